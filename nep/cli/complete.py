@@ -46,6 +46,13 @@ def complete_type(ctx: typer.Context, incomplete: str) -> list[str]:
     return sorted(each for each in types if each.startswith(incomplete))
 
 
+def complete_service_type(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Types of services that begin so."""
+    view = _view(ctx)
+    types = {service.msg_type for service in view.services.values()} if view is not None else set()
+    return sorted(each for each in types if each.startswith(incomplete))
+
+
 def complete_node(ctx: typer.Context, incomplete: str) -> list[str]:
     """Names of nodes that begin so."""
     view = _view(ctx)

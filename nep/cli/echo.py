@@ -15,11 +15,13 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_more, complete_topic
+from nep.cli.message_filter import MessageFilter
+from nep.cli.network import BackendOption, node_for
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, console, json_painter, say, show_json, size, write
 from nep.cli.table_file import Fields, Table
 from nep.cli.topic_patterns import TopicPatterns, is_pattern
-from nep.cli.topic_wait import TopicWait, node_for
+from nep.cli.topic_wait import TopicWait
 from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, listed, ngettext
@@ -39,7 +41,8 @@ _SLICE_S = 0.02
 TopicArgument = Annotated[
     str,
     typer.Argument(
-        help=_("The topic to look into, or a pattern such as '/*/odom'."),
+        metavar=_("TOPIC"),
+        help=_("Topic, or a pattern such as '/*/odom'."),
         show_default=False,
         autocompletion=complete_topic,
     ),
@@ -48,19 +51,28 @@ MoreArgument = Annotated[
     list[str] | None,
     typer.Argument(
         metavar=_("TOPIC|FIELD"),
-        help=_("More topics; or show these fields only, such as pose.x or joints\\[3]."),
+        help=_("More topics, or the fields to print, such as pose.x or joints\\[3]."),
         show_default=False,
         autocompletion=complete_more,
     ),
 ]
 CountOption = Annotated[
-    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N messages; 0 goes on."))
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N messages (0: never)."))
 ]
 CsvOption = Annotated[
-    bool, typer.Option("--csv", help=_("Write the fields as comma-separated values, with their time."))
+    bool, typer.Option("--csv", help=_("Print the fields as comma-separated values, with their time."))
+]
+FilterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        metavar=_("EXPRESSION"),
+        help=_("Print only messages that match, such as 'pose.x > 1.5 and state == \"moving\"'."),
+        show_default=False,
+    ),
 ]
 FullOption = Annotated[
-    bool, typer.Option("--full", help=_("Show long lists and texts whole, on a terminal too."))
+    bool, typer.Option("--full", help=_("Print long lists and texts in full, on a terminal too."))
 ]
 
 
@@ -73,18 +85,24 @@ def echo(
     as_json: JsonOption = False,
     as_csv: CsvOption = False,
     full: FullOption = False,
+    expression: FilterOption = None,
+    backend: BackendOption = None,
 ) -> None:
-    """Show the messages of topics as they come. Ctrl+C ends it.
+    """Print messages from topics until Ctrl+C.
 
-    A pattern means all topics that match it, also those that appear later: * is any letters between slashes,
-    ? is one letter, ** is any parts or none. Put it into quotes, for the shell has patterns too.
+    A pattern also matches topics that appear later: * stands for any characters between slashes, ? for one
+    character, ** for any number of parts. Put it in quotes, because the shell expands patterns, too.
 
-    Pictures are shown by their size, and what cannot be read as its bytes. A terminal shows the beginning of
-    long lists and texts; files and other programs get all of them.
+    --filter compares fields with values using ==, !=, <, <=, >, >= and in; combine conditions with and, or
+    and not. m is the whole message.
+
+    Images are printed as their size, undecodable messages as bytes. A terminal shows the beginning of long
+    lists and texts; files and pipes get all of them.
     """
     if as_csv and as_json:
         raise typer.BadParameter(_("--csv and --json are two ways to write; choose one"))
-    with ExitStack() as opened, node_for("echo", master) as node:
+    chosen = None if expression is None else MessageFilter(expression)
+    with ExitStack() as opened, node_for("echo", master, backend) as node:
         graph = node.graph()
         topics, fields = topics_and_fields(topic, more or (), graph)
         if as_csv and not fields:
@@ -113,6 +131,8 @@ def echo(
 
         hear(wanted)
         coming = _coming(subscribers, timeout_s, waiting, patterns, hear)
+        if chosen is not None:
+            coming = (message for message in coming if _passes(chosen, message))
         try:
             for message in itertools.islice(coming, count or None):
                 show(message)
@@ -177,6 +197,14 @@ def _coming(
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
             waiting.look_again()
+
+
+def _passes(condition: MessageFilter, message: Message) -> bool:
+    """Whether a message is shown; one that can't be decoded is not."""
+    try:
+        return condition.matches(dict(message.extension) if message.codec == "image" else message.payload)
+    except DecodeError:
+        return False
 
 
 def show_record(message: Message, fields: Fields | None = None) -> None:

@@ -13,10 +13,11 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic
+from nep.cli.network import BackendOption, node_for
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow, ReplayFilter
 from nep.cli.screen import UNKNOWN, cells, padded, rate, say, show_json, size, write
-from nep.cli.topic_wait import TopicWait, node_for
+from nep.cli.topic_wait import TopicWait
 from nep.errors import WaitTimeoutError
 from nep.i18n import _, lazy, listed
 from nep.messages.message import Message
@@ -33,7 +34,7 @@ _COMPARED_AFTER = 3
 TopicsArgument = Annotated[
     list[str],
     typer.Argument(
-        help=_("The topics to measure."),
+        help=_("Topics to measure."),
         metavar=_("TOPIC"),
         show_default=False,
         autocompletion=complete_topic,
@@ -42,11 +43,16 @@ TopicsArgument = Annotated[
 WindowOption = Annotated[
     float,
     typer.Option(
-        "--window", "-w", metavar=_("SECONDS"), help=_("Measure over the last seconds."), min=1.0, max=3600.0
+        "--window",
+        "-w",
+        metavar=_("SECONDS"),
+        help=_("Length of the window in seconds."),
+        min=1.0,
+        max=3600.0,
     ),
 ]
 CountOption = Annotated[
-    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N reports; 0 goes on."))
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N reports (0: never)."))
 ]
 Figures = Mapping[str, object]
 
@@ -58,14 +64,15 @@ def hz(
     master: MasterOption = None,
     as_json: JsonOption = False,
     timeout_s: TimeoutOption = None,
+    backend: BackendOption = None,
 ) -> None:
-    """Show how often topics are published: rate, and the gaps between messages. Ctrl+C ends it.
+    """Print the rate of topics and the gaps between their messages, once a second until Ctrl+C.
 
-    Gaps are told by the publishers' clocks, so this program's own pace does not count; of programs of the
-    original NEP, which send no time, by when their messages arrive here.
+    Gaps are measured with the publishers' stamps; programs of the original NEP send none, so arrival times
+    are used. Messages that a publisher kept for new subscribers are left out.
     """
     heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
-    _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, as_json=as_json)
+    _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, backend, as_json=as_json)
 
 
 def bw(
@@ -75,8 +82,9 @@ def bw(
     master: MasterOption = None,
     as_json: JsonOption = False,
     timeout_s: TimeoutOption = None,
+    backend: BackendOption = None,
 ) -> None:
-    """Show how much topics carry: bytes a second, and how large their messages are. Ctrl+C ends it."""
+    """Print the bandwidth of topics and the sizes of their messages, once a second until Ctrl+C."""
     heads = (
         lazy("bandwidth"),
         lazy("mean"),
@@ -85,7 +93,7 @@ def bw(
         lazy("messages"),
         lazy("lost"),
     )
-    _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, as_json=as_json)
+    _Report(topics, window_s, heads, _traffic_cells).run(count, timeout_s, master, backend, as_json=as_json)
 
 
 def delay(
@@ -95,14 +103,15 @@ def delay(
     master: MasterOption = None,
     as_json: JsonOption = False,
     timeout_s: TimeoutOption = None,
+    backend: BackendOption = None,
 ) -> None:
-    """Show how old messages are when they arrive here. Ctrl+C ends it.
+    """Print the age of messages when they arrive here, once a second until Ctrl+C.
 
-    Between two computers it is corrected by how their clocks differ, which the master finds out within two
-    seconds, and how surely that is known is shown behind a ±. Programs of the original NEP send no time. A
-    message that was kept for whoever subscribes later is as old as it is.
+    Between two computers the age is corrected by the difference of their clocks, which the master measures
+    within two seconds; its uncertainty follows after ±. Programs of the original NEP send no stamps. Messages
+    that were kept for new subscribers count with their full age.
     """
-    _DelayReport(topics, window_s).run(count, timeout_s, master, as_json=as_json)
+    _DelayReport(topics, window_s).run(count, timeout_s, master, backend, as_json=as_json)
 
 
 class _Report:
@@ -124,9 +133,17 @@ class _Report:
         self._heard_at = time.monotonic()
         self._width = max(_NARROWEST, *map(cells, topics))
 
-    def run(self, count: int, timeout_s: float | None, master: str | None, *, as_json: bool) -> None:
+    def run(
+        self,
+        count: int,
+        timeout_s: float | None,
+        master: str | None,
+        backend: str | None,
+        *,
+        as_json: bool,
+    ) -> None:
         """Report until Ctrl+C, or `count` times. Raises `BadTopicError`, `WaitTimeoutError`."""
-        with ExitStack() as opened, node_for("measure", master) as node:
+        with ExitStack() as opened, node_for("measure", master, backend) as node:
             waiting = TopicWait(node, list(self._windows))
             waiting.look(node.graph())
             for topic in self._windows:

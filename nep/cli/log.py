@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.complete import complete_node
+from nep.cli.network import node_for
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, say, show_json, write
-from nep.cli.topic_wait import node_for
 from nep.cli.values import cleaned
 from nep.errors import DecodeError, did_you_mean
 from nep.i18n import _

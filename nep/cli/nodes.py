@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict
+from typing import Annotated
 
 import typer
 
+from nep.cli.complete import complete_node
+from nep.cli.network import BackendOption, graph_of
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_alerts, show_json, show_table
+from nep.cli.screen import UNKNOWN, TextColumn, duration, say, show_alerts, show_json, show_table, write
+from nep.cli.topic_wait import meant
 from nep.cli.typer_words import TranslatedGroup
+from nep.cli.values import service_type_text
+from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, NodeInfo
-from nep.text import escaped
+from nep.text import escaped, quotable
 
 app: typer.Typer = typer.Typer(
-    cls=TranslatedGroup, no_args_is_help=True, help=_("The programs that are there.")
+    cls=TranslatedGroup, no_args_is_help=True, help=_("List the running nodes and inspect one.")
 )
 _COLUMNS = (
     TextColumn(lazy("node"), style="bold", is_whole=True),
@@ -43,9 +48,11 @@ _WIRES = {
 
 
 @app.command("list")
-def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """List all nodes, with what they publish, subscribe, serve and call."""
-    graph = view(master)
+def list_nodes(
+    master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
+) -> None:
+    """List nodes with their topics and services."""
+    graph = graph_of(master, backend)
     nodes = sorted(graph.nodes.values(), key=lambda node: (node.generation != "native", node.name, node.id))
     if as_json:
         show_json(
@@ -60,6 +67,81 @@ def list_nodes(master: MasterOption = None, as_json: JsonOption = False) -> None
     else:
         say(_("no nodes yet; they appear as soon as a program makes one"))
     show_alerts(graph.alerts)
+
+
+@app.command("info")
+def info(
+    node: Annotated[
+        str,
+        typer.Argument(
+            metavar=_("NODE"),
+            help=_("Name or id of the node."),
+            show_default=False,
+            autocompletion=complete_node,
+        ),
+    ],
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print information about a node: its program, and its topics and services with their types."""
+    graph = graph_of(master, backend)
+    found = [each for each in graph.nodes.values() if node in {each.name, each.id}]
+    if not found:
+        said = _("no node '{node}'; {meant}'nep node list' shows all nodes")
+        near = meant(node, [each.name for each in graph.nodes.values()])
+        raise NepError(said.format(node=quotable(node), meant=near))
+    found.sort(key=lambda each: each.id)
+    if as_json:
+        show_json([_record(graph, each) for each in found])
+        return
+    for number, each in enumerate(found):
+        write(("\n" if number else "") + _described(graph, each))
+    show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == node)
+
+
+def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
+    """As `nep node list --json` has it, with the types of its topics and services."""
+    topics = {
+        role: {name: _topic_type(graph, name) for name in names}
+        for role, names in _topics_of(graph, node).items()
+    }
+    services = {
+        role: {name: graph.services[name].msg_type for name in names}
+        for role, names in _services_of(graph, node).items()
+    }
+    return {**asdict(node), **topics, **services}
+
+
+def _described(graph: GraphView, node: NodeInfo) -> str:
+    language, wire, pid, since, cpu = _row(graph, node)[1:6]
+    heads = (
+        (_("node"), escaped(node.name)),
+        (_("id"), node.id),
+        (_("computer"), escaped(node.host) or UNKNOWN),
+        (_("pid"), pid),
+        (_("language"), language),
+        (_("wire"), wire),
+        (_("since"), since),
+        (_("cpu"), cpu),
+    )
+    topics, services = _topics_of(graph, node), _services_of(graph, node)
+    sections = (
+        (_("publishes"), [(name, escaped(_topic_type(graph, name))) for name in topics["publishes"]]),
+        (_("subscribes"), [(name, escaped(_topic_type(graph, name))) for name in topics["subscribes"]]),
+        (_("serves"), [(name, service_type_text(graph.services[name])) for name in services["serves"]]),
+        (_("calls"), [(name, service_type_text(graph.services[name])) for name in services["calls"]]),
+    )
+    lines = [f"{head}: {value}" for head, value in heads]
+    for head, entries in sections:
+        lines.append(f"{head}:" if entries else f"{head}: {UNKNOWN}")
+        lines += [f"  {escaped(name)}: {kind}" for name, kind in entries]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _topic_type(graph: GraphView, name: str) -> str:
+    known = graph.topics.get(name) or graph.patterns.get(name)
+    return known.msg_type if known is not None else ""
 
 
 def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ MasterOption = Annotated[
         "--master",
         metavar=_("ADDRESS"),
         envvar="NEP_MASTER",
-        help=_("Where the master is; {address} when nothing is said.").format(address=DEFAULT_MASTER),
+        help=_("Address of the master (default: {address}).").format(address=DEFAULT_MASTER),
         show_default=False,
     ),
 ]
@@ -31,7 +31,7 @@ AllowMovingOption = Annotated[
         show_default=False,
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help=_("Write JSON, for programs."))]
+JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
 def checked_time(given: float | None) -> float | None:
@@ -46,7 +46,7 @@ TimeoutOption = Annotated[
     typer.Option(
         "--timeout",
         metavar=_("SECONDS"),
-        help=_("End when no message came for so long."),
+        help=_("Exit with an error if no message arrives for this long."),
         show_default=False,
         callback=checked_time,
     ),

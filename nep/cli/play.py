@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli.network import node_for
 from nep.cli.options import AllowMovingOption, MasterOption
 from nep.cli.recording_files import (
     FileArgument,
@@ -20,7 +21,6 @@ from nep.cli.recording_files import (
     span_ns,
 )
 from nep.cli.screen import console, say
-from nep.cli.topic_wait import node_for
 from nep.errors import NepError
 from nep.i18n import _, listed, ngettext, number
 from nep.messages.message import Message

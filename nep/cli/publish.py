@@ -18,9 +18,9 @@ import typer
 
 from nep.cli.complete import complete_topic
 from nep.cli.json_input import parse_json, text_of
+from nep.cli.network import BackendOption, node_for
 from nep.cli.options import MasterOption
 from nep.cli.screen import say, size
-from nep.cli.topic_wait import node_for
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for
@@ -32,6 +32,7 @@ from nep.protocol.graph_view import TopicInfo
 _MOST_BYTES = 10**9
 """What a file may have: far more than a message, but a device such as /dev/zero has no end."""
 _MAX_CATCH_UP_S = 0.01
+_WAIT_SLICE_S = 0.02
 _TEXT_TYPES = frozenset({"string"})
 _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
@@ -39,9 +40,10 @@ _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 _Payload = Annotated[
     str,
     typer.Argument(
+        metavar=_("MESSAGE"),
         help=_(
-            "What to publish: JSON, or plain text for the type string; @FILE takes it from a "
-            "file, - takes each line of the standard input."
+            "Message as JSON, or as plain text for the type string. @FILE reads it from a file, - publishes "
+            "each line of the standard input."
         ),
         show_default=False,
     ),
@@ -61,7 +63,7 @@ _TypeOption = Annotated[
         "--type",
         "-t",
         metavar=_("TYPE"),
-        help=_("The topic's type; else the one it has, else json."),
+        help=_("Message type (default: the topic's, or json)."),
         show_default=False,
         callback=_type,
     ),
@@ -72,7 +74,7 @@ _RateOption = Annotated[
         "--rate",
         "-r",
         metavar="HZ",
-        help=_("Publish again and again, so often a second."),
+        help=_("Publish repeatedly, HZ times a second."),
         show_default=False,
     ),
 ]
@@ -81,31 +83,52 @@ _RateOption = Annotated[
 def publish(
     topic: Annotated[
         str,
-        typer.Argument(help=_("The topic to publish."), show_default=False, autocompletion=complete_topic),
+        typer.Argument(
+            metavar=_("TOPIC"),
+            help=_("Topic to publish on."),
+            show_default=False,
+            autocompletion=complete_topic,
+        ),
     ],
     payload: _Payload,
     msg_type: _TypeOption = None,
     rate_hz: _RateOption = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("With --rate: end after N."))
+        int,
+        typer.Option(
+            "--count", "-n", min=0, metavar="N", help=_("With --rate: exit after N messages (0: never).")
+        ),
     ] = 0,
     latched: Annotated[
-        bool, typer.Option("--latched", help=_("Stay, and give it to whoever subscribes later."))
+        bool, typer.Option("--latched", help=_("Keep running, and send the last message to new subscribers."))
     ] = False,
     master: MasterOption = None,
+    wait: Annotated[
+        int,
+        typer.Option(
+            "--wait",
+            "-w",
+            min=0,
+            metavar="N",
+            help=_("Wait for N subscribers before the first message."),
+            show_default=False,
+        ),
+    ] = 0,
+    backend: BackendOption = None,
 ) -> None:
-    """Publish once, or with --rate again and again. Ctrl+C ends it.
+    """Publish a message once, or with --rate repeatedly until Ctrl+C.
 
-    What is typed here is published without asking, also on a topic that moves a robot.
+    The message is sent without asking, also on a topic that moves a robot.
     """
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
         raise typer.BadParameter(_("a rate is more than 0 and at most 10000 a second"), param_hint="--rate")
-    with node_for("pub", master) as node:
+    with node_for("pub", master, backend) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
         _warn_of_type(topic, kind, known)
         value = None if payload == "-" else encoded_of(payload, kind)
         with node.new_pub(topic, kind, latched=latched) as publisher:
+            wait_for_subscribers(publisher, wait)
             if payload == "-":
                 _publish_lines(publisher, kind)
             else:
@@ -241,6 +264,21 @@ def repeat(
         if late_s > _MAX_CATCH_UP_S:
             due += math.ceil(late_s / period_s) * period_s
         wait_s(max(0.0, due - clock()))
+
+
+def wait_for_subscribers(publisher: Publisher, count: int) -> None:
+    """Return when `count` subscribers are connected."""
+    if publisher.subscribers >= count:
+        return
+    said = ngettext(
+        "waiting for {count} subscriber; Ctrl+C ends it",
+        "waiting for {count} subscribers; Ctrl+C ends it",
+        count,
+    )
+    say(said.format(count=count))
+    never = threading.Event()
+    while publisher.subscribers < count:
+        never.wait(_WAIT_SLICE_S)
 
 
 def _wait_for_ever() -> None:

@@ -16,10 +16,10 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
+from nep.cli.network import node_for
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.recording_files import TopicsToRecord, clock_text
 from nep.cli.screen import console, say, show_json, size
-from nep.cli.topic_wait import node_for
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext
 from nep.protocol.graph_view import GraphView

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-    from nep.protocol.graph_view import Alert
+    from nep.protocol.graph_view import Alert, TopicInfo
     from nep.system.terminal import Terminal
 
 _GAP = 3
@@ -231,6 +231,13 @@ def size(value: float | None, per: str = "") -> str:
             return f"{value:.{digits}f} {unit}{per}"
         value /= 1000
     return f"{value:.1f} GB{per}"
+
+
+def bandwidth(topic: TopicInfo) -> str:
+    """Bytes a second; messages that nobody subscribes are not encoded, so their size is unknown."""
+    if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
+        return _("not subscribed")
+    return size(topic.bandwidth_Bps, "/s")
 
 
 def duration(seconds: float) -> str:

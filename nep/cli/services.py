@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from nep.cli.complete import complete_service
+from nep.cli.complete import complete_service, complete_service_type
 from nep.cli.json_input import parse_json, text_of
+from nep.cli.network import BackendOption, graph_of, open_node
 from nep.cli.options import JsonOption, MasterOption, checked_time
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, say, show_alerts, show_json, show_table, size, write
 from nep.cli.topic_wait import meant
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import ids_as_text, presented
+from nep.cli.values import ids_as_text, presented, service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.masters.process import view
-from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView, ServiceInfo
 from nep.protocol.service_wire import check_service
-from nep.text import escaped
+from nep.text import escaped, quotable
 
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
-    help=_("Who answers calls: list the services, look into one, call it."),
+    help=_("List, inspect and call services."),
 )
 _TIMEOUT_S = 5.0
 _COLUMNS = (
@@ -50,31 +48,19 @@ _ServiceArgument = Annotated[
     str,
     typer.Argument(
         metavar=_("NAME"),
-        help=_("The service."),
+        help=_("Name of the service."),
         show_default=False,
         autocompletion=complete_service,
     ),
 ]
 
 
-_BackendOption = Annotated[
-    str | None,
-    typer.Option(
-        "--backend",
-        metavar=_("NAME"),
-        help=_("Look there, where no master is asked: 'zenoh', 'ros2', 'ros'. ADDRESS is then its place."),
-        show_default=False,
-    ),
-]
-_MASTER_VARIABLE = "NEP_MASTER"
-
-
 @app.command("list")
 def list_services(
-    master: MasterOption = None, backend: _BackendOption = None, as_json: JsonOption = False
+    master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
 ) -> None:
-    """List all services, with who serves and calls them."""
-    graph = _view(master, backend)
+    """List services with their servers and clients."""
+    graph = graph_of(master, backend)
     services = [graph.services[name] for name in sorted(graph.services)]
     if as_json:
         show_json(ids_as_text([asdict(each) for each in services]))
@@ -90,17 +76,18 @@ def list_services(
 def info(
     service: _ServiceArgument,
     master: MasterOption = None,
-    backend: _BackendOption = None,
+    backend: BackendOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what is known of a service: each node that serves or calls it."""
-    graph = _view(master, backend)
+    """Print information about a service: its type, servers and clients."""
+    graph = graph_of(master, backend)
     found = _found(service, graph)
     if as_json:
         show_json(ids_as_text(_record(graph, found)))
         return
     for head, value in (
         (_("service"), escaped(found.name)),
+        (_("type"), service_type_text(found)),
         (_("answered"), str(found.calls)),
         (_("errors"), str(found.errors)),
     ):
@@ -110,6 +97,51 @@ def info(
     show_alerts(each for each in graph.alerts if each.id == f"service:{service}")
 
 
+@app.command("type")
+def show_type(
+    service: _ServiceArgument,
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the type of a service."""
+    found = _found(service, graph_of(master, backend))
+    if as_json:
+        show_json({"service": found.name, "msg_type": found.msg_type})
+    else:
+        write(f"{service_type_text(found)}\n")
+
+
+@app.command("find")
+def find(
+    msg_type: Annotated[
+        str,
+        typer.Argument(
+            metavar=_("TYPE"),
+            help=_("Type to find."),
+            show_default=False,
+            autocompletion=complete_service_type,
+        ),
+    ],
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List services of a type."""
+    graph = graph_of(master, backend)
+    names = sorted(name for name, each in graph.services.items() if each.msg_type == msg_type)
+    if as_json:
+        show_json(names)
+    elif names:
+        write("".join(f"{escaped(name)}\n" for name in names))
+    else:
+        types = sorted({each.msg_type for each in graph.services.values()})
+        said = _(
+            "no service has the type '{msg_type}'; {meant}'nep service type NAME' shows a service's type"
+        )
+        say(said.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
+
+
 @app.command("call")
 def call(
     service: _ServiceArgument,
@@ -117,7 +149,7 @@ def call(
         str,
         typer.Argument(
             metavar="JSON",
-            help=_("What to ask: JSON; @FILE takes it from a file. An empty map when nothing is said."),
+            help=_("Request as JSON (default: an empty map); @FILE reads it from a file."),
             show_default=False,
         ),
     ] = "{}",
@@ -126,7 +158,7 @@ def call(
         typer.Option(
             "--timeout",
             metavar=_("SECONDS"),
-            help=_("How long to wait for a server and its answer; {seconds:g} when nothing is said.").format(
+            help=_("How long to wait for a server and its answer (default: {seconds:g}).").format(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,
@@ -134,35 +166,18 @@ def call(
         ),
     ] = None,
     master: MasterOption = None,
-    backend: _BackendOption = None,
+    backend: BackendOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Call a service, and write its answer."""
+    """Call a service and print its answer."""
     asked = _request(request)
-    with _node("nep-service-call", master, backend) as node:
+    with open_node("nep-service-call", master, backend) as node:
         client = node.new_client(service, timeout_s=_TIMEOUT_S if timeout_s is None else timeout_s)
         answer = client.call(asked)
     if as_json:
         show_json(answer)
     else:
         write(f"{presented(answer, whole=True)}\n")
-
-
-def _node(name: str, master: str | None, backend: str | None) -> Node:
-    """A node over the back end. Raises `UnknownBackendError`, `BackendUnavailableError`."""
-    name = f"{name}-{os.getpid()}"
-    if backend is None:
-        return Node(name, master=master)
-    is_said = master is not None and master != os.environ.get(_MASTER_VARIABLE)
-    return Node(name, backend, master=master if is_said else None)
-
-
-def _view(master: str | None, backend: str | None) -> GraphView:
-    """Who is there. Raises `MasterUnreachable`, and as `_node` does."""
-    if backend is None:
-        return view(master)
-    with _node("nep-service", master, backend) as node:
-        return node.graph()
 
 
 def _request(text: str) -> object:

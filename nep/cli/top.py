@@ -21,6 +21,7 @@ from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
+    bandwidth,
     console,
     duration,
     rate,
@@ -251,7 +252,7 @@ class _Shown:
             escaped(topic.msg_type),
             shortened(escaped(", ".join(dict.fromkeys(names))), _NAMES_MOST) or UNKNOWN,
             rate(topic.rate_hz),
-            size(topic.bandwidth_Bps, "/s"),
+            bandwidth(topic),
             str(len(topic.subscribers)),
             UNKNOWN if topic.lost is None else str(topic.lost),
         )

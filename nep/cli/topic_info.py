@@ -8,13 +8,24 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic, complete_type
+from nep.cli.network import BackendOption, graph_of
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size, write
+from nep.cli.screen import (
+    UNKNOWN,
+    TextColumn,
+    bandwidth,
+    rate,
+    say,
+    show_alerts,
+    show_json,
+    show_table,
+    size,
+    write,
+)
 from nep.cli.topic_wait import meant
 from nep.cli.values import ids_as_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
-from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.wire import check_topic
 from nep.text import escaped
@@ -23,7 +34,7 @@ TopicArgument = Annotated[
     str,
     typer.Argument(
         metavar=_("TOPIC"),
-        help=_("The topic to look into."),
+        help=_("Topic to inspect."),
         show_default=False,
         autocompletion=complete_topic,
     ),
@@ -31,7 +42,7 @@ TopicArgument = Annotated[
 TypeArgument = Annotated[
     str,
     typer.Argument(
-        metavar=_("TYPE"), help=_("The type to find."), show_default=False, autocompletion=complete_type
+        metavar=_("TYPE"), help=_("Type to find."), show_default=False, autocompletion=complete_type
     ),
 ]
 _COLUMNS = (
@@ -44,9 +55,14 @@ _COLUMNS = (
 )
 
 
-def info(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """Show what is known of a topic: its type, and each node that publishes or subscribes it."""
-    graph = view(master)
+def info(
+    topic: TopicArgument,
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print information about a topic: its type, publishers and subscribers."""
+    graph = graph_of(master, backend)
     found = _found(topic, graph)
     if as_json:
         show_json(ids_as_text(_record(graph, found)))
@@ -58,7 +74,7 @@ def info(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption 
         (_("codec"), escaped(found.codec)),
         (_("latched"), _("yes") if latched else _("no")),
         (_("rate"), rate(found.rate_hz)),
-        (_("bandwidth"), size(found.bandwidth_Bps, "/s")),
+        (_("bandwidth"), bandwidth(found)),
         (_("lost"), _count(found.lost)),
     ):
         write(f"{head}: {value}\n")
@@ -67,18 +83,28 @@ def info(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption 
     show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == topic)
 
 
-def show_type(topic: TopicArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """Show the type of a topic."""
-    found = _found(topic, view(master))
+def show_type(
+    topic: TopicArgument,
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the type of a topic."""
+    found = _found(topic, graph_of(master, backend))
     if as_json:
         show_json({"topic": found.name, "msg_type": found.msg_type, "codec": found.codec})
     else:
         write(f"{escaped(found.msg_type)}\n")
 
 
-def find(msg_type: TypeArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """List the topics that have a type."""
-    graph = view(master)
+def find(
+    msg_type: TypeArgument,
+    master: MasterOption = None,
+    backend: BackendOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List topics of a type."""
+    graph = graph_of(master, backend)
     names = sorted(name for name, each in graph.topics.items() if each.msg_type == msg_type)
     if as_json:
         show_json(names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Collection, Sequence
 from contextlib import suppress
@@ -18,11 +17,6 @@ _AGAIN_S = 1.0
 _SLICE_S = 0.1
 _PATIENCE_S = 0.3
 """A master that is away must not keep messages waiting, which do not need it."""
-
-
-def node_for(command: str, master: str | None) -> Node:
-    """A node for one run of a command. Its name holds the process, because two of them may run."""
-    return Node(f"nep-topic-{command}-{os.getpid()}", master=master)
 
 
 class TopicWait:

@@ -8,21 +8,21 @@ import typer
 
 from nep.cli.echo import echo
 from nep.cli.hz_bw import bw, delay, hz
+from nep.cli.network import BackendOption, graph_of
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.publish import publish
-from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_alerts, show_json, show_table, size
+from nep.cli.screen import UNKNOWN, TextColumn, bandwidth, rate, say, show_alerts, show_json, show_table
 from nep.cli.topic_info import find, info, show_type
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import ids_as_text
 from nep.i18n import _, lazy
-from nep.masters.process import view
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.text import escaped
 
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
-    help=_("What is published: list it, look into it, measure it, publish."),
+    help=_("List, print, measure and publish topics."),
 )
 app.command("echo")(echo)
 app.command("pub")(publish)
@@ -44,9 +44,11 @@ _COLUMNS = (
 
 
 @app.command("list")
-def list_topics(master: MasterOption = None, as_json: JsonOption = False) -> None:
-    """List all topics, with who publishes and subscribes them and how fast."""
-    graph = view(master)
+def list_topics(
+    master: MasterOption = None, backend: BackendOption = None, as_json: JsonOption = False
+) -> None:
+    """List topics with their publishers, subscribers and rates."""
+    graph = graph_of(master, backend)
     topics = [graph.topics[name] for name in sorted(graph.topics)]
     if as_json:
         show_json(ids_as_text([asdict(topic) for topic in topics]))
@@ -65,7 +67,7 @@ def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
         _names(graph, [each.node_id for each in topic.publishers]),
         _names(graph, [each.node_id for each in topic.subscribers]),
         rate(topic.rate_hz),
-        size(topic.bandwidth_Bps, "/s"),
+        bandwidth(topic),
         UNKNOWN if topic.lost is None else str(topic.lost),
     )
 

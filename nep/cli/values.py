@@ -10,6 +10,8 @@ import orjson
 
 from nep.i18n import _
 from nep.messages.codecs import numpy_option
+from nep.protocol.graph_view import ServiceInfo
+from nep.protocol.service_wire import SERVICE_TYPE
 from nep.text import escaped, shortened
 
 __all__ = ["ids_as_text", "json_of", "presented"]
@@ -119,6 +121,13 @@ def _list(value: Sequence[object], items: float, fields: float, letters: float, 
     if count < len(value):
         shown.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
     return shown
+
+
+def service_type_text(service: ServiceInfo) -> str:
+    """The type of a service; nep's own services have none."""
+    if service.msg_type == SERVICE_TYPE:
+        return _("any (each client chooses json or msgpack)")
+    return escaped(service.msg_type)
 
 
 def cleaned(text: str) -> str:

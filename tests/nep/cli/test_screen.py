@@ -9,6 +9,7 @@ from rich.cells import cell_len
 from nep.cli.screen import (
     UNKNOWN,
     TextColumn,
+    bandwidth,
     duration,
     rate,
     say_error,
@@ -17,7 +18,7 @@ from nep.cli.screen import (
     show_table,
     size,
 )
-from nep.protocol.graph_view import Alert
+from nep.protocol.graph_view import Alert, SubscriberInfo, TopicInfo
 
 
 @pytest.mark.parametrize(
@@ -166,3 +167,11 @@ def test_a_wide_name_is_whole_where_it_has_room(capsys, monkeypatch):
         [("/" + "日本" * 5, "a/type/that/is/folded")],
     )
     assert "/" + "日本" * 5 in capsys.readouterr().out
+
+
+def test_bandwidth_of_a_topic_without_subscribers_is_not_zero():
+    subscriber = SubscriberInfo(1, "n", 0, 0)
+    assert "B/s" not in bandwidth(TopicInfo("/t", "json", "json", rate_hz=50.0, bandwidth_Bps=0.0))
+    heard = TopicInfo("/t", "json", "json", (), (subscriber,), rate_hz=50.0, bandwidth_Bps=0.0)
+    assert bandwidth(heard) == "0 B/s"
+    assert bandwidth(TopicInfo("/t", "json", "json", rate_hz=0.0, bandwidth_Bps=0.0)) == "0 B/s"

@@ -70,15 +70,23 @@ def test_topics_and_services_are_listed_apart(arm, type_in):
     assert head[-2:] == ["serves", "calls"]
 
 
-def test_info_names_each_node_and_where_the_server_is(arm, type_in):
+def test_info_type_and_find_of_a_service(arm, type_in):
     code, out, _err = type_in("service", "info", SERVICE)
     assert code == 0
-    assert out.startswith(f"service: {SERVICE}\nanswered: 2\nerrors: 1\n\n")
+    assert out.startswith(
+        f"service: {SERVICE}\ntype: any (each client chooses json or msgpack)\nanswered: 2\nerrors: 1\n\n"
+    )
     assert any(row[:4] == ["arm", "serves", "2", "1"] and row[-1] == arm.endpoints[0] for row in rows(out))
     assert any(row[:4] == ["page", "calls", "2", "0"] for row in rows(out))
     record = json.loads(type_in("service", "info", SERVICE, "--json")[1])
     assert [each["node"] for each in record["servers"]] == ["arm"]
     assert [each["node"] for each in record["clients"]] == ["page"]
+    assert type_in("service", "type", SERVICE)[:2] == (0, "any (each client chooses json or msgpack)\n")
+    msg_type = json.loads(type_in("service", "type", SERVICE, "--json")[1])["msg_type"]
+    assert json.loads(type_in("service", "find", msg_type, "--json")[1]) == [SERVICE]
+    code, out, err = type_in("service", "find", "std_srvs/SetBool")
+    assert (code, out) == (0, "")
+    assert "'std_srvs/SetBool'" in err
 
 
 def test_two_servers_are_told_with_the_list(arm, type_in):

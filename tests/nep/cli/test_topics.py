@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nep.cli.echo import Lines, show_record
-from nep.cli.publish import value_of
+from nep.cli.publish import value_of, wait_for_subscribers
 from nep.errors import EncodeError, NepError
 from nep.messages.message import Message
 
@@ -110,3 +110,17 @@ def test_a_device_without_end_is_no_file(monkeypatch):
     monkeypatch.setattr("nep.cli.publish._MOST_BYTES", 1000)
     with pytest.raises(EncodeError, match=r"more than the 1\.0 kB"):
         value_of("@/dev/zero", "bytes")
+
+
+def test_publishing_waits_for_the_number_of_subscribers(capsys):
+    class _Publisher:
+        counts = iter([0, 0, 1, 1, 2])
+
+        @property
+        def subscribers(self):
+            return next(self.counts)
+
+    publisher = _Publisher()
+    wait_for_subscribers(publisher, 2)
+    assert list(publisher.counts) == []
+    assert "2 subscribers" in capsys.readouterr().err

@@ -1,0 +1,55 @@
+"""Nodes and graph views for commands: through the master, or over the back end that `--backend` names."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from nep.i18n import _
+from nep.masters.process import view
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+from nep.system.addresses import MASTER_VARIABLE
+
+__all__ = ["BackendOption", "graph_of", "node_for", "open_node"]
+
+BackendOption = Annotated[
+    str | None,
+    typer.Option(
+        "--backend",
+        metavar=_("NAME"),
+        help=_(
+            "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master is then its place."
+        ),
+        show_default=False,
+    ),
+]
+
+
+def node_for(command: str, master: str | None, backend: str | None = None) -> Node:
+    """Open a node for one run of a topic command. Its name has the process id, because two may run."""
+    return open_node(f"nep-topic-{command}", master, backend)
+
+
+def open_node(name: str, master: str | None, backend: str | None = None) -> Node:
+    """Open a node. NEP_MASTER is the place of the default back end only.
+
+    Raises `UnknownBackendError`, `BackendUnavailableError`.
+    """
+    name = f"{name}-{os.getpid()}"
+    if backend is None:
+        return Node(name, master=master)
+    is_given = master is not None and master != os.environ.get(MASTER_VARIABLE)
+    return Node(name, backend, master=master if is_given else None)
+
+
+def graph_of(master: str | None, backend: str | None = None) -> GraphView:
+    """Return the graph without the node that asks. Raises `MasterUnreachable`, and as `open_node` does."""
+    if backend is None:
+        return view(master)
+    with open_node("nep-graph", master, backend) as node:
+        graph = node.graph()
+    return replace(graph, nodes={id: each for id, each in graph.nodes.items() if id != node.id})

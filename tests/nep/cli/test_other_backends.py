@@ -1,0 +1,55 @@
+"""`--backend`: topic and node commands over a back end that has no master."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import pytest
+
+import nep
+from nep.nodes.publisher import Publisher
+from tests.nep.meeting import place_for
+
+
+@pytest.fixture
+def there(monkeypatch):
+    """A node that publishes /odom again and again; the words that name its place."""
+    monkeypatch.setenv("NEP_MASTER", "127.0.0.1:1")  # of another back end: no place of this one
+    place, ended = place_for("memory", ""), threading.Event()
+
+    def publish(publisher: Publisher) -> None:
+        number = 0
+        while not ended.wait(0.005):
+            number += 1
+            publisher.publish({"x": number})
+
+    with nep.node("robot", "memory", master=place) as node:
+        thread = threading.Thread(target=publish, args=(node.new_pub("/odom", "robot/odometry"),))
+        thread.start()
+        yield "--backend", "memory", "--master", place
+        ended.set()
+        thread.join()
+
+
+def test_topics_and_nodes_of_a_back_end_are_listed_without_the_command_itself(there, type_in):
+    assert [each["name"] for each in json.loads(type_in("topic", "list", "--json", *there)[1])] == ["/odom"]
+    assert [each["name"] for each in json.loads(type_in("node", "list", "--json", *there)[1])] == ["robot"]
+    assert type_in("topic", "type", "/odom", *there)[:2] == (0, "robot/odometry\n")
+    assert "publishes" in type_in("topic", "info", "/odom", *there)[1]
+    assert type_in("topic", "find", "robot/odometry", *there)[1] == "/odom\n"
+
+
+def test_messages_of_a_back_end_are_printed_filtered_and_measured(there, type_in):
+    code, out, _err = type_in("topic", "echo", "/odom", "x", "--filter", "x > 5", "-n", "2", "--json", *there)
+    first, second = (json.loads(line)["fields"]["x"] for line in out.splitlines())
+    assert (code, second) == (0, first + 1)
+    assert first > 5
+    code, out, _err = type_in("topic", "hz", "/odom", "-n", "1", "--json", *there)
+    assert json.loads(out)["rate_hz"] > 0
+
+
+def test_an_unknown_back_end_is_an_error(type_in):
+    code, out, err = type_in("topic", "list", "--backend", "zenho")
+    assert (code, out) == (1, "")
+    assert "zenoh" in err
