@@ -417,7 +417,9 @@ class RecordingError(NepError):
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         self.reason = reason
-        super().__init__(_("cannot use the recording '{path}'; {reason}").format(path=path, reason=reason))
+        super().__init__(
+            _("cannot use the recording '{path}'; {reason}").format(path=escaped(path), reason=reason)
+        )
 
 
 class RecordingsUnavailableError(NepError):

@@ -13,8 +13,17 @@ from nep.masters.process import view
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import MASTER_VARIABLE
+from nep.system.arguments import text
 
 __all__ = ["BackendOption", "graph_of", "node_for", "open_node"]
+
+
+def _checked_backend(given: str | None) -> str | None:
+    try:
+        return None if given is None else text("--backend", given)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
 
 BackendOption = Annotated[
     str | None,
@@ -25,6 +34,7 @@ BackendOption = Annotated[
             "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master is then its place."
         ),
         show_default=False,
+        callback=_checked_backend,
     ),
 ]
 

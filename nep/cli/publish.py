@@ -28,6 +28,7 @@ from nep.messages.encoded import Encoded
 from nep.nodes.arguments import text
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
+from nep.text import escaped
 
 _MOST_BYTES = 10**9
 """What a file may have: far more than a message, but a device such as /dev/zero has no end."""
@@ -191,23 +192,24 @@ def _bytes_typed(text: str) -> bytes:
 
 def read_file(file: Path, msg_type: str) -> bytes:
     """What is in it, up to what a message may have. Raises `EncodeError`."""
+    shown = escaped(str(file))
     try:
         with file.open("rb") as opened:  # it may be a pipe, or a device that has no end
             data = opened.read(_MOST_BYTES + 1)
     except OSError as error:
         raise EncodeError(
-            msg_type, "file", _("'{file}' cannot be read: {reason}").format(file=file, reason=error.strerror)
+            msg_type, "file", _("'{file}' cannot be read: {reason}").format(file=shown, reason=error.strerror)
         ) from error
     except ValueError as error:  # letters that no file's name has here
         raise EncodeError(
-            msg_type, "file", _("'{file}' is no name of a file here").format(file=file)
+            msg_type, "file", _("'{file}' is no name of a file here").format(file=shown)
         ) from error
     if len(data) > _MOST_BYTES:
         raise EncodeError(
             msg_type,
             "file",
             _("'{file}' has more than the {most} that a message may have").format(
-                file=file, most=size(_MOST_BYTES)
+                file=shown, most=size(_MOST_BYTES)
             ),
         )
     return data

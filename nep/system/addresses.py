@@ -70,7 +70,7 @@ def master_address(address: str | None = None) -> str:
             )
         )
     chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
-    if "://" not in chosen and ("[" in chosen or chosen.count(":") > 1):
+    if _is_ipv6(chosen):
         checked_host(chosen)
     host, colon, port = chosen.rpartition(":")
     if not colon:
@@ -89,11 +89,17 @@ def checked_host(host: object) -> str:
 
     Raises `NepError`.
     """
-    if isinstance(host, str) and ":" in host:
+    if isinstance(host, str) and _is_ipv6(host):
         raise NepError(
             _(
                 "'{host}' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1', "
                 "or the computer's name"
+            ).format(host=quotable(host))
+        )
+    if isinstance(host, str) and "://" in host:
+        raise NepError(
+            _(
+                "'{host}' is a URL; write the address alone, such as '127.0.0.1', or the computer's name"
             ).format(host=quotable(host))
         )
     if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_possible(host):
@@ -103,6 +109,16 @@ def checked_host(host: object) -> str:
             )
         )
     return host
+
+
+def _is_ipv6(address: str) -> bool:
+    """Whether it is an IPv6 address, perhaps in brackets and with a port."""
+    bare = address[1:].partition("]")[0] if address.startswith("[") else address
+    try:
+        ipaddress.IPv6Address(bare)
+    except ValueError:
+        return False
+    return True
 
 
 def _is_port(word: str) -> bool:

@@ -15,7 +15,7 @@ from app.errors import QueryError
 from nep.i18n import _
 from nep.messages.fields import path_text
 from nep.system.lazy_import import lazy_module
-from nep.text import shortened
+from nep.text import escaped, shortened
 
 if TYPE_CHECKING:
     import jsonpath
@@ -64,6 +64,8 @@ class JsonQuery:
             self._path = _environment().compile(self.text)
         except jsonpath.JSONPathError as error:
             raise QueryError(_sentence(error, self.text)) from error
+        except OverflowError as error:
+            raise QueryError(_("the query has a number that is too large")) from error
         except (RecursionError, ValueError) as error:  # brackets a thousand deep; numbers no computer has
             raise QueryError(_("the query can't be understood")) from error
 
@@ -104,12 +106,12 @@ def _environment() -> jsonpath.JSONPathEnvironment:
 
 def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
     """What is wrong, and from where on."""
-    reason, token = str(error.message or ""), error.token
+    reason, token = escaped(str(error.message or "")), error.token
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
         return _("the query does not end well: {reason}").format(reason=reason)
     said = _("the query can't be understood from {rest} on: {reason}")
-    return said.format(rest=shortened(rest, 20), reason=reason)
+    return said.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 
 class _TooMany(Exception):  # noqa: N818  it is no fault: it ends the search

@@ -36,7 +36,7 @@ from nep.programs.alarms.rule import (
     new_id,
     problem_of,
 )
-from nep.text import quotable
+from nep.text import escaped, quotable
 
 __all__ = [
     "EXAMPLE",
@@ -112,7 +112,9 @@ def read_alarms(path: Path) -> AlarmFile:
     except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
         reason = getattr(error, "strerror", None) or str(error)
         said = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
-        raise NepError(said.format(path=path, reason=reason[:1].lower() + reason[1:])) from error
+        raise NepError(
+            said.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
+        ) from error
     return read_text(data, str(path))
 
 
@@ -122,6 +124,7 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     `lenient`: alarms that are wrong are left out, and `AlarmFile.problems` says why; what is no file of
     alarms at all is raised for anyway.
     """
+    path = escaped(path)
     if len(data) > _MOST_BYTES:
         said = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
         raise NepError(said.format(path=path, most=_MOST_BYTES))

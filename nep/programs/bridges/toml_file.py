@@ -86,6 +86,7 @@ _CHECKED = TypeVar("_CHECKED")
 
 def read_configuration(path: Path) -> BridgeConfiguration:
     """The configuration in a file. Raises `NepError`."""
+    shown = escaped(str(path))
     try:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
@@ -94,12 +95,12 @@ def read_configuration(path: Path) -> BridgeConfiguration:
         raise NepError(
             _(
                 "'{path}' cannot be read: {reason}; 'nep bridge --example' shows what a file looks like"
-            ).format(path=path, reason=reason[:1].lower() + reason[1:])
+            ).format(path=shown, reason=reason[:1].lower() + reason[1:])
         ) from error
     if len(data) > _MOST_BYTES:
         raise NepError(
             _("'{path}' is larger than {most} bytes, so it is no file of a bridge; give another").format(
-                path=path, most=_MOST_BYTES
+                path=shown, most=_MOST_BYTES
             )
         )
     try:
@@ -107,9 +108,9 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise NepError(
-            _("line {line} of '{path}' is no UTF-8; save it as UTF-8").format(line=line, path=path)
+            _("line {line} of '{path}' is no UTF-8; save it as UTF-8").format(line=line, path=shown)
         ) from error
-    return read_text(text, str(path), path.stem)
+    return read_text(text, shown, path.stem)
 
 
 def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:

@@ -79,6 +79,9 @@ def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
         ("$." + "x" * LONGEST, f"a query has {LONGEST} letters at most"),
         ("$[?" + "(" * 400, "the query "),
         ("$\x00", "the query "),
+        ("$[?@.x > 1e9999]", "the query has a number that is too large"),
+        ("$[?@.x == -1e9999]", "the query has a number that is too large"),
+        ("$.a\x1b[2J b", "the query can't be understood from \\x1b[2J b on: "),
     ],
 )
 def test_a_wrong_query_is_a_sentence(text, sentence) -> None:
@@ -86,6 +89,7 @@ def test_a_wrong_query_is_a_sentence(text, sentence) -> None:
         JsonQuery(text)
     assert told.value.sentence.startswith(sentence)
     assert "\n" not in told.value.sentence
+    assert "\x1b" not in told.value.sentence
 
 
 MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}

@@ -53,3 +53,21 @@ def test_an_unknown_back_end_is_an_error(type_in):
     code, out, err = type_in("topic", "list", "--backend", "zenho")
     assert (code, out) == (1, "")
     assert "zenoh" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("topic", "list", "--backend", "\x1b[31m\nx"),
+        ("topic", "pub", "t", "@\x1b[31m\nx", "--backend", "memory"),
+        ("bridge", "\x1b[31m\nx"),
+        ("watch", "\x1b[31m\nx"),
+        ("play", "\x1b[31m\nx"),
+        ("topic", "echo", "t", "--filter", "\x1b[31m\nx +"),
+    ],
+)
+def test_names_in_errors_can_not_control_the_terminal_or_forge_a_line(words, type_in):
+    code, out, err = type_in(*words)
+    assert (code in {1, 2}, out) == (True, "")
+    assert "\x1b" not in err
+    assert "\nx" not in err

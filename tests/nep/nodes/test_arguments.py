@@ -143,6 +143,8 @@ def test_a_time_is_no_less_than_nothing(node: nep.Node, time_s: float) -> None:
             r"'\[::1\]' is an IPv6 address, which nep does not speak; use one such as '127.0.0.1'",
         ),
         ({"ip": "fe80::1"}, "'fe80::1' is an IPv6 address"),
+        ({"ip": "http://robot"}, "'http://robot' is a URL"),
+        ({"ip": "robot:7780"}, "'robot:7780' is no address of a computer"),
         ({"ip": "a b"}, "'a b' is no address of a computer"),
         ({"ip": ""}, "'' is no address of a computer"),
         ({"ip": "999.1.1.1"}, "'999.1.1.1' is no address of a computer"),
@@ -176,6 +178,9 @@ def test_a_direct_connection_that_cannot_be_leaves_no_socket_behind(wire: Any) -
 def test_a_master_is_no_ipv6_address() -> None:
     for given in ("[::1]:7780", "::1", "[::1]"):
         with pytest.raises(nep.NepError, match="is an IPv6 address, which nep does not speak"):
+            master_address(given)
+    for given in ("http://robot", "robot:7780:1", "a:b:c"):
+        with pytest.raises(nep.NepError, match="is no address of a master"):
             master_address(given)
     with pytest.raises(ValueError, match="an address is a 'str'"):
         master_address(7780)  # type: ignore[arg-type]
