@@ -34,6 +34,12 @@ from nep.messages.image_codec import raw_image as raw_image
 from nep.messages.message import Message as Message
 from nep.nodes.node import Node as Node
 from nep.nodes.node import spin as spin
+from nep.nodes.original import FixedClient as FixedClient
+from nep.nodes.original import FixedServer as FixedServer
+from nep.nodes.original import dict2json as dict2json
+from nep.nodes.original import getMyIP as getMyIP
+from nep.nodes.original import json2dict as json2dict
+from nep.nodes.original import read_json as read_json
 from nep.nodes.publisher import Publisher as Publisher
 from nep.nodes.subscriber import Subscriber as Subscriber
 from nep.nodes.timer import Timer as Timer
@@ -61,6 +67,12 @@ from nep.protocol.graph_view import TopicInfo as TopicInfo
 
 node = Node
 """A node; see `Node`. The paper's spelling."""
+
+server = FixedServer
+"""A server at a fixed address; see `FixedServer`. The original module's spelling."""
+
+client = FixedClient
+"""A client of a server at a fixed address; see `FixedClient`. The original module's spelling."""
 
 master = Master
 """A master; see `Master`."""

@@ -29,7 +29,12 @@ def test_every_public_name_has_its_place(book: reference.Reference) -> None:
     names = {each for each in nep.__all__ if not each.startswith("_")} - book.spellings.keys()
     types = {*nep.geometry.__all__, *nep.sensor.__all__}
     assert book.names == names | types
-    assert book.spellings == {"node": "Node", "master": "Master"}
+    assert book.spellings == {
+        "node": "Node",
+        "master": "Master",
+        "server": "FixedServer",
+        "client": "FixedClient",
+    }
 
 
 def test_every_public_name_has_a_docstring(book: reference.Reference) -> None:

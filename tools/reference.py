@@ -73,7 +73,9 @@ PAGES: Mapping[str, Field] = {
 }
 OWN_PAGES = ("nep.geometry", "nep.sensor")
 """Public modules of which all that `__all__` names is public."""
-MADE_BY_HAND = frozenset({"Node", "Master", "Blackboard", "ImageFormat", "Encoded"})
+MADE_BY_HAND = frozenset(
+    {"Node", "Master", "FixedServer", "FixedClient", "Blackboard", "ImageFormat", "Encoded"}
+)
 """Classes that programs call. Of others nep makes the instances, but for those on pages of types."""
 INTERNAL = frozenset({
     "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.take", "Client.join",

@@ -145,6 +145,10 @@ class Node(ServiceNode):
         is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
         return Hybrid(self._master if is_own else self._backend.master(master_ip), checked_mode(mode))
 
+    def broker(self, mode: str = "many2many") -> Hybrid:
+        """Return `hybrid(mode=mode)`: the original module's name for it up to 0.5.2."""
+        return self.hybrid(mode=mode)
+
     def direct(
         self,
         ip: str = "127.0.0.1",

@@ -207,6 +207,34 @@ class Publisher:
         if self._unsendable.try_out(payload):
             self._transport.skip()
 
+    # ---- the original module's names
+
+    def send_json(self, message: object) -> None:
+        """Publish a message of the type `json`. Raises as `publish` does."""
+        self.publish(message)
+
+    def send_string(self, message: str) -> None:
+        """Publish a message of the type `string`. Raises as `publish` does."""
+        self.publish(message)
+
+    def send_image(self, message: object) -> None:
+        """Publish a picture. Raises as `publish` does."""
+        self.publish(message)
+
+    def send_bytes(self, message: bytes) -> None:
+        """Publish a message of the type `bytes`. Raises as `publish` does."""
+        self.publish(message)
+
+    def send_msgpack(self, message: object) -> None:
+        """Publish a message of the type `msgpack`. Raises as `publish` does."""
+        self.publish(message)
+
+    sendJson = sendDictionary = send_json  # noqa: N815 - the original's names from 0.5.4.7 on
+    sendString = sendTopicString = send_string  # noqa: N815
+    sendImages = send_image  # noqa: N815
+    sendBytes = send_bytes  # noqa: N815
+    sendMsgPack = send_msgpack  # noqa: N815
+
     def loan(self, shape: int | tuple[int, ...], dtype: str = "uint8") -> NDArray[Any]:
         """An array to write into and then publish: a picture (`nep.raw_image`), or `bytes` as `Encoded`.
 

@@ -135,6 +135,34 @@ class Subscriber:
                 if deadline is not None:
                     limit = max(0.0, deadline - time.monotonic())
 
+    # ---- the original module's names
+
+    def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
+        """Return what `listen` does, for a topic of the type `json`."""
+        return self.listen(block_mode)
+
+    def listen_string(self, block_mode: bool = False) -> tuple[bool, object]:
+        """Return what `listen` does, for a topic of the type `string`."""
+        return self.listen(block_mode)
+
+    def listen_image(self, block_mode: bool = False) -> tuple[bool, object]:
+        """Return what `listen` does, for a topic of pictures."""
+        return self.listen(block_mode)
+
+    def listen_bytes(self, block_mode: bool = False) -> tuple[bool, object]:
+        """Return what `listen` does, for a topic of the type `bytes`."""
+        return self.listen(block_mode)
+
+    def listen_msgpack(self, block_mode: bool = False) -> tuple[bool, object]:
+        """Return what `listen` does, for a topic of the type `msgpack`."""
+        return self.listen(block_mode)
+
+    listenJson = listenDictionary = listen_json  # noqa: N815 - the original's names from 0.5.4.7 on
+    listenString = listenStringTopic = listen_string  # noqa: N815
+    listenImages = listen_image  # noqa: N815
+    listenBytes = listen_bytes  # noqa: N815
+    listenMsgPack = listen_msgpack  # noqa: N815
+
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
 

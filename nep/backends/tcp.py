@@ -1,0 +1,63 @@
+"""The back end `tcp`: servers and clients over plain TCP sockets, also called "POSIX" and "socket".
+
+It carries calls only, at an address that both sides name with `node.direct(ip, port)`; docs/services.md
+specifies its bytes, for programs in any language that has sockets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NoReturn
+
+from nep.backends.base import Backend, PublisherSpec, SubscriberSpec
+from nep.backends.connection import Configuration, Direct
+from nep.backends.services import ClientSpec, ClientTransport, ServerSpec, ServerTransport
+from nep.backends.zeromq.transport import ZeromqTransport
+from nep.errors import NepError
+from nep.i18n import _
+from nep.protocol.graph_view import GraphView
+
+__all__ = ["BACKEND"]
+
+
+class TcpTransport(ZeromqTransport):
+    """Direct servers and clients of the wire "tcp"; everything else is an error that says so."""
+
+    def publisher(self, spec: PublisherSpec) -> NoReturn:
+        """Raise `NepError`."""
+        raise _no_topics(spec.topic)
+
+    def subscriber(self, spec: SubscriberSpec) -> NoReturn:
+        """Raise `NepError`."""
+        raise _no_topics(spec.topic)
+
+    def survey(self, spec: ClientSpec) -> NoReturn:
+        """Raise `NepError`."""
+        raise _no_topics(spec.service)
+
+    def server(self, spec: ServerSpec) -> ServerTransport:
+        """See `ServiceTransport.server`. Raises `NepError` for one without an address."""
+        return super().server(replace(spec, configuration=_over_tcp(spec.configuration)))
+
+    def client(self, spec: ClientSpec) -> ClientTransport:
+        """See `ServiceTransport.client`. Raises `NepError` for one without an address."""
+        return super().client(replace(spec, configuration=_over_tcp(spec.configuration)))
+
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002
+        """Raise `NepError`."""
+        raise NepError(_("plain TCP has no master, so nobody knows who is there"))
+
+
+def _over_tcp(configuration: Configuration) -> Direct:
+    if not isinstance(configuration, Direct):
+        said = _("plain TCP has no master; name the address of both sides with 'node.direct(ip, port)'")
+        raise NepError(said)
+    return replace(configuration, wire="tcp")
+
+
+def _no_topics(name: str) -> NepError:
+    said = _("plain TCP has servers and clients only; make a node with 'zeromq' for '{name}'")
+    return NepError(said.format(name=name))
+
+
+BACKEND = Backend("tcp", TcpTransport, aliases=("posix", "socket", "normal"))

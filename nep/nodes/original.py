@@ -1,0 +1,194 @@
+"""Names of the original module that nep itself has no use for, so that its programs run unchanged.
+
+docs/original-nep.md lists them all, with what new programs write instead.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nep.i18n import _
+from nep.nodes.node import Node
+from nep.system.addresses import own_addresses
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = [
+    "FixedClient",
+    "FixedServer",
+    "dict2json",
+    "getMyIP",
+    "json2dict",
+    "original_hint",
+    "read_json",
+]
+
+_LOOPBACK = "127.0.0.1"
+_INSTEAD: Mapping[str, str] = {
+    "publisher": "node.new_pub(topic, msg_type)",
+    "subscriber": "node.new_sub(topic, msg_type)",
+    "surveyor": "node.new_surveyor(topic, timeout)",
+    "respondent": "node.new_respondent(topic)",
+    "broker": "nep master",
+    "nepmaster": "nep master",
+    "neprun": "nep master",
+    "masterRegister": "nep.node(name)",
+    "printError": "node.log.error(...)",
+    "logError": "node.log.error(...)",
+    "getFiles": "pathlib.Path(folder).iterdir()",
+    "getPath": "pathlib.Path.cwd()",
+    "getNEPpath": "pathlib.Path.cwd()",
+    "setNEPpath": "pathlib.Path.cwd()",
+    "robot": "app.robots (docs/write-a-driver.md)",
+}
+
+
+def original_hint(name: str) -> str:
+    """What to write instead of a name of the original module that nep lacks; "" for any other name."""
+    instead = _INSTEAD.get(name)
+    if instead is None:
+        return ""
+    said = _("the original module's '{name}' is written '{instead}' here; see docs/original-nep.md")
+    return said.format(name=name, instead=instead)
+
+
+class FixedServer:
+    """Server at a fixed address, without a master: the original module's `server`.
+
+    ::
+
+        server = nep.server("127.0.0.1", 8123)
+        while True:
+            print(server.listen_info())
+            server.send_info({"answer": 42})
+
+    Clients are `nep.client`, the original module's `client`, and `node.new_client` with
+    `node.direct(ip, port)`.
+    """
+
+    def __init__(
+        self,
+        IP: str,  # noqa: N803 - the original's names
+        port: int | str,
+        transport: str = "ZMQ",
+        debug: bool = True,  # noqa: ARG002 - as the original has it; nothing is printed
+    ) -> None:
+        """Bind `IP:port`.
+
+        Args:
+            IP: Address of this computer; "*" or "0.0.0.0" for all.
+            port: 1 to 65535.
+            transport: "ZMQ", or "TCP", "POSIX" or "socket" for plain TCP (docs/services.md), which the
+                client must have, too.
+            debug: Ignored.
+
+        Raises:
+            AddressInUseError: Another program has the port.
+            UnknownBackendError: No such transport.
+        """
+        self._node = Node(f"server-{port}", transport)
+        try:
+            self._server = self._node.new_server(f"{IP}:{port}", None, self._node.direct(IP, port))
+        except BaseException:
+            self._node.close()
+            raise
+
+    def listen_info(self, timeout_s: float | None = None) -> object:
+        """Return the next request, None when none came within `timeout_s` (None: wait for ever)."""
+        return self._server.listen_info(timeout_s)
+
+    def send_info(self, info: object) -> None:
+        """Answer the request that `listen_info` returned."""
+        self._server.send_info(info)
+
+    def close(self) -> None:
+        """Free the port. May be called twice."""
+        self._node.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+class FixedClient:
+    """Client of a server at a fixed address, without a master: the original module's `client`.
+
+    ::
+
+        client = nep.client("127.0.0.1", 8123)
+        client.send_info({"question": "?"})
+        print(client.listen_info())
+    """
+
+    def __init__(
+        self,
+        IP: str,  # noqa: N803 - the original's names
+        port: int | str,
+        transport: str = "ZMQ",
+        debug: bool = True,  # noqa: ARG002 - as the original has it; nothing is printed
+        *,
+        timeout_s: float | None = None,
+    ) -> None:
+        """Connect to `IP:port`; the server may start later.
+
+        Args:
+            IP: Address or name of the server's computer.
+            port: 1 to 65535.
+            transport: As for `FixedServer`.
+            debug: Ignored.
+            timeout_s: How long `listen_info` waits for the answer (None: for ever, as the original does).
+        """
+        self._node = Node(f"client-{port}", transport)
+        try:
+            self._client = self._node.new_client(
+                f"{IP}:{port}", self._node.direct(IP, port), timeout_s=timeout_s
+            )
+        except BaseException:
+            self._node.close()
+            raise
+
+    def send_info(self, info: object) -> None:
+        """Send a request; `listen_info` returns its answer."""
+        self._client.send_info(info)
+
+    def listen_info(self) -> object:
+        """Return the answer to what `send_info` sent. Raises as `Client.call` does."""
+        return self._client.listen_info()
+
+    def close(self) -> None:
+        """Disconnect. May be called twice."""
+        self._node.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+def getMyIP() -> str:  # noqa: N802 - the original's name
+    """Return an address under which other computers may reach this one, "127.0.0.1" when there is none."""
+    return next((each.host for each in own_addresses()), _LOOPBACK)
+
+
+def json2dict(text: str | bytes) -> object:
+    """Parse a JSON text, as `json.loads` does."""
+    value: object = json.loads(text)
+    return value
+
+
+def dict2json(value: object) -> str:
+    """Return `value` as a JSON text, as `json.dumps` does."""
+    return json.dumps(value)
+
+
+def read_json(json_file: str | Path) -> object:
+    """Parse a JSON file in UTF-8. Raises `OSError`, `ValueError`."""
+    value: object = json.loads(Path(json_file).read_text("utf-8-sig"))
+    return value
