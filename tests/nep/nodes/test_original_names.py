@@ -79,7 +79,7 @@ def test_helpers_of_the_original_module(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["publisher", "subscriber", "nepmaster", "masterRegister", "getFiles"])
 def test_a_name_that_is_missing_is_an_error_that_names_the_replacement(name: str) -> None:
-    with pytest.raises(AttributeError, match="docs/original-nep.md") as raised:
+    with pytest.raises(AttributeError, match=r"docs/original-nep\.md") as raised:
         getattr(nep, name)
     shown = "".join(traceback.format_exception(raised.value))
     assert "Did you mean" not in shown
