@@ -422,6 +422,10 @@ class RecordingError(NepError):
         )
 
 
+class RecordingTooLargeError(RecordingError):
+    """Reading the recording at `path` would take more work than is allowed; `reason` says what."""
+
+
 class RecordingsUnavailableError(NepError):
     """The packages that recordings need are not installed; `needs` says how to get them."""
 

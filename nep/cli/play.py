@@ -18,6 +18,7 @@ from nep.cli.recording_files import (
     ToOption,
     chosen_topics,
     clock_text,
+    end_with_damage,
     span_ns,
 )
 from nep.cli.screen import console, say
@@ -30,6 +31,7 @@ from nep.programs.robots.guard import MotionGuard, refusal_words
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.wire import check_topic
 from nep.system.lazy_import import lazy_module
+from nep.text import quotable
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -78,6 +80,8 @@ def play(
     with reader.Recording(file) as recording:
         named = _named(recording, topics or (), publish_all=publish_all)
         chosen = list(recording.topics) if publish_all else named
+        if not any(recording.topics[each].message_count for each in chosen):
+            raise NepError(_("nothing of '{file}' can be played: it has no such messages").format(file=file))
         names = _names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
         limits = _Limits(recording, names, frozenset(allow_moving or ()), armed)
@@ -99,6 +103,7 @@ def play(
                 _play(recording, playback, sender)
                 said = ngettext("published {count} message", "published {count} messages", sender.count)
                 say(said.format(count=sender.count))
+        end_with_damage(recording)
         if limits.was_named_refused:
             raise typer.Exit(1)
 
@@ -106,7 +111,7 @@ def play(
 def _named(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
     """The topics that words name. Raises `typer.BadParameter`, also when nothing is to be published."""
     if not words and not publish_all:
-        known = listed([f"'{each}'" for each in list(recording.topics)[:20]], "and")
+        known = listed([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
             _("name the topics to publish, or --all; the recording has {topics}").format(topics=known)
         )

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime, time, timedelta
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.screen import console
-from nep.errors import NepError, did_you_mean
+from nep.cli.screen import console, say
+from nep.errors import NepError, did_you_mean, nearest
 from nep.i18n import _
 from nep.protocol.topic_glob import glob_matches, is_glob
 from nep.system.lazy_import import lazy_module
 from nep.text import quotable
 
 if TYPE_CHECKING:
-    from nep.recordings import reader
+    from nep.recordings import damage, reader
 else:  # the other commands need not wait for it, nor have what it needs
+    damage = lazy_module("nep.recordings.damage")
     reader = lazy_module("nep.recordings.reader")
 
 __all__ = [
@@ -31,11 +33,13 @@ __all__ = [
     "TopicsToRecord",
     "chosen_topics",
     "clock_text",
+    "end_with_damage",
     "progress_bar",
     "span_ns",
     "time_ns",
 ]
 
+_MAX_COMPARED, _MAX_NAMED = 1_000, 20
 FileArgument = Annotated[
     Path, typer.Argument(metavar=_("FILE"), help=_("The recording."), show_default=False, dir_okay=False)
 ]
@@ -97,9 +101,11 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
     for word in words:
         found = [name for name in recording.topics if glob_matches(word, name)]
         if not found:
-            known = tuple(recording.topics)
+            known = [quotable(name) for name in islice(recording.topics, _MAX_COMPARED)]
             if is_glob(word):
                 raise typer.BadParameter(_("no topic of the recording matches '{word}'").format(word=word))
+            if nearest(word, known) is None:
+                del known[_MAX_NAMED:]
             raise typer.BadParameter(
                 _("the recording has no topic '{word}'; {did_you_mean}").format(
                     word=word, did_you_mean=did_you_mean(word, known)
@@ -107,6 +113,14 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
             )
         chosen.update(dict.fromkeys(found))
     return list(chosen)
+
+
+def end_with_damage(recording: reader.Recording) -> None:
+    """Say what of the file could not be read so far, and leave with 1; nothing for a whole one."""
+    words = damage.damage_words(recording.damage, recording.start_ns)
+    if words:
+        say(words)
+        raise typer.Exit(1)
 
 
 def span_ns(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nep.cli import ring
+from nep.cli import recording_info, ring
 from nep.cli.options import JsonOption
 from nep.cli.recording_files import (
     FileArgument,
@@ -20,19 +20,18 @@ from nep.cli.recording_files import (
     progress_bar,
     span_ns,
 )
-from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_json, show_table, size, write
+from nep.cli.screen import UNKNOWN, say, show_json, size
 from nep.cli.typer_words import TranslatedGroup
-from nep.i18n import _, lazy, ngettext, number
+from nep.i18n import _, ngettext, number
 from nep.system.lazy_import import lazy_module
-from nep.text import escaped
 
 if TYPE_CHECKING:
+    from nep.recordings import damage, reader
     from nep.recordings import export as exports
-    from nep.recordings import figures, reader
     from nep.recordings import repair as repairs
 else:  # the other commands need not wait for it, nor have what it needs
     exports = lazy_module("nep.recordings.export")
-    figures = lazy_module("nep.recordings.figures")
+    damage = lazy_module("nep.recordings.damage")
     reader = lazy_module("nep.recordings.reader")
     repairs = lazy_module("nep.recordings.repair")
 
@@ -41,91 +40,9 @@ app: typer.Typer = typer.Typer(
     no_args_is_help=True,
     help=_("What was recorded: look into it, mend it, make other files of it."),
 )
+app.command("info")(recording_info.info)
 app.command("ring")(ring.ring)
 app.command("keep")(ring.keep)
-_COLUMNS = (
-    TextColumn(lazy("topic"), style="bold", is_whole=True),
-    TextColumn(lazy("type")),
-    TextColumn(lazy("messages"), "right"),
-    TextColumn(lazy("rate"), "right"),
-    TextColumn(lazy("lost"), "right"),
-    TextColumn(lazy("late"), "right"),
-    TextColumn(lazy("unreadable"), "right"),
-    TextColumn(lazy("lost in writing"), "right"),
-)
-
-
-@app.command("info")
-def info(file: FileArgument, as_json: JsonOption = False) -> None:
-    """Tell what is in a recording, and what is missing in it."""
-    with reader.Recording(file) as recording:
-        told = recording.figures()
-        if as_json:
-            show_json(_plain(recording, told))
-            return
-        head = _("{messages} messages in {time}, {size}, from {started}").format(
-            messages=recording.message_count,
-            time=clock_text(recording.duration_s),
-            size=size(recording.size_bytes),
-            started=_day_text(recording.start_ns),
-        )
-        write(f"{head}\n")
-        words = recording.words
-        if words.get("note"):
-            write(f"{escaped(words['note'])}\n")
-        show_table(
-            _COLUMNS, [_row(recording, each, told.get(each.name)) for each in recording.topics.values()]
-        )
-        if not recording.is_complete:
-            said = _(
-                "it was not ended, and is read as far as it is whole; mend it: nep recording repair {file}"
-            )
-            say(said.format(file=file))
-
-
-def _day_text(at_ns: int) -> str:
-    """A time as the computer's clock shows it; of recordings without messages there is none."""
-    try:
-        day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
-    except (OSError, OverflowError, ValueError):  # what another program wrote, and no calendar has
-        day = None
-    return UNKNOWN if day is None else day.strftime("%Y-%m-%d %H:%M:%S")
-
-
-def _row(
-    recording: reader.Recording, topic: reader.RecordedTopic, told: figures.TopicFigures | None
-) -> tuple[str, ...]:
-    duration = recording.duration_s
-    return (
-        escaped(topic.name),
-        escaped(topic.msg_type),
-        str(topic.message_count),
-        rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
-        UNKNOWN if told is None or told.lost is None else str(told.lost),
-        UNKNOWN if told is None else str(told.late),
-        UNKNOWN if told is None else str(told.undecodable),
-        UNKNOWN if told is None else str(told.unkept),
-    )
-
-
-def _plain(recording: reader.Recording, told: dict[str, figures.TopicFigures]) -> dict[str, object]:
-    return {
-        "path": str(recording.path),
-        "start_ns": recording.start_ns,
-        "end_ns": recording.end_ns,
-        "size_bytes": recording.size_bytes,
-        "is_complete": recording.is_complete,
-        "words": dict(recording.words),
-        "topics": {
-            each.name: {
-                "msg_type": each.msg_type,
-                "codec": each.codec,
-                "message_count": each.message_count,
-                "figures": told[each.name].to_plain() if each.name in told else None,
-            }
-            for each in recording.topics.values()
-        },
-    }
 
 
 @app.command("repair")
@@ -219,6 +136,7 @@ def export(
         folder = output or file.with_name(file.stem)
         with progress_bar(_("exporting")) as progress:
             made = exports.export(recording, kind, folder, part, fps=fps, progress=progress)
+        words = damage.damage_words(recording.damage, recording.start_ns)
     if as_json:
         show_json(
             [
@@ -231,7 +149,14 @@ def export(
                 for each in made
             ]
         )
-        return
+    else:
+        _say_exported(made)
+    if words:
+        say(words)
+        raise typer.Exit(1)
+
+
+def _say_exported(made: Sequence[exports.Exported]) -> None:
     for each in made:
         said = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
         say(said.format(count=each.count, path=each.path))

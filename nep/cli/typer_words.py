@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from nep.i18n import _, lazy
+from nep.text import escaped
 
 __all__ = ["TranslatedCommand", "TranslatedGroup", "translated"]
 
@@ -70,7 +71,7 @@ def _mistakes_translated() -> Iterator[None]:
         yield
     except _UsageError as error:
         english = error.format_message()
-        words = translated(english)
+        words = escaped(translated(english), lines=True)  # a name in it may come from a file
         if words == english:
             raise
         raise _UsageError(words, ctx=error.ctx) from error

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -20,22 +19,21 @@ from typing import Any
 from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
+from nep.recordings.copy_part import copy_part
 from nep.recordings.film import Container, Film, container_there, frame_of
 from nep.recordings.reader import RecordedMessage, Recording
-from nep.recordings.writer import RecordingWriter, disk_sentence
+from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
 
 __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MOST_COLUMNS = 5_000
+MAX_FILES = 1_000
+"""One for each topic."""
 _MOST_ITEMS = 100
 """Of a list that get a column each; a longer one is one column of JSON."""
 _DEEPEST = 20
-_FLUSH_BYTES, _FLUSH_MESSAGES = 16_000_000, 10_000
-"""So much is given to the writer of a recording until it has been written."""
-_MOST_SAID = 100_000
-_SAID = ("notes", "runs", "alarms", "alerts")
 _CELLS_AT_ONCE = 200_000
 _FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
 _FPS = 30.0
@@ -137,9 +135,13 @@ def _wanted(
             "mp4": _("no topic has pictures"),
         }.get(kind, _("no topic has values for a table"))
         raise RecordingError(str(recording.path), reason)
+    if kind != "mcap" and len(topics) > MAX_FILES:
+        said = _("it has {count} such topics; choose {most} of them at most")
+        raise RecordingError(str(recording.path), said.format(count=len(topics), most=MAX_FILES))
     counts = _counts(recording, topics, part)
-    topics = [name for name in topics if counts.get(name)]
-    if not topics:
+    if kind != "mcap":
+        topics = [name for name in topics if counts.get(name)]
+    if not any(counts.values()):
         raise RecordingError(str(recording.path), _("nothing of it came in that part"))
     return topics, _Counted(sum(counts.values()), progress)
 
@@ -293,80 +295,16 @@ def _mcap(recording: Recording, folder: Path, part: Part, counted: _Counted) -> 
         raise disk_sentence(folder, error) from error
     if path.exists():
         raise RecordingError(str(path), _("there is such a file already; choose another name"))
-    start_ns = recording.start_ns if part.start_ns is None else max(part.start_ns, recording.start_ns)
-    clock = _Clock(start_ns)
-    writer = RecordingWriter(unfinished, note=recording.words.get("note", ""), clock=clock)
-    count = size = 0
     try:
-        said = deque(_said_in(recording, part))
-        for at_ns, message in recording.read(part.start_ns, part.end_ns, part.topics):
-            while said and said[0][0] <= at_ns:
-                _say(writer, clock, *said.popleft(), path)
-            clock.now_ns = at_ns
-            writer.post([message])
-            counted.add()
-            count, size = count + 1, size + message.size_bytes
-            if size >= _FLUSH_BYTES or count % _FLUSH_MESSAGES == 0:
-                size = 0
-                _check(writer.flush(), writer, path)
-        for each in said:
-            _say(writer, clock, *each, path)
-        status = writer.close()
-        _check(not status.problem and not status.unkept, writer, path)
+        span = (part.start_ns, part.end_ns)
+        count = copy_part(recording, unfinished, span, part.topics or (), counted.add)
         replace_file(unfinished, path)
     except BaseException as error:
-        writer.close()
         _remove(unfinished)
         if isinstance(error, OSError):
             raise disk_sentence(path, error) from error
         raise
     return Exported("", path, count, 0)
-
-
-class _Clock:
-    """The time at which something came."""
-
-    def __init__(self, now_ns: int) -> None:
-        self.now_ns = now_ns
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-
-def _say(writer: RecordingWriter, clock: _Clock, at_ns: int, role: str, value: object, path: Path) -> None:
-    """Written at once: the writer asks for the time when it writes."""
-    _check(writer.flush(), writer, path)
-    clock.now_ns = at_ns
-    writer.say(role, value)
-    _check(writer.flush(), writer, path)
-
-
-def _check(is_well: bool, writer: RecordingWriter, path: Path) -> None:
-    if not is_well:
-        raise RecordingError(str(path), writer.problem or _("the disk does not answer"))
-
-
-def _said_in(recording: Recording, part: Part) -> list[tuple[int, str, object]]:
-    """(time, role, value) of what stands there beside messages; what is said again and again only once."""
-    found: list[tuple[int, str, object]] = []
-    for role in _SAID:
-        before: dict[str, object] = {}
-        for at_ns, value in recording.said(role):
-            is_late = part.end_ns is not None and at_ns >= part.end_ns
-            if (part.start_ns is not None and at_ns < part.start_ns) or is_late:
-                continue
-            id = value.get("id") if isinstance(value, Mapping) else None
-            if isinstance(id, str):
-                if before.get(id) == value:
-                    continue
-                before[id] = value
-            if len(found) < _MOST_SAID:
-                found.append((at_ns, role, value))
-    return sorted(found, key=_first)
-
-
-def _first(each: tuple[int, str, object]) -> int:
-    return each[0]
 
 
 # ---- tables

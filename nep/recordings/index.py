@@ -1,22 +1,31 @@
-"""What is where in a recording: of its summary, or, where it has none, of a look at each record's head."""
+"""What is where in a recording: from its summary, or from a walk over its records where it has none.
+
+A file that was closed properly but has no summary, no chunk index or no chunks is read as it is. Messages
+outside of chunks (ROS 2's preset "fastwrite") are grouped into runs of about 1 MB, which are read like
+uncompressed chunks. The package `mcap` is not used for this, because its reader takes offsets, lengths and
+counts of the file as they are (docs/adr/0030-reading-foreign-recordings.md).
+"""
 
 from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, BinaryIO
 
-from nep.errors import RecordingError
+from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.channels import ChannelDefinition
+from nep.recordings.compression import decompressed
+from nep.recordings.limits import RECORD_COST_BYTES, ReadBudget, open_budget
 from nep.recordings.records import (
-    CHUNK_HEAD_BYTES,
     HEAD_BYTES,
     MAGIC,
+    MESSAGE_REST_BYTES,
+    MESSAGE_START,
     MOST_CHUNK_BYTES,
     RECORD_HEAD,
     ChunkHead,
@@ -24,33 +33,86 @@ from nep.recordings.records import (
     Opcode,
     RawMessage,
     chunk_head,
-    decompressed,
     messages_in,
     pack_offsets,
     read_chunk_info,
     read_message_index,
     read_record,
 )
+from nep.recordings.walk import Place, walk
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
 
 __all__ = [
     "MOST_SMALL_BYTES",
+    "Attachment",
+    "Damage",
     "Definitions",
     "FileIndex",
-    "Place",
+    "RecordCounter",
     "read_chunk",
     "read_entries",
     "read_index",
-    "records_of",
 ]
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 MOST_SMALL_BYTES = 64_000_000
 """A record that is no chunk and is larger is damaged, or an attachment that nobody needs here."""
-_MOST_SUMMARY_BYTES = 1_000_000_000
-"""A summary with more is damaged: a week of recording has less."""
+_MAX_SCHEMA_BYTES = 8_000_000
+_MAX_CHANNEL_BYTES = 256_000
+_MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
+_MAX_DEFINITION_BYTES = 64_000_000
+_MAX_OTHER_RECORDS = 200_000
+_MANY = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
+_MAX_METADATA_BYTES = 4_000_000
+"""Of all metadata together; recordings of 10 000 topics have half of it."""
+_MAX_ATTACHMENTS = 1_000
+_MAX_HEADER_BYTES = 64_000
+_MAX_COUNTED_CHUNKS = 10_000
+_RUN_BYTES = 1_000_000
+_MAX_INSIDE_BYTES = 65_536
+"""A longer record between messages ends their run, so that reading the run does not read it, too."""
+_READ_BYTES = 1_048_576
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A piece of a file that can't be read. Times in ns since 1970; 0 and 0 where they are not known.
+
+    ``message_count``: how many messages are missing, None where the file doesn't say.
+    """
+
+    offset: int
+    length: int
+    start_ns: int = 0
+    end_ns: int = 0
+    message_count: int | None = None
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file inside the recording: its name, media type and size."""
+
+    name: str
+    media_type: str
+    size_bytes: int
+
+
+class RecordCounter:
+    """Counts the records of a file that are neither chunks nor messages: no recording has very many."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._count = path, 0
+
+    def add(self, opcode: int) -> None:
+        """Count a record. Raises `RecordingTooLargeError` for the first one beyond the limit."""
+        if opcode in _MANY:
+            return
+        self._count += 1
+        if self._count > _MAX_OTHER_RECORDS:
+            said = _("it has more than {most} records that are no messages")
+            raise RecordingTooLargeError(str(self._path), said.format(most=_MAX_OTHER_RECORDS))
 
 
 class Definitions:
@@ -61,22 +123,41 @@ class Definitions:
         self._schemas: dict[int, Schema] = {}
         self._waiting: dict[int, dict[int, Channel]] = {}
         """By the schema that they need, and their own number."""
+        self._read: dict[tuple[int, int], int] = {}
+        """Hashes of what was read for an opcode and a number: files repeat the same record many times."""
+        self._size_bytes = 0
 
     @property
     def lacks_schemas(self) -> bool:
         """Whether there are channels whose schemas have not been told yet."""
         return bool(self._waiting)
 
-    def add(self, opcode: int, content: bytes | memoryview) -> None:
-        """A record of a schema or channel; others, and damaged ones, are passed over."""
-        with suppress(ValueError):
-            if opcode == Opcode.SCHEMA:
-                schema = read_record("Schema", content)
-                self._schemas[schema.id] = schema
-                for channel in self._waiting.pop(schema.id, {}).values():
-                    self._add_channel(channel)
-            elif opcode == Opcode.CHANNEL:
-                self._add_channel(read_record("Channel", content))
+    def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
+        """Add a record of a schema or channel; others, and damaged or huge ones, are skipped.
+
+        Returns the channels that are defined by it.
+        """
+        most = _MAX_SIZES.get(opcode, 0)
+        if not 2 <= len(content) <= most:
+            return []
+        whole = bytes(content)
+        key = (opcode, int.from_bytes(whole[:2], "little"))
+        mark = hash(whole)
+        if self._read.get(key) == mark or self._size_bytes > _MAX_DEFINITION_BYTES:
+            return []
+        self._read[key] = mark
+        self._size_bytes += len(whole)
+        try:
+            made = read_record("Schema" if opcode == Opcode.SCHEMA else "Channel", whole)
+        except ValueError:
+            return []
+        channels = [made]
+        if opcode == Opcode.SCHEMA:
+            self._schemas[made.id] = made
+            channels = list(self._waiting.pop(made.id, {}).values())
+        for channel in channels:
+            self._add_channel(channel)
+        return [channel.id for channel in channels]
 
     def _add_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
@@ -90,182 +171,304 @@ class Definitions:
 
 @dataclass
 class FileIndex:
-    """`chunks` by the time when they begin. `is_complete`: the file has its summary, so it was ended."""
+    """`chunks` by the time when they begin. `is_complete`: the file was closed, so it has its footer."""
 
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
+    damage: list[Damage] = field(default_factory=list)
     counts: dict[int, int] | None = None
     """Messages of each channel; None where the file does not tell."""
     is_complete: bool = True
     end: int = 0
     """How far the file is whole, in bytes."""
+    profile: str = ""
+    library: str = ""
+    metadata_bytes: int = 0
 
 
-class Place(NamedTuple):
-    """A record in a file."""
+def read_index(
+    file: BinaryIO,
+    path: Path,
+    progress: Callable[[int, int], object] | None = None,
+    budget: ReadBudget | None = None,
+) -> FileIndex:
+    """Return the index of a recording.
 
-    offset: int
-    opcode: int
-    length: int
-
-
-def records_of(file: BinaryIO, size: int, offset: int = len(MAGIC)) -> Iterator[Place]:
-    """The records from an offset on, up to the end, or to where there can be none. Content is not read."""
-    while offset + HEAD_BYTES <= size:
-        file.seek(offset)
-        head = file.read(HEAD_BYTES)
-        if len(head) < HEAD_BYTES:
-            return
-        opcode, length = RECORD_HEAD.unpack(head)
-        if not 0 < opcode <= Opcode.DATA_END and opcode < 0x80:
-            return
-        if offset + HEAD_BYTES + length > size:
-            return
-        yield Place(offset, opcode, length)
-        offset += HEAD_BYTES + length
-
-
-def read_index(file: BinaryIO, path: Path, progress: Callable[[int, int], object] | None = None) -> FileIndex:
-    """The index of a recording. Raises `RecordingError` for what is none, `OSError`.
-
-    `progress` is told how many bytes of how many are done, where they all have to be looked through.
+    `progress` is given how many bytes of how many are done, where they all have to be looked through. Raises
+    `RecordingError` for a file that is no recording, `RecordingTooLargeError` for one that is too much work,
+    `OSError`.
     """
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     if file.read(len(MAGIC)) != MAGIC:
         raise RecordingError(str(path), _("it is no MCAP file"))
-    return _of_summary(file, size) or _of_records(file, size, progress)
+    work = budget or open_budget(path, size)
+    footer = _footer(file, size)
+    index = None if footer is None else _Summary(file, path, size, work).read(footer)
+    if index is None:
+        data_end = size if footer is None else size - _FOOTER_BYTES
+        index = _Scan(file, path, size, work, progress, data_end).run()
+        index.is_complete = footer is not None
+    _read_header(file, index)
+    index.chunks.sort(key=lambda each: each.start_ns)
+    return index
+
+
+def _footer(file: BinaryIO, size: int) -> bytes | None:
+    """The footer with the magic after it; None for a file that was not closed."""
+    if size < len(MAGIC) + _FOOTER_BYTES:
+        return None
+    file.seek(size - _FOOTER_BYTES)
+    footer = file.read(_FOOTER_BYTES)
+    if len(footer) < _FOOTER_BYTES or not footer.endswith(MAGIC):
+        return None
+    return footer if RECORD_HEAD.unpack_from(footer) == (Opcode.FOOTER, 20) else None
+
+
+def _read_header(file: BinaryIO, index: FileIndex) -> None:
+    file.seek(len(MAGIC))
+    head = file.read(HEAD_BYTES)
+    if len(head) < HEAD_BYTES:
+        return
+    opcode, length = RECORD_HEAD.unpack(head)
+    if opcode == Opcode.HEADER and length <= _MAX_HEADER_BYTES:
+        with suppress(ValueError):
+            header = read_record("Header", file.read(length))
+            index.profile, index.library = header.profile, header.library
+
+
+def _content(file: BinaryIO, place: Place) -> bytes:
+    if len(place.begin) == place.length:
+        return place.begin
+    file.seek(place.offset + HEAD_BYTES)
+    return file.read(place.length)
+
+
+def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
+    index.metadata_bytes += place.length
+    if not 0 < place.length <= MOST_SMALL_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
+        return
+    with suppress(ValueError):
+        made = read_record("Metadata", _content(file, place))
+        index.metadata.append((made.name, made.metadata))
 
 
 # ---- by the summary
 
 
-def _of_summary(file: BinaryIO, size: int) -> FileIndex | None:
-    """None for a file that was not ended, or whose summary is damaged."""
-    if size < 2 * len(MAGIC) + _FOOTER_BYTES:
-        return None
-    file.seek(size - _FOOTER_BYTES)
-    footer = file.read(_FOOTER_BYTES)
-    opcode, length = RECORD_HEAD.unpack_from(footer)
-    if opcode != Opcode.FOOTER or length != 20 or not footer.endswith(MAGIC):
-        return None
-    start = int.from_bytes(footer[9:17], "little")
-    crc = int.from_bytes(footer[25:29], "little")
-    if not len(MAGIC) <= start < size - _FOOTER_BYTES or size - start > _MOST_SUMMARY_BYTES:
-        return None
-    file.seek(start)
-    summary = file.read(size - _FOOTER_BYTES - start)
-    if crc and zlib.crc32(footer[:25], zlib.crc32(summary)) != crc:
-        return None
-    index = FileIndex(end=size)
-    try:
-        _read_summary(file, summary, index)
-    except ValueError:
-        return None
-    if not index.chunks and _has_messages(file, size, start):
-        return None
-    index.chunks.sort(key=lambda each: each.start_ns)
-    return index
+class _Summary:
+    """Reads a summary, and believes what can be true."""
 
+    def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
+        self._file, self._size, self._budget = file, size, budget
+        self._others = RecordCounter(path)
+        self._index = FileIndex(end=size)
+        self._message_count = 0
+        self._seen: set[int] = set()
+        self._opcodes: set[int] = set()
+        self._lacks_places: Mapping[int, bool] = {}
 
-def _read_summary(file: BinaryIO, summary: bytes, index: FileIndex) -> None:
-    whole, at = memoryview(summary), 0
-    while at + HEAD_BYTES <= len(whole):
-        opcode, length = RECORD_HEAD.unpack_from(whole, at)
-        content = whole[at + HEAD_BYTES : at + HEAD_BYTES + length]
-        at += HEAD_BYTES + length
+    def read(self, footer: bytes) -> FileIndex | None:
+        """The index; None where there is no summary, or it is damaged, or it does not tell of all chunks."""
+        start = int.from_bytes(footer[9:17], "little")
+        end = self._size - _FOOTER_BYTES
+        if not len(MAGIC) <= start < end or not self._is_crc_right(start, end, footer):
+            return None
+        try:
+            for place in walk(self._file, end, self._budget, start):
+                self._add(place)
+        except ValueError:
+            return None
+        index = self._index
+        return index if index.chunks and self._is_true(start) else None
+
+    def _is_crc_right(self, start: int, end: int, footer: bytes) -> bool:
+        wanted = int.from_bytes(footer[25:29], "little")
+        if not wanted:
+            return True
+        self._budget.spend(end - start)
+        self._file.seek(start)
+        crc, left = 0, end - start
+        while left and (block := self._file.read(min(left, _READ_BYTES))):
+            crc, left = zlib.crc32(block, crc), left - len(block)
+        return zlib.crc32(footer[:25], crc) == wanted
+
+    def _add(self, place: Place) -> None:
+        """Raises `ValueError` for what can't be true."""
+        index, opcode = self._index, place.opcode
+        self._others.add(opcode)
+        self._opcodes.add(opcode)
         if opcode == Opcode.CHUNK_INDEX:
-            info = read_chunk_info(content)
-            if not _is_inside(info, index.end):
-                raise ValueError("a chunk beyond the file")
-            if not info.packed_offsets:
-                info = _indexed_by_reading(file, info, Definitions())
-            index.chunks.append(info)
+            self._add_chunk(read_chunk_info(_content(self._file, place)))
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            index.definitions.add(opcode, content)
-        elif opcode == Opcode.STATISTICS:
-            index.counts = read_record("Statistics", content).channel_message_counts
-        elif opcode == Opcode.METADATA_INDEX:
-            place = read_record("MetadataIndex", content)
-            if place.offset + place.length <= index.end:
-                _read_metadata(file, Place(place.offset, Opcode.METADATA, place.length - HEAD_BYTES), index)
+            if place.length <= _MAX_SCHEMA_BYTES:
+                index.definitions.add(opcode, _content(self._file, place))
+        elif opcode == Opcode.STATISTICS and place.length <= _MAX_METADATA_BYTES:
+            statistics = read_record("Statistics", _content(self._file, place))
+            index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
+            self._lacks_places = {
+                Opcode.METADATA_INDEX: bool(statistics.metadata_count),
+                Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
+            }
+        elif opcode == Opcode.METADATA_INDEX and place.length <= _MAX_HEADER_BYTES:
+            at = read_record("MetadataIndex", _content(self._file, place))
+            if at.offset + at.length <= index.end and self._is_new(at.offset):
+                _read_metadata(
+                    self._file, Place(at.offset, Opcode.METADATA, max(0, at.length - HEAD_BYTES)), index
+                )
+        elif opcode == Opcode.ATTACHMENT_INDEX and place.length <= _MAX_HEADER_BYTES:
+            told = read_record("AttachmentIndex", _content(self._file, place))
+            if self._is_new(told.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
+                index.attachments.append(Attachment(told.name, told.media_type, told.data_size))
 
+    def _is_new(self, offset: int) -> bool:
+        """Whether no other entry of the summary leads to this offset."""
+        if offset in self._seen:
+            return False
+        self._seen.add(offset)
+        return True
 
-def _is_inside(info: ChunkInfo, size: int) -> bool:
-    """Whether a chunk and its indexes can be where a summary says that they are."""
-    end = info.offset + info.length + info.index_bytes
-    return info.offset >= len(MAGIC) and info.length >= HEAD_BYTES and end <= size
+    def _add_chunk(self, info: ChunkInfo) -> None:
+        end = info.offset + info.length + info.index_bytes
+        if info.offset < len(MAGIC) or info.length < HEAD_BYTES or end > self._index.end:
+            raise ValueError("a chunk beyond the file")
+        if not self._is_new(info.offset):
+            raise ValueError("two entries for one chunk")
+        if not info.packed_offsets:
+            damage = _index_by_reading(self._file, info, self._index.definitions, self._budget)
+            self._index.damage.extend(damage)
+        if info.packed_offsets:
+            self._index.chunks.append(info)
 
-
-def _has_messages(file: BinaryIO, size: int, data_end: int) -> bool:
-    """Whether there are messages that no summary tells of."""
-    wanted = {Opcode.CHUNK, Opcode.MESSAGE}
-    return any(each.opcode in wanted for each in records_of(file, min(size, data_end)))
-
-
-def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
-    if not 0 < place.length <= MOST_SMALL_BYTES:
-        return
-    file.seek(place.offset + HEAD_BYTES)
-    try:
-        made = read_record("Metadata", file.read(place.length))
-    except ValueError:
-        return
-    index.metadata.append((made.name, made.metadata))
+    def _is_true(self, start: int) -> bool:
+        """Whether chunks don't overlap, all channels are known, and all that the file has is listed."""
+        index, known = self._index, self._index.definitions.channels
+        if any(lacks and opcode not in self._opcodes for opcode, lacks in self._lacks_places.items()):
+            return False
+        end = 0
+        for info in sorted(index.chunks, key=lambda each: each.offset):
+            if info.offset < end or info.offset + info.length > start:
+                return False
+            end = info.offset + info.length
+        if any(channel not in known for info in index.chunks for channel in info.channels):
+            return False
+        if len(index.chunks) > _MAX_COUNTED_CHUNKS or not all(info.index_bytes for info in index.chunks):
+            return True
+        return self._message_count <= sum(sum(info.counts.values()) for info in index.chunks)
 
 
 # ---- by the records
 
 
-def _of_records(file: BinaryIO, size: int, progress: Callable[[int, int], object] | None) -> FileIndex:
-    index = FileIndex(is_complete=False, end=len(MAGIC))
-    scanned = _Scan(file, index)
-    for place in records_of(file, size):
-        scanned.add(place)
-        index.end = place.offset + HEAD_BYTES + place.length
-        if progress is not None:
-            progress(index.end, size)
-        if place.opcode == Opcode.DATA_END:
-            break
-    scanned.end_chunk()
-    for chunk in index.chunks:  # other programs put a schema into any chunk before that of its channel
-        if index.definitions.lacks_schemas:
-            _indexed_by_reading(file, chunk, index.definitions)
-    index.chunks.sort(key=lambda each: each.start_ns)
-    return index
-
-
 class _Scan:
-    """Puts together the chunks of a file without a summary."""
+    """Puts together the chunks, and the runs of messages, of a file without a summary."""
 
-    def __init__(self, file: BinaryIO, index: FileIndex) -> None:
-        self._file = file
-        self._index = index
+    def __init__(
+        self,
+        file: BinaryIO,
+        path: Path,
+        size: int,
+        budget: ReadBudget,
+        progress: Callable[[int, int], object] | None,
+        data_end: int,
+    ) -> None:
+        self._file, self._size, self._budget, self._progress = file, size, budget, progress
+        self._data_end = data_end
+        self._index = FileIndex(end=len(MAGIC))
         self._chunk: ChunkInfo | None = None
         self._offsets: dict[int, int] = {}
+        self._run: ChunkInfo | None = None
+        self._counts: dict[int, int] = {}
+        self._others = RecordCounter(path)
 
-    def add(self, place: Place) -> None:
-        """The next record."""
-        if place.opcode == Opcode.MESSAGE_INDEX:
-            self._file.seek(place.offset + HEAD_BYTES)
-            if self._chunk is not None:
-                self._offsets[int.from_bytes(self._file.read(2), "little")] = place.offset
+    def run(self) -> FileIndex:
+        """Walk over the file. Raises `RecordingTooLargeError`, `OSError`, what `progress` raises."""
+        index, told = self._index, 0
+        is_closed = self._data_end < self._size
+        for place in walk(self._file, self._data_end, self._budget):
+            self._add(place)
+            index.end = place.end
+            if self._progress is not None and index.end - told >= _READ_BYTES:
+                told = index.end
+                self._progress(index.end, self._size)
+            if place.opcode == Opcode.DATA_END:
+                index.end = self._data_end if is_closed else place.end
+                break
+        self._end_chunk()
+        self._end_run()
+        if is_closed and index.end < self._data_end:  # it was not cut, so the rest is damaged
+            index.damage.append(Damage(index.end, self._data_end - index.end))
+        for chunk in index.chunks:  # other programs put a schema into any chunk before that of its channel
+            if index.definitions.lacks_schemas and not chunk.is_run:
+                _index_by_reading(self._file, chunk, index.definitions, self._budget)
+        if is_closed and index.end == self._data_end:
+            index.end = self._size
+        return index
+
+    def _add(self, place: Place) -> None:
+        opcode = place.opcode
+        if opcode == Opcode.MESSAGE:
+            self._end_chunk()
+            self._add_message(place)
+            return
+        if opcode == Opcode.MESSAGE_INDEX:
+            if self._chunk is not None and place.length >= 2:
+                self._offsets[int.from_bytes(place.begin[:2], "little")] = place.offset
                 self._chunk.index_bytes += HEAD_BYTES + place.length
             return
-        self.end_chunk()
-        if place.opcode == Opcode.CHUNK:
-            self._file.seek(place.offset)
-            head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
-            if head is not None:
-                self._chunk = _info(place, head)
-        elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL} and place.length <= MOST_SMALL_BYTES:
-            self._file.seek(place.offset + HEAD_BYTES)
-            self._index.definitions.add(place.opcode, self._file.read(place.length))
-        elif place.opcode == Opcode.METADATA:
+        self._end_chunk()
+        self._others.add(opcode)
+        if opcode == Opcode.CHUNK or place.length > _MAX_INSIDE_BYTES:
+            self._end_run()
+        if opcode == Opcode.CHUNK:
+            self._begin_chunk(place)
+        elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
+            if place.length <= _MAX_SCHEMA_BYTES:
+                self._index.definitions.add(opcode, _content(self._file, place))
+        elif opcode == Opcode.METADATA:
             _read_metadata(self._file, place, self._index)
+        elif opcode == Opcode.ATTACHMENT:
+            self._add_attachment(place)
 
-    def end_chunk(self) -> None:
+    # -- messages outside of chunks
+
+    def _add_message(self, place: Place) -> None:
+        if place.length < MESSAGE_REST_BYTES:
+            return
+        channel, _sequence, log_ns = MESSAGE_START.unpack_from(place.begin)
+        run = self._run
+        if run is None or place.end - run.offset > _RUN_BYTES:
+            self._end_run()
+            run = self._run = ChunkInfo(log_ns, log_ns, place.offset, 0, b"", 0, "", 0, 0, is_run=True)
+        run.length = place.end - run.offset
+        if log_ns < run.start_ns:
+            run.start_ns = log_ns
+        elif log_ns > run.end_ns:
+            run.end_ns = log_ns
+        self._counts[channel] = self._counts.get(channel, 0) + 1
+
+    def _end_run(self) -> None:
+        run, self._run = self._run, None
+        if run is None:
+            return
+        run.compressed_bytes = run.uncompressed_bytes = run.length
+        run.packed_counts = pack_offsets(self._counts)
+        run.packed_offsets = pack_offsets(dict.fromkeys(self._counts, 0))
+        self._counts = {}
+        self._index.chunks.append(run)
+
+    # -- chunks
+
+    def _begin_chunk(self, place: Place) -> None:
+        head = chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.begin, place.length)
+        if head is None:
+            self._index.damage.append(Damage(place.offset, HEAD_BYTES + place.length))
+        else:
+            self._chunk = _info(place, head)
+
+    def _end_chunk(self) -> None:
         """No more indexes of the last chunk come."""
         if self._chunk is None:
             return
@@ -273,8 +476,25 @@ class _Scan:
         chunk.packed_offsets, self._offsets = pack_offsets(self._offsets), {}
         known = self._index.definitions.channels
         if not chunk.packed_offsets or not all(each in known for each in chunk.channels):
-            chunk = _indexed_by_reading(self._file, chunk, self._index.definitions)
-        self._index.chunks.append(chunk)
+            damage = _index_by_reading(self._file, chunk, self._index.definitions, self._budget)
+            self._index.damage.extend(damage)
+        if chunk.packed_offsets:
+            self._index.chunks.append(chunk)
+
+    def _add_attachment(self, place: Place) -> None:
+        if len(self._index.attachments) >= _MAX_ATTACHMENTS:
+            return
+        self._file.seek(place.offset + HEAD_BYTES + 16)  # after its two times
+        begin = self._file.read(min(place.length, _MAX_HEADER_BYTES))
+        words, at = [], 0
+        for _word in range(2):
+            end = at + 4 + int.from_bytes(begin[at : at + 4], "little")
+            if end + 4 > len(begin):
+                return
+            words.append(begin[at + 4 : end].decode("utf-8", "replace"))
+            at = end
+        size = int.from_bytes(begin[at : at + 8], "little")
+        self._index.attachments.append(Attachment(words[0], words[1], min(size, place.length)))
 
 
 def _info(place: Place, head: ChunkHead) -> ChunkInfo:
@@ -291,29 +511,41 @@ def _info(place: Place, head: ChunkHead) -> ChunkInfo:
     )
 
 
-def _indexed_by_reading(file: BinaryIO, info: ChunkInfo, definitions: Definitions) -> ChunkInfo:
-    """Which channels a chunk has, where the file does not tell; an offset of 0 is no index."""
+def _index_by_reading(
+    file: BinaryIO, info: ChunkInfo, definitions: Definitions, budget: ReadBudget
+) -> list[Damage]:
+    """Find out which channels a chunk has, where the file does not tell; an offset of 0 is no index."""
+    budget.spend(info.length)
     try:
         chunk = read_chunk(file, info)
     except ValueError:
-        return info
-    channels = info.index_offsets
-    for record in messages_in(chunk):
+        return [] if info.packed_offsets else [Damage(info.offset, info.length, info.start_ns, info.end_ns)]
+    budget.spend(len(chunk))
+    channels, counts = info.index_offsets, dict[int, int]()
+    for number, record in enumerate(messages_in(chunk), 1):
+        if number % 1_000 == 0:
+            budget.spend(1_000 * RECORD_COST_BYTES)
         if isinstance(record, RawMessage):
-            channels.setdefault(record.channel, 0)
-        else:
+            counts[record.channel] = counts.get(record.channel, 0) + 1
+        elif record[0] in {Opcode.SCHEMA, Opcode.CHANNEL}:
             definitions.add(*record)
-    info.packed_offsets = pack_offsets(channels)
-    return info
+    for channel in counts:
+        channels.setdefault(channel, 0)
+    info.packed_offsets, info.packed_counts = pack_offsets(channels), pack_offsets(counts)
+    return []
 
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
-    """A chunk's records. Raises `ValueError` when it is damaged, `OSError`."""
+    """Return a chunk's records. Raises `ValueError` when it is damaged or too large, `OSError`."""
     if info.length > MOST_CHUNK_BYTES:
         raise ValueError("size")
     file.seek(info.offset)
     record = memoryview(file.read(info.length))
-    if len(record) != info.length or len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
+    if len(record) != info.length:
+        raise ValueError("cut")
+    if info.is_run:
+        return record
+    if len(record) < HEAD_BYTES or record[0] != Opcode.CHUNK:
         raise ValueError("cut")
     head = chunk_head(record, info.length - HEAD_BYTES)
     if head is None:

@@ -17,12 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from nep.recordings.channels import ChannelDefinition
+from nep.recordings.compression import check_packages, compressed
 from nep.recordings.records import (
     MAGIC,
     ChunkInfo,
     Opcode,
-    check_packages,
-    compressed,
     message_count,
     message_head,
     pack_chunk,
@@ -42,7 +41,7 @@ else:  # who records nothing need not have it
 __all__ = ["CHUNK_BYTES", "MOST_CHANNELS", "ChannelTable", "FileWriter"]
 
 CHUNK_BYTES = 1_000_000
-MOST_CHANNELS = 60_000
+MOST_CHANNELS = 65_535
 """Their numbers have 16 bits."""
 
 
@@ -131,8 +130,12 @@ class FileWriter:
         compression: str = "zstd",
         is_new: bool = True,
         keeps_chunks: bool = False,
+        profile: str = "",
     ) -> None:
-        """Raises `FileExistsError` when there is such a file, unless it is not to be new."""
+        """Raises `FileExistsError` when there is such a file, unless it is not to be new.
+
+        `profile`: what MCAP calls the kind of messages, such as "ros2".
+        """
         check_packages()
         self.path = path
         self.table = ChannelTable() if table is None else table
@@ -152,7 +155,7 @@ class FileWriter:
         self._written_schemas: set[int] = set()
         self._metadata: list[mcap_records.MetadataIndex] = []
         try:
-            self._write(MAGIC + packed(mcap_records.Header(profile="", library=f"nep {__version__}")))
+            self._write(MAGIC + packed(mcap_records.Header(profile=profile, library=f"nep {__version__}")))
         except OSError:
             self._file.close()
             with suppress(OSError):  # it has nothing
@@ -269,15 +272,15 @@ class FileWriter:
         new = [number for number in channels if number not in self._written_channels]
         if not new:
             return
-        made = b""
+        made: list[bytes | memoryview] = []
         schemas: set[int] = set()
         for number in new:
             schema, channel = self.table.records(number)
-            if schema is not None and schema.id not in self._written_schemas | schemas:
+            if schema is not None and schema.id not in self._written_schemas and schema.id not in schemas:
                 schemas.add(schema.id)
-                made += packed(schema)
-            made += packed(channel)
-        self._write(made)
+                made.append(packed(schema))
+            made.append(packed(channel))
+        self._write(b"".join(made))
         self._written_channels.update(new)
         self._written_schemas |= schemas
 

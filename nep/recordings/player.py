@@ -428,15 +428,14 @@ class Player:
                 self._on_end()
 
     def _play_until_closed(self) -> None:
-        was_playing = False
         while True:
             with self._lock:
                 if self._is_closed:
                     return
+                was_playing = self._playback.status().is_playing
                 due = self._playback.advance()
                 is_playing = self._playback.status().is_playing
                 has_ended = was_playing and not is_playing and self._playback.status().is_at_end
-                was_playing = is_playing
                 if not due.messages and not has_ended:
                     self._lock.wait(due.wait_s)
             if due.messages:

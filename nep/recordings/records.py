@@ -9,34 +9,31 @@ from __future__ import annotations
 
 import io
 import struct
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from nep.errors import RecordingsUnavailableError
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    import lz4.frame as lz4_frame  # type: ignore[import-untyped]
     import mcap.data_stream as mcap_stream
     import mcap.exceptions as mcap_exceptions
     import mcap.records as mcap_records
-    import zstandard
 else:  # who records nothing need not have them
-    lz4_frame = lazy_module("lz4.frame")
     mcap_exceptions = lazy_module("mcap.exceptions")
     mcap_records = lazy_module("mcap.records")
     mcap_stream = lazy_module("mcap.data_stream")
-    zstandard = lazy_module("zstandard")
 
 __all__ = [
     "CHUNK_HEAD_BYTES",
     "HEAD_BYTES",
     "MAGIC",
     "MESSAGE_HEAD",
+    "MESSAGE_REST_BYTES",
+    "MESSAGE_START",
     "MOST_CHUNK_BYTES",
     "RECORD_HEAD",
     "ChunkHead",
@@ -44,11 +41,7 @@ __all__ = [
     "IndexEntry",
     "Opcode",
     "RawMessage",
-    "check_packages",
     "chunk_head",
-    "compressed",
-    "decompressed",
-    "decompressed_part",
     "message_count",
     "message_head",
     "messages_in",
@@ -66,7 +59,10 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 HEAD_BYTES = RECORD_HEAD.size
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_MESSAGE_REST = MESSAGE_HEAD.size - HEAD_BYTES
+_MAX_OTHERS = 200_000
+"""A chunk has schemas and channels beside its messages, each once."""
+MESSAGE_REST_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
+MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, letters of the compression
 _SIZE = struct.Struct("<Q")
 _ENTRIES = struct.Struct("<HI")  # channel, bytes of the entries
@@ -75,9 +71,6 @@ _OFFSET = struct.Struct("<HQ")
 _INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the index offsets
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
-_ZSTD_LEVEL = 1
-"""Of joints as JSON 40 % are left at 170 MB/s (lz4: 80 % at 360), of JPEGs it notices that nothing is to be
-gained at 1200 MB/s; higher levels take three times as long for nothing (2 cores, 1 MB chunks)."""
 MOST_CHUNK_BYTES = 2**31
 """A chunk that tells of more is none: whoever writes larger ones cannot be read in memory."""
 CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
@@ -104,30 +97,30 @@ class Opcode(IntEnum):
     DATA_END = 15
 
 
-def check_packages() -> None:
-    """Raises `RecordingsUnavailableError` when a package that recordings need is not installed."""
-    try:
-        import lz4.frame  # noqa: F401, PLC0415 - optional
-        import mcap.records  # noqa: F401, PLC0415
-        import zstandard  # noqa: F401, PLC0415
-    except ImportError as error:
-        raise RecordingsUnavailableError("pip install 'nep-studio[recordings]'") from error
-
-
 def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 - any record of mcap
     """One of mcap's records, by the name of its class, from its content. Raises `ValueError`."""
-    stream = mcap_stream.ReadDataStream(io.BytesIO(content))
+    stream_class, record_class = _classes(kind)
     try:
-        return getattr(mcap_records, kind).read(stream)
+        return record_class.read(stream_class(io.BytesIO(content)))
     except (struct.error, OverflowError, EOFError, MemoryError, mcap_exceptions.McapError) as error:
         raise ValueError(str(error)) from error
 
 
+@cache
+def _classes(kind: str) -> tuple[Any, Any]:
+    return mcap_stream.ReadDataStream, getattr(mcap_records, kind)
+
+
+@cache
+def _builder_class() -> Any:  # noqa: ANN401 - of mcap
+    return mcap_stream.RecordBuilder
+
+
 def packed(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
     """One of mcap's records as bytes."""
-    builder = mcap_stream.RecordBuilder()
+    builder = _builder_class()()
     record.write(builder)
-    made: bytes = builder.end()  # type: ignore[no-untyped-call]
+    made: bytes = builder.end()
     return made
 
 
@@ -148,30 +141,33 @@ class RawMessage(NamedTuple):
 def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
     """What stands before a message's bytes in a chunk."""
     return MESSAGE_HEAD.pack(
-        Opcode.MESSAGE, _MESSAGE_REST + size_bytes, channel, sequence, log_ns, publish_ns
+        Opcode.MESSAGE, MESSAGE_REST_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
     )
 
 
 def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
     """The records of a chunk from an offset on: messages, and others as (opcode, content).
 
-    Ends without an error where the bytes do: the last record may be cut, then it is not told.
+    Ends without an error where the bytes do, or where they can be no record: the last record may be cut.
     """
     whole = memoryview(chunk)
-    size = whole.nbytes
+    size, others = whole.nbytes, 0
     while offset + HEAD_BYTES <= size:
         opcode, length = RECORD_HEAD.unpack_from(whole, offset)
         end = offset + HEAD_BYTES + length
         if end > size:
             return
         if opcode == Opcode.MESSAGE:
-            if length < _MESSAGE_REST:
+            if length < MESSAGE_REST_BYTES:
                 return
             _opcode, _length, channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(whole, offset)
             yield RawMessage(
                 offset, channel, sequence, log_ns, publish_ns, whole[offset + MESSAGE_HEAD.size : end]
             )
         else:
+            others += 1
+            if not opcode or others > _MAX_OTHERS:
+                return
             yield opcode, whole[offset + HEAD_BYTES : end]
         offset = end
 
@@ -221,59 +217,6 @@ def pack_chunk(
     return RECORD_HEAD.pack(Opcode.CHUNK, len(rest) + len(data)) + rest
 
 
-def compressed(data: bytes, compression: str) -> bytes:
-    """A chunk's data as it stands in a file."""
-    if compression == "zstd":
-        return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
-    if compression == "lz4":
-        made: bytes = lz4_frame.compress(data)
-        return made
-    return data
-
-
-def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """A chunk's records, checked by their size and CRC. Raises `ValueError` for what is damaged."""
-    try:
-        if head.compression == "zstd":
-            made: bytes | memoryview = zstandard.ZstdDecompressor().decompress(
-                data, max_output_size=head.uncompressed_bytes
-            )
-        elif head.compression == "lz4":
-            with lz4_frame.LZ4FrameDecompressor() as lz4_decompressor:
-                made = lz4_decompressor.decompress(data, max_length=head.uncompressed_bytes + 1)
-        else:
-            made = data
-    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
-        raise ValueError(str(error)) from error
-    if len(made) != head.uncompressed_bytes:
-        raise ValueError("size")
-    if head.crc and zlib.crc32(made) != head.crc:
-        raise ValueError("crc")
-    return made
-
-
-def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """As much of a chunk's records as there is in its first bytes; not checked."""
-    if not head.compression:
-        return data
-    made = bytearray()
-    try:
-        if head.compression == "zstd":
-            zstd = zstandard.ZstdDecompressor().decompressobj()
-            for at in range(0, len(data), _STEP):
-                made += zstd.decompress(data[at : at + _STEP])
-        else:
-            with lz4_frame.LZ4FrameDecompressor() as lz4_decompressor:
-                for at in range(0, len(data), _STEP):
-                    made += lz4_decompressor.decompress(data[at : at + _STEP])
-    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
-        pass  # what came before is there
-    return bytes(made[: head.uncompressed_bytes])
-
-
-_STEP = 16_384
-
-
 # ---- indexes
 
 
@@ -313,6 +256,8 @@ class ChunkInfo:
 
     `offset`, `length`: of its record in the file. `packed_offsets`: where each channel's message index is, as
     it stands in the file: of ten thousand chunks only a few are asked. `index_bytes`: of all these indexes.
+    `is_run`: messages that stand outside of chunks, one behind the other. `packed_counts`: how many each
+    channel has, where they were counted because no index tells.
     """
 
     start_ns: int
@@ -324,6 +269,8 @@ class ChunkInfo:
     compression: str
     compressed_bytes: int
     uncompressed_bytes: int
+    is_run: bool = False
+    packed_counts: bytes = b""
 
     @property
     def channels(self) -> list[int]:
@@ -346,6 +293,8 @@ class ChunkInfo:
 
         Channels without an index are missing: to count theirs the chunk must be read.
         """
+        if self.packed_counts:
+            return dict(_OFFSET.iter_unpack(self.packed_counts))
         after = self.offset + self.length
         end = after + self.index_bytes
         counts = {}

@@ -17,10 +17,12 @@ from typing import BinaryIO
 
 import orjson
 
-from nep.errors import RecordingError
+from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.channels import ChannelDecoder
-from nep.recordings.index import MOST_SMALL_BYTES, Definitions, Place, read_chunk, read_index
+from nep.recordings.compression import check_packages, decompressed, decompressed_part
+from nep.recordings.index import MOST_SMALL_BYTES, Definitions, RecordCounter, read_chunk, read_index
+from nep.recordings.limits import open_budget
 from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
     CHUNK_HEAD_BYTES,
@@ -32,15 +34,13 @@ from nep.recordings.records import (
     ChunkInfo,
     Opcode,
     RawMessage,
-    check_packages,
     chunk_head,
-    decompressed,
-    decompressed_part,
     messages_in,
     pack_message_index,
     read_message_index,
     read_record,
 )
+from nep.recordings.walk import Place
 from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
 
@@ -180,6 +180,7 @@ class _Mending:
         self._file = file
         self._progress = progress
         self._size = file.seek(0, io.SEEK_END)
+        self._search_budget = open_budget(path, self._size)
         file.seek(0)
         if file.read(len(MAGIC)) != MAGIC and not self._find_chunk(0):
             raise RecordingError(str(path), _("it is no MCAP file"))
@@ -187,6 +188,7 @@ class _Mending:
         self._table = ChannelTable(self._definitions.channels)
         self._counts = _Counts()
         self._damaged_chunk: ChunkHead | None = None
+        self._others = RecordCounter(path)
         self.writer = FileWriter(target, self._table, is_new=False)
 
     def _known_definitions(self, path: Path) -> Definitions:
@@ -203,6 +205,8 @@ class _Mending:
         while offset + HEAD_BYTES <= self._size:
             self._progress(offset, self._size)
             place = self._place(offset)
+            if place is not None:
+                self._others.add(place.opcode)
             if place is not None and place.opcode == Opcode.DATA_END:
                 break
             if place is not None and self._take(place):
@@ -255,9 +259,7 @@ class _Mending:
         return self._file.read(place.length)
 
     def _define(self, opcode: int, content: bytes | memoryview) -> None:
-        before = set(self._definitions.channels)
-        self._definitions.add(opcode, content)
-        for number in self._definitions.channels.keys() - before:
+        for number in self._definitions.add(opcode, content):
             self._table.put(number, self._definitions.channels[number])
 
     def _take_metadata(self, content: bytes) -> None:
@@ -400,7 +402,13 @@ class _Mending:
             for match in _LIKE_A_CHUNK.finditer(window):
                 at = match.start()
                 _opcode, length = RECORD_HEAD.unpack_from(window, at)
-                if offset + at + HEAD_BYTES + length <= self._size and self._is_whole(offset + at, length):
+                if offset + at + HEAD_BYTES + length > self._size:
+                    continue
+                try:
+                    is_whole = self._is_whole(offset + at, length)
+                except RecordingTooLargeError:  # too many places look like chunks and are none
+                    return
+                if is_whole:
                     yield offset + at
             offset += max(1, len(window) - CHUNK_HEAD_BYTES)
             self._progress(min(offset, self._size), self._size)
@@ -410,6 +418,7 @@ class _Mending:
         head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
         if head is None or not head.crc:
             return False
+        self._search_budget.spend(head.data_bytes + min(head.uncompressed_bytes, _WINDOW))
         self._file.seek(offset + head.data_at)
         try:
             decompressed(memoryview(self._file.read(head.data_bytes)), head)

@@ -23,6 +23,7 @@ from nep.errors import RecordingError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.channels import Role
+from nep.recordings.compression import decompressed
 from nep.recordings.figures import TopicFigures, read_figures
 from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
@@ -31,7 +32,6 @@ from nep.recordings.records import (
     Opcode,
     RawMessage,
     chunk_head,
-    decompressed,
     messages_in,
 )
 from nep.recordings.writer import USUAL_LIMITS, LogClock, RecordingWriter, WriterLimits, disk_sentence

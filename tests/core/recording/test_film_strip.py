@@ -90,7 +90,11 @@ def test_sizes_of_what_nobody_counted_are_those_of_some_messages(tmp_path):
         writer.finish()
     look = film_strip(path, 0, 10, (24, 16))
     assert look is not None
-    assert [(each.name, look.size_of(each)) for each in look.topics] == [("/few", 2), ("/many", 99 * 50)]
+    assert [(each.name, look.size_of(each)) for each in look.topics] == [
+        ("/few", 2),
+        ("/many", 99 * 50),
+        ("/none", None),
+    ]
     unknown = replace(look, message_bytes={"/few": 2.0})
     assert unknown.about(0, 100, ("/few",)) == (1, 2)
     assert unknown.about(0, 100, ("/few", "/many")) == (100, None)

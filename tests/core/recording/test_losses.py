@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from app.core.recording.replay.density import losses_of
-from nep.recordings import reader
+from nep.recordings import file_reader
 from nep.recordings.reader import Recording
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits
@@ -37,13 +37,13 @@ def recording(path, gaps: dict[int, int]) -> None:
 def read_bytes(monkeypatch) -> list[int]:
     """The lengths of the pieces that are read."""
     lengths: list[int] = []
-    read = reader.read_chunk
+    read = file_reader.read_chunk
 
     def counted(file, chunk):
         lengths.append(chunk.length)
         return read(file, chunk)
 
-    monkeypatch.setattr(reader, "read_chunk", counted)
+    monkeypatch.setattr(file_reader, "read_chunk", counted)
     return lengths
 
 

@@ -144,7 +144,7 @@ def test_info_tells_what_is_there_and_what_is_missing(path, tmp_path, capfd):
     out = capfd.readouterr().out
     assert "24 messages in 0:00" in out
     line = next(line for line in out.splitlines() if line.startswith("/arm/joints"))
-    assert line.split()[:3] == ["/arm/joints", "json", "20"]
+    assert line.split()[:5] == ["/arm/joints", "json", "json", "jsonschema", "20"]
     run("recording", "info", path, "--json")
     told = json.loads(capfd.readouterr().out)
     assert told["topics"]["/arm/joints"]["figures"]["received"] == 20

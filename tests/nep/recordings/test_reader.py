@@ -90,7 +90,7 @@ def test_the_newest_of_each_topic_and_a_step(path, everything, data):
 
 
 def test_densities_are_counts_without_a_look_at_payloads(recording, everything, monkeypatch):
-    monkeypatch.setattr(recording, "_chunk", pytest.fail)
+    monkeypatch.setattr(recording.file, "_chunk", pytest.fail)
     start, end = recording.start_ns, recording.end_ns + 1
     for buckets in (1, 7, 100):
         found = recording.densities(start, end, buckets)
@@ -100,7 +100,7 @@ def test_densities_are_counts_without_a_look_at_payloads(recording, everything, 
                 if each.message.topic == topic:
                     wanted[(each.log_ns - start) * buckets // (end - start)] += 1
             assert found[topic] == wanted
-    monkeypatch.setattr("nep.recordings.reader._MOST_EXACT", 0)
+    monkeypatch.setattr("nep.recordings.file_reader._MAX_EXACT_CHUNKS", 0)
     coarse = recording.densities(start, end, 12, ("/a",))
     assert set(coarse) == {"/a"}
     assert sum(coarse["/a"]) == 120
@@ -111,18 +111,18 @@ def test_densities_are_counts_without_a_look_at_payloads(recording, everything, 
 def test_memory_is_bounded_by_the_cache(path, everything):
     with Recording(path, cache_bytes=1) as opened:
         assert len(list(opened.read())) == len(ALL)
-        assert len(opened._cache) == 1
+        assert len(opened.file._cache) == 1
         order = list(range(len(everything)))
         random.Random(1).shuffle(order)
         for at in order[:20]:
             assert opened.newest(everything[at].log_ns)
-            assert len(opened._cache) == 1
+            assert len(opened.file._cache) == 1
 
 
 def test_a_file_that_was_not_ended_tells_the_same(path, everything, tmp_path):
     cut = tmp_path / "cut.mcap"
     with Recording(path) as opened:
-        chunks = opened.chunks()
+        chunks = opened.file.chunks()
     end = chunks[-1].offset + chunks[-1].length + chunks[-1].index_bytes
     cut.write_bytes(path.read_bytes()[:end])
     with Recording(cut) as opened:
@@ -152,7 +152,7 @@ def test_a_damaged_piece_is_passed_over_and_counted(path, everything, tmp_path):
     damaged = tmp_path / "damaged.mcap"
     data = bytearray(path.read_bytes())
     with Recording(path) as opened:
-        chunk = opened.chunks()[5]
+        chunk = opened.file.chunks()[5]
     data[chunk.offset + chunk.length // 2] ^= 0x10
     damaged.write_bytes(data)
     with Recording(damaged) as opened:
@@ -223,9 +223,9 @@ def test_a_summary_that_lies_about_times_costs_no_time(path, everything, tmp_pat
         assert [each.log_ns for each in opened.read()] == [each.log_ns for each in everything]
         start = everything[0].log_ns
         for number in range(300):
-            opened._chunks.append(opened._chunks[number % 12])
-            opened._starts.append(0)
-            opened._latest_ends.append(2**64 - 1)
+            opened.file._chunks.append(opened.file._chunks[number % 12])
+            opened.file._starts.append(0)
+            opened.file._latest_ends.append(2**64 - 1)
         counts = opened.densities(start, start + 1000, 1000, ("/a",))["/a"]
         assert len(counts) == 1000
         assert sum(counts) <= 12 * 120
@@ -235,7 +235,7 @@ def test_messages_that_overlap_between_chunks_come_in_order(tmp_path, everything
     path = tmp_path / "a.mcap"
     record(path, [ALL[:1]])
     with Recording(path) as opened:
-        table_of = opened._index.definitions.channels
+        table_of = opened.facts.channels
     writer = FileWriter(tmp_path / "b.mcap")
     for number, definition in table_of.items():
         writer.table.put(number, definition)

@@ -35,7 +35,7 @@ def read(path):
 def test_a_recording_that_is_cut_anywhere_gives_all_that_was_whole(path, tmp_path):
     data, whole = path.read_bytes(), [kept(each) for each in ALL]
     with Recording(path) as recording:
-        chunks = recording.chunks()
+        chunks = recording.file.chunks()
     rnd = random.Random(1474)
     for at in range(200):
         cut = rnd.randrange(len(data))
@@ -80,7 +80,7 @@ def test_a_whole_recording_loses_nothing(path, tmp_path):
 @pytest.mark.parametrize("has_end", [True, False])
 def test_damage_in_the_middle_costs_the_damaged_chunk_alone_and_is_counted(path, tmp_path, has_end):
     with Recording(path) as recording:
-        chunks = recording.chunks()
+        chunks = recording.file.chunks()
     data = bytearray(path.read_bytes())
     data[chunks[4].offset + chunks[4].length - 5] ^= 1
     if not has_end:
@@ -95,7 +95,7 @@ def test_damage_in_the_middle_costs_the_damaged_chunk_alone_and_is_counted(path,
 
 def test_what_a_damaged_length_hides_is_found_again(path, tmp_path):
     with Recording(path) as recording:
-        chunks = recording.chunks()
+        chunks = recording.file.chunks()
     data = bytearray(path.read_bytes())
     place = chunks[3].offset
     data[place : place + 600] = random.Random(3).randbytes(600)

@@ -1,0 +1,213 @@
+"""`nep recording info`: what is in a recording, and what is missing in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from datetime import datetime, timezone
+from itertools import islice
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nep.cli.options import JsonOption
+from nep.cli.recording_files import FileArgument, clock_text, end_with_damage, progress_bar
+from nep.cli.screen import UNKNOWN, TextColumn, rate, say, show_json, show_table, size, write
+from nep.i18n import _, lazy, listed, ngettext
+from nep.system.lazy_import import lazy_module
+from nep.text import escaped, quotable
+
+if TYPE_CHECKING:
+    from nep.recordings import figures, file_reader, reader
+else:  # the other commands need not wait for it, nor have what it needs
+    file_reader = lazy_module("nep.recordings.file_reader")
+    reader = lazy_module("nep.recordings.reader")
+
+_MAX_ROWS = 1_000
+_MAX_VALUES = 20
+_CHECKED_BYTES = 1_000_000_000
+_SHOWN_OTHERWISE = frozenset({"nep.recording", "nep.figures"})
+_COLUMNS = (
+    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("type")),
+    TextColumn(lazy("encoding")),
+    TextColumn(lazy("schema")),
+    TextColumn(lazy("messages"), "right"),
+    TextColumn(lazy("rate"), "right"),
+    TextColumn(lazy("lost"), "right"),
+    TextColumn(lazy("late"), "right"),
+    TextColumn(lazy("unreadable"), "right"),
+    TextColumn(lazy("lost in writing"), "right"),
+)
+_ATTACHMENT_COLUMNS = (
+    TextColumn(lazy("attachment"), is_whole=True),
+    TextColumn(lazy("type")),
+    TextColumn(lazy("size"), "right"),
+)
+
+
+def info(
+    file: FileArgument,
+    check_all: Annotated[
+        bool, typer.Option("--check", help=_("Read all of a large file, too, to find what is damaged."))
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell what is in a recording, and what is missing in it.
+
+    Up to 1 GB of messages is read to find damage. The exit code is 1 when a piece is damaged.
+    """
+    opened = file_reader.FileReader(file)
+    with reader.Recording(file, file=opened) as recording:
+        told = recording.figures()
+        with progress_bar(_("checking")) as progress:
+            is_checked = opened.check(progress, None if check_all else _CHECKED_BYTES)
+        if as_json:
+            show_json(_plain(recording, told))
+        else:
+            _show(recording, told)
+            if not is_checked:
+                words = _("only the first gigabyte was checked for damage; --check reads all of it")
+                say(words)
+        if not recording.is_complete:
+            said = _(
+                "the file was cut off or not closed, and is read as far as it is whole; "
+                "to close it: nep recording repair {file}"
+            )
+            say(said.format(file=file))
+        end_with_damage(recording)
+
+
+def _show(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]) -> None:
+    head = _("{messages} messages in {time}, {size}, from {started}").format(
+        messages=recording.message_count,
+        time=clock_text(recording.duration_s),
+        size=size(recording.size_bytes),
+        started=_day_text(recording.start_ns),
+    )
+    write(f"{head}\n")
+    if recording.words.get("note"):
+        write(f"{escaped(recording.words['note'])}\n")
+    write(f"{_written_by(recording.facts)}\n")
+    topics = list(islice(recording.topics.values(), _MAX_ROWS))
+    show_table(_COLUMNS, [_row(recording, each, told.get(each.name)) for each in topics])
+    left_out = len(recording.topics) - len(topics)
+    if left_out:
+        said = ngettext(
+            "and {count} more topic, which --json lists",
+            "and {count} more topics, which --json lists",
+            left_out,
+        )
+        write(f"{said.format(count=left_out)}\n")
+    if recording.facts.attachments:
+        rows = [
+            (quotable(each.name), quotable(each.media_type), size(each.size_bytes))
+            for each in recording.facts.attachments
+        ]
+        show_table(_ATTACHMENT_COLUMNS, rows)
+    for line in _metadata_lines(recording.facts):
+        write(f"{line}\n")
+
+
+def _written_by(facts: file_reader.FileFacts) -> str:
+    """Program, profile and compression in one line."""
+    kinds = []
+    for name, count in sorted(facts.compressions.items()):
+        if name == "-":
+            kinds.append(_("messages outside of chunks"))
+        else:
+            said = ngettext("{count} chunk {compression}", "{count} chunks {compression}", count)
+            kinds.append(said.format(count=count, compression=name or _("uncompressed")))
+    parts = [quotable(facts.library) or UNKNOWN]
+    if facts.profile:
+        parts.append(_("profile {profile}").format(profile=quotable(facts.profile)))
+    return _("written by {program}; {chunks}").format(
+        program=", ".join(parts), chunks=listed(kinds, "and") if kinds else _("no messages")
+    )
+
+
+def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
+    shown = [each for each in facts.metadata if each[0] not in _SHOWN_OTHERWISE]
+    for name, values in shown[:_MAX_VALUES]:
+        pairs = [f"{quotable(key)}: {quotable(value)}" for key, value in islice(values.items(), _MAX_VALUES)]
+        more = "; …" if len(values) > _MAX_VALUES else ""
+        yield _("metadata {name}: {values}").format(name=quotable(name), values="; ".join(pairs) + more)
+    if len(shown) > _MAX_VALUES:
+        count = len(shown) - _MAX_VALUES
+        said = ngettext(
+            "and {count} more metadata record, which --json lists",
+            "and {count} more metadata records, which --json lists",
+            count,
+        )
+        yield said.format(count=count)
+
+
+def _day_text(at_ns: int) -> str:
+    """A time as the computer's clock shows it; of recordings without messages there is none."""
+    try:
+        day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
+    except (OSError, OverflowError, ValueError):  # what another program wrote, and no calendar has
+        day = None
+    return UNKNOWN if day is None else day.strftime("%Y-%m-%d %H:%M:%S")
+
+
+def _row(
+    recording: reader.Recording, topic: reader.RecordedTopic, told: figures.TopicFigures | None
+) -> tuple[str, ...]:
+    duration = recording.duration_s
+    return (
+        escaped(topic.name),
+        escaped(topic.msg_type),
+        quotable(topic.encoding) or UNKNOWN,
+        quotable(topic.schema_encoding) or UNKNOWN,
+        str(topic.message_count),
+        rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
+        UNKNOWN if told is None or told.lost is None else str(told.lost),
+        UNKNOWN if told is None else str(told.late),
+        UNKNOWN if told is None else str(told.undecodable),
+        UNKNOWN if told is None else str(told.unkept),
+    )
+
+
+def _plain(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]) -> dict[str, object]:
+    facts = recording.facts
+    return {
+        "path": str(recording.path),
+        "start_ns": recording.start_ns,
+        "end_ns": recording.end_ns,
+        "size_bytes": recording.size_bytes,
+        "is_complete": recording.is_complete,
+        "words": dict(recording.words),
+        "library": facts.library,
+        "profile": facts.profile,
+        "compressions": dict(facts.compressions),
+        "attachments": [
+            {"name": each.name, "media_type": each.media_type, "size_bytes": each.size_bytes}
+            for each in facts.attachments
+        ],
+        "metadata": [
+            {"name": name, "values": dict(values)}
+            for name, values in facts.metadata
+            if name not in _SHOWN_OTHERWISE
+        ],
+        "damage": [
+            {
+                "start_ns": each.start_ns,
+                "end_ns": each.end_ns,
+                "offset": each.offset,
+                "size_bytes": each.length,
+                "message_count": each.message_count,
+            }
+            for each in recording.damage
+        ],
+        "topics": {
+            each.name: {
+                "msg_type": each.msg_type,
+                "codec": each.codec,
+                "encoding": each.encoding,
+                "schema_encoding": each.schema_encoding,
+                "message_count": each.message_count,
+                "figures": told[each.name].to_plain() if each.name in told else None,
+            }
+            for each in recording.topics.values()
+        },
+    }

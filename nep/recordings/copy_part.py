@@ -1,0 +1,188 @@
+"""A part of a recording as a smaller one: channels, bytes, numbers and times as they are in the original.
+
+Recordings of other programs keep their encodings and schemas, and get no counts that nobody made. In those of
+nep, what was lost or came late within the part is counted anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+
+import orjson
+
+from nep.errors import RecordingError
+from nep.i18n import _
+from nep.recordings.channels import ChannelDecoder, encoding_of, own_channel
+from nep.recordings.figures import TopicCounter, changed
+from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.reader import Recording
+from nep.recordings.records import RawMessage
+
+__all__ = ["copy_part"]
+
+_MAX_SAID = 100_000
+_SAID = frozenset({"notes", "runs", "alarms", "alerts"})
+_FLUSH_NS = 500_000_000
+_FIGURES_NS = 1_000_000_000
+_OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
+
+
+def copy_part(
+    recording: Recording,
+    path: Path,
+    span: tuple[int | None, int | None],
+    topics: Collection[str],
+    copied: Callable[[], object],
+) -> int:
+    """Write a part of a recording to a new file, which is complete then; return its number of messages.
+
+    Args:
+        recording: The original.
+        path: The file; one that exists is overwritten.
+        span: From when, and before when (ns since 1970); None for no limit.
+        topics: All topics of the part; those without messages are listed in it, too.
+        copied: Called for each message.
+
+    Raises:
+        RecordingError: There are too many channels.
+        OSError: The disk doesn't take it.
+    """
+    writer = FileWriter(path, is_new=False, profile=recording.facts.profile)
+    try:
+        copy = _Copy(recording, writer, topics, copied)
+        for raw in recording.file.raw(*span, copy.channels):
+            copy.add(raw)
+        copy.finish()
+    except BaseException:
+        writer.close()
+        raise
+    return copy.count
+
+
+class _Copy:
+    def __init__(
+        self, recording: Recording, writer: FileWriter, topics: Collection[str], copied: Callable[[], object]
+    ) -> None:
+        self._recording, self._writer, self._copied = recording, writer, copied
+        self._path = writer.path
+        self.count = 0
+        self._roles: dict[int, str] = {}
+        self._numbers: dict[int, int] = {}
+        for channel, definition in recording.facts.channels.items():
+            role = dict(definition.metadata).get("nep.role")
+            if role in _SAID:
+                self._roles[channel] = role
+            elif role is None and definition.topic in topics:
+                self._numbers[channel] = self._number(channel)
+        self.channels = frozenset((*self._roles, *self._numbers))
+        writer.define(dict.fromkeys(self._numbers.values()))
+        self._figures = _Figures(recording) if recording.figures() else None
+        self._said: dict[tuple[str, str], object] = {}
+        self._said_count = 0
+        self._chunk_ns: int | None = None
+        self._last_ns = 0
+
+    def _number(self, channel: int) -> int:
+        number = self._writer.table.number(self._recording.facts.channels[channel])
+        if number is None:
+            raise RecordingError(str(self._path), _("it has too many channels"))
+        return number
+
+    def add(self, raw: RawMessage) -> None:
+        """Copy a message, or what the recorder said."""
+        if raw.channel in self._roles:
+            self._say(raw)
+            return
+        self._last_ns = raw.log_ns
+        self._put(self._numbers[raw.channel], raw)
+        self.count += 1
+        self._copied()
+        if self._figures is not None:
+            self._figures.add(raw)
+            self._write_figures(raw.log_ns)
+
+    def _put(self, number: int, raw: RawMessage) -> None:
+        self._writer.add(number, (raw.log_ns, raw.publish_ns), raw.sequence, b"", bytes(raw.data))
+        if self._chunk_ns is None:
+            self._chunk_ns = raw.log_ns
+        if self._writer.pending_bytes >= CHUNK_BYTES or raw.log_ns - self._chunk_ns >= _FLUSH_NS:
+            self._writer.flush()
+            self._chunk_ns = None
+
+    def _say(self, raw: RawMessage) -> None:
+        """What is said again and again, such as a behaviour that still runs, is copied where it changes."""
+        role = self._roles[raw.channel]
+        try:
+            value = orjson.loads(raw.data)
+        except orjson.JSONDecodeError:
+            return
+        id = value.get("id") if isinstance(value, Mapping) else None
+        if isinstance(id, str):
+            if self._said.get((role, id)) == value:
+                return
+            self._said[role, id] = value
+        if self._said_count < _MAX_SAID:
+            self._said_count += 1
+            self._put(self._number(raw.channel), raw)
+
+    def _write_figures(self, at_ns: int, *, is_final: bool = False) -> None:
+        record = None if self._figures is None else self._figures.record(at_ns, is_final=is_final)
+        number = None if record is None else self._writer.table.number(own_channel("figures"))
+        if record is not None and number is not None:
+            self._writer.add(number, (at_ns, at_ns), 0, b"", record)
+
+    def finish(self) -> None:
+        """Write the counts, the metadata and the summary. Raises `OSError`."""
+        recording, writer = self._recording, self._writer
+        self._write_figures(self._last_ns, is_final=True)
+        writer.flush()
+        if self._figures is not None or recording.words:
+            words = {
+                "started_ns": str(writer.start_ns or 0),
+                "ended_ns": str(writer.end_ns),
+                "note": recording.words.get("note", ""),
+                "end": "",
+            }
+            writer.add_metadata("nep.recording", words)
+        if self._figures is not None:
+            writer.add_metadata("nep.figures", self._figures.plain())
+        for name, values in recording.facts.metadata:
+            if name not in _OWN_METADATA:
+                writer.add_metadata(name, values)
+        writer.finish()
+
+
+class _Figures:
+    """Counts what was lost and late within the part."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._decoders = {number: ChannelDecoder(each) for number, each in recording.facts.channels.items()}
+        self._counters: dict[str, TopicCounter] = {}
+        self._next_ns: int | None = None
+
+    def add(self, raw: RawMessage) -> None:
+        decoder = self._decoders[raw.channel]
+        message = decoder.message(raw)
+        counter = self._counters.setdefault(decoder.topic, TopicCounter())
+        is_decodable = encoding_of(message, raw.log_ns).is_decodable
+        counter.add(message.publisher, message.seq, message.size_bytes, is_decodable=is_decodable)
+
+    def record(self, at_ns: int, *, is_final: bool) -> bytes | None:
+        """The counts that have changed, once a second; all of them at the end."""
+        if self._next_ns is None:
+            self._next_ns = at_ns + _FIGURES_NS
+        if not is_final and at_ns < self._next_ns:
+            return None
+        self._next_ns = at_ns + _FIGURES_NS
+        told = dict(self._counters) if is_final else dict(changed(self._counters))
+        plain = {topic: each.figures().to_plain() for topic, each in told.items()}
+        for each in told.values():
+            each.is_changed = False
+        return orjson.dumps({"topics": plain, "is_final": is_final})
+
+    def plain(self) -> dict[str, str]:
+        return {
+            topic: orjson.dumps(each.figures().to_plain()).decode()
+            for topic, each in sorted(self._counters.items())
+        }

@@ -1,0 +1,44 @@
+"""What is missing in a damaged recording, in a sentence without a full stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from nep.i18n import _, ngettext, number
+from nep.recordings.index import Damage
+
+__all__ = ["damage_words"]
+
+_MAX_NAMED = 3
+
+
+def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
+    """Say how many pieces were skipped, from when to when, and how many messages are missing; "" for none.
+
+    Times are seconds after ``start_ns``, the start of the recording.
+    """
+    if not damage:
+        return ""
+    known = [each.message_count for each in damage]
+    start_ns = start_ns or damage[0].start_ns
+    places = "; ".join(_place(each, start_ns) for each in damage[:_MAX_NAMED])
+    if len(damage) > _MAX_NAMED:
+        places += "; …"
+    said = ngettext(
+        "{count} piece of the file is damaged and was skipped ({places})",
+        "{count} pieces of the file are damaged and were skipped ({places})",
+        len(damage),
+    ).format(count=len(damage), places=places)
+    if any(each is None for each in known):
+        return _("{damage}; how many messages are missing is not known").format(damage=said)
+    missing = sum(each or 0 for each in known)
+    return ngettext(
+        "{damage}; {count} message is missing", "{damage}; {count} messages are missing", missing
+    ).format(damage=said, count=missing)
+
+
+def _place(each: Damage, start_ns: int) -> str:
+    if not each.end_ns:
+        return _("{size} bytes after byte {offset}").format(size=each.length, offset=each.offset)
+    begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (each.start_ns, each.end_ns))
+    return _("{begin} s to {end} s").format(begin=number(begin, ".1f"), end=number(end, ".1f"))

@@ -1,0 +1,519 @@
+"""FileReader: messages of a recording as they lie in it, from any time on, with bounded memory.
+
+It knows channels and bytes, not topics and messages (`nep.recordings.reader`), so it can run in another
+process (`nep.recordings.remote`).
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from array import array
+from bisect import bisect_left, bisect_right
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Protocol
+
+from nep.errors import ClosedError
+from nep.recordings.channels import ChannelDefinition
+from nep.recordings.compression import check_packages
+from nep.recordings.index import Attachment, Damage, FileIndex, read_chunk, read_entries, read_index
+from nep.recordings.limits import ReadBudget
+from nep.recordings.records import ChunkInfo, RawMessage, messages_in
+from nep.recordings.writer import disk_sentence
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["CACHE_BYTES", "FileFacts", "FileReader", "RawFile"]
+
+CACHE_BYTES = 64_000_000
+_MAX_EXACT_CHUNKS = 200
+"""Chunks whose message indexes are read to count exactly: what a screen shows of some minutes."""
+_MAX_COUNTED_CHUNKS = 10_000
+"""With more chunks the counts of the file's own statistics are believed."""
+_MAX_HELD_BYTES = 64_000_000
+"""Of chunks that overlap in time, held to give their messages in order; beyond, order is given up."""
+_LARGE_CHUNK_BYTES = 8_000_000
+"""Messages of larger chunks are copied, so that the last message of a reader doesn't keep its chunk."""
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """What is known of a recording's file when it is open.
+
+    ``channels``: by their numbers; ``counts``: messages of each, 0 for channels without any. Times are ns
+    since 1970, 0 and 0 without messages. ``is_complete``: the file was closed properly. ``compressions``:
+    chunks by compression ("" for none, "-" for messages outside of chunks).
+    """
+
+    channels: Mapping[int, ChannelDefinition]
+    counts: Mapping[int, int]
+    start_ns: int = 0
+    end_ns: int = 0
+    size_bytes: int = 0
+    is_complete: bool = True
+    metadata: Sequence[tuple[str, Mapping[str, str]]] = ()
+    attachments: Sequence[Attachment] = ()
+    compressions: Mapping[str, int] = field(default_factory=dict)
+    profile: str = ""
+    library: str = ""
+
+
+class RawFile(Protocol):
+    """A recording's file that is open for reading, here or in another process. Thread-safe."""
+
+    @property
+    def facts(self) -> FileFacts:
+        """What is known of it."""
+
+    @property
+    def damage(self) -> Sequence[Damage]:
+        """Pieces that can't be read, as far as they were met."""
+
+    def raw(
+        self,
+        start_ns: int | None,
+        end_ns: int | None,
+        channels: Collection[int],
+        pieces: Collection[int] | None = None,
+    ) -> Iterator[RawMessage]:
+        """Messages of these channels by log time, from ``start_ns`` on and before ``end_ns``.
+
+        ``pieces``: only from these chunks, as `pieces_of` numbers them.
+        """
+
+    def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
+        """The last message up to a time, of each group of channels."""
+
+    def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
+        """The log time of the last message up to a time, of each channel that has one; from indexes alone."""
+
+    def densities(
+        self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
+    ) -> dict[int, Sequence[int]]:
+        """Number of messages of each channel in each of ``buckets`` equal parts of [start, end)."""
+
+    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
+        """The chunks in which these channels have messages, in their order."""
+
+    def close(self) -> None:
+        """Close the file; later calls raise `ClosedError`. May be called twice."""
+
+
+class _Loaded:
+    """A chunk in memory."""
+
+    def __init__(self, data: bytes | memoryview) -> None:
+        self.data = data
+        self._offsets: dict[int, array[int]] | None = None
+
+    def messages(self, info: ChunkInfo, channels: Collection[int]) -> Iterator[RawMessage]:
+        """The messages of these channels. Finding those of a few among many takes time once only."""
+        if self._offsets is None and all(each in channels for each in info.channels):
+            for record in messages_in(self.data):
+                if isinstance(record, RawMessage) and record.channel in channels:
+                    yield record
+            return
+        offsets = self._offsets if self._offsets is not None else self._index()
+        found = [offsets[each] for each in channels if each in offsets]
+        for offset in found[0] if len(found) == 1 else sorted(each for some in found for each in some):
+            found_there = next(messages_in(self.data, offset), None)
+            if isinstance(found_there, RawMessage):
+                yield found_there
+
+    def _index(self) -> dict[int, array[int]]:
+        offsets: dict[int, array[int]] = {}
+        for record in messages_in(self.data):
+            if isinstance(record, RawMessage):
+                if record.channel not in offsets:
+                    offsets[record.channel] = array("Q")
+                offsets[record.channel].append(record.offset)
+        self._offsets = offsets
+        return offsets
+
+
+class FileReader:
+    """A recording's file that is read in this process. See `RawFile`."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        cache_bytes: int = CACHE_BYTES,
+        progress: Callable[[int, int], object] | None = None,
+        budget: ReadBudget | None = None,
+    ) -> None:
+        """Open it: from its summary at once, else by a walk over its records.
+
+        Args:
+            path: The file.
+            cache_bytes: How much of decompressed chunks is kept.
+            progress: Given how many bytes of how many are done during a walk; what it raises comes out.
+            budget: Bounds all that is read until the file is closed; by default only opening is bounded.
+
+        Raises:
+            RecordingError: The file can't be opened or is no recording.
+            RecordingTooLargeError: It is more work than is allowed.
+        """
+        check_packages()
+        self.path = Path(path)
+        self._lock = threading.RLock()
+        self._budget = budget
+        self._bad: dict[int, Damage] = {}
+        self._broken: set[int] = set()
+        self._cache: OrderedDict[int, _Loaded] = OrderedDict()
+        self._cache_bytes, self._cached_bytes = cache_bytes, 0
+        try:
+            self._file: BinaryIO = open(self.path, "rb", buffering=65_536)  # noqa: SIM115, PTH123
+        except OSError as error:
+            raise disk_sentence(self.path, error) from error
+        try:
+            self._index: FileIndex = read_index(self._file, self.path, progress, budget)
+            self._chunks = self._index.chunks
+            self._starts = array("Q", [each.start_ns for each in self._chunks])
+            self._latest_ends = array("Q")
+            self._in_chunks: dict[int, array[int]] = {}
+            self._place_chunks()
+            self._facts = self._read_facts()
+        except OSError as error:
+            self._file.close()
+            raise disk_sentence(self.path, error) from error
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _place_chunks(self) -> None:
+        latest = 0
+        for number, chunk in enumerate(self._chunks):
+            latest = max(latest, chunk.end_ns)
+            self._latest_ends.append(latest)
+            for channel in chunk.channels:
+                if channel not in self._in_chunks:
+                    self._in_chunks[channel] = array("L")
+                self._in_chunks[channel].append(number)
+
+    def _read_facts(self) -> FileFacts:
+        index, compressions = self._index, dict[str, int]()
+        for chunk in self._chunks:
+            name = "-" if chunk.is_run else chunk.compression
+            compressions[name] = compressions.get(name, 0) + 1
+        counts = index.counts
+        if counts is None or len(self._chunks) <= _MAX_COUNTED_CHUNKS:
+            counts = {}
+            for at in range(len(self._chunks)):
+                for channel, count in self._counts(at).items():
+                    counts[channel] = counts.get(channel, 0) + count
+        return FileFacts(
+            index.definitions.channels,
+            counts,
+            self._starts[0] if self._chunks else 0,
+            self._latest_ends[-1] if self._chunks else 0,
+            index.end,
+            index.is_complete,
+            index.metadata,
+            index.attachments,
+            compressions,
+            index.profile,
+            index.library,
+        )
+
+    @property
+    def facts(self) -> FileFacts:
+        """See `RawFile`."""
+        return self._facts
+
+    @property
+    def damage(self) -> Sequence[Damage]:
+        """See `RawFile`."""
+        with self._lock:
+            return tuple(
+                sorted(
+                    (*self._index.damage, *self._bad.values()), key=lambda each: (each.start_ns, each.offset)
+                )
+            )
+
+    def chunks(self) -> Sequence[ChunkInfo]:
+        """The file's chunks by their times."""
+        return tuple(self._chunks)
+
+    # ---- reading
+
+    def raw(
+        self,
+        start_ns: int | None,
+        end_ns: int | None,
+        channels: Collection[int],
+        pieces: Collection[int] | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `RawFile`."""
+        wanted = self._wanted(start_ns, end_ns, channels, pieces)
+        first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
+        waiting: list[tuple[int, int, RawMessage]] = []
+        order = held = 0
+        for at, number in enumerate(wanted):
+            came = [each for each in self._messages(number, channels) if first <= each.log_ns < last]
+            came.sort(key=_log_ns)  # mostly sorted, which takes no time
+            following = wanted[at + 1] if at + 1 < len(wanted) else None
+            limit = 2**64 if following is None else self._starts[following]
+            held += self._size(number)
+            if following is None or held + self._size(following) > _MAX_HELD_BYTES:
+                limit = 2**64
+            until = 0 if waiting else bisect_left(came, limit, key=_log_ns)
+            yield from came[:until]
+            for each in came[until:]:
+                order += 1
+                heappush(waiting, (each.log_ns, order, each))
+            del came
+            while waiting and waiting[0][0] < limit:
+                yield heappop(waiting)[2]
+            if not waiting:
+                held = 0
+
+    def _size(self, number: int) -> int:
+        return self._chunks[number].uncompressed_bytes
+
+    def _wanted(
+        self,
+        start_ns: int | None,
+        end_ns: int | None,
+        channels: Collection[int],
+        pieces: Collection[int] | None,
+    ) -> list[int]:
+        """Numbers of the chunks that may have such messages."""
+        first = 0 if start_ns is None else bisect_left(self._latest_ends, max(0, start_ns))
+        last = (
+            len(self._chunks) if end_ns is None else bisect_left(self._starts, max(0, min(end_ns, 2**64 - 1)))
+        )
+        found = {
+            number
+            for channel in channels
+            for number in self._chunks_of(channel, first, last)
+            if (start_ns is None or self._chunks[number].end_ns >= start_ns)
+            and (pieces is None or number in pieces)
+        }
+        return sorted(found)
+
+    def _chunks_of(self, channel: int, first: int, last: int) -> Sequence[int]:
+        numbers = self._in_chunks.get(channel, ())
+        return numbers[bisect_left(numbers, first) : bisect_left(numbers, last)]
+
+    def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
+        """See `RawFile`."""
+        found: list[RawMessage | None] = []
+        for group in groups:
+            places = [
+                (*place, channel)
+                for channel in group
+                if (place := self._last_before(channel, at_ns)) is not None
+            ]
+            found.append(self._message_at(*max(places)[1:]) if places else None)
+        return found
+
+    def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
+        """See `RawFile`."""
+        places = {channel: self._last_before(channel, at_ns) for channel in channels}
+        return {channel: place[0] for channel, place in places.items() if place is not None}
+
+    def _last_before(self, channel: int, at_ns: int) -> tuple[int, int, int] | None:
+        """(time, chunk, offset in it) of a channel's last message up to a time."""
+        numbers = self._in_chunks.get(channel, array("L"))
+        place = (
+            bisect_right(numbers, bisect_right(self._starts, max(-1, min(at_ns, 2**64 - 1))) - 1)
+            if at_ns >= 0
+            else 0
+        )
+        best: tuple[int, int, int] | None = None
+        while place > 0:
+            place -= 1
+            number = numbers[place]
+            if best is not None and self._latest_ends[number] <= best[0]:
+                break
+            for log_ns, offset in self._entries(number, channel):
+                if log_ns <= at_ns and (best is None or (log_ns, number, offset) > best):
+                    best = (log_ns, number, offset)
+        return best
+
+    def _entries(self, number: int, channel: int) -> Sequence[tuple[int, int]]:
+        with self._lock:
+            self._check_open()
+            try:
+                told = read_entries(self._file, self._chunks[number], channel)
+            except OSError:
+                told = None
+        if told is not None:
+            return told
+        return [(each.log_ns, each.offset) for each in self._messages(number, (channel,))]
+
+    def _message_at(self, number: int, offset: int, channel: int) -> RawMessage | None:
+        chunk = self._chunk(number)
+        if chunk is None:
+            return None
+        record = next(messages_in(chunk.data, offset), None)
+        if not isinstance(record, RawMessage) or record.channel != channel:
+            return None
+        return self._owned(record, chunk)
+
+    # ---- how many there are
+
+    def densities(
+        self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
+    ) -> dict[int, Sequence[int]]:
+        """See `RawFile`.
+
+        No payload is read: for a short time exactly, of the indexes; for a long one each chunk's messages are
+        spread over its time, which is half a second at most in recordings of our own.
+        """
+        made: dict[int, list[int]] = {}
+        first = bisect_left(self._latest_ends, max(0, start_ns))
+        last = bisect_left(self._starts, max(0, min(end_ns, 2**64 - 1)))
+        is_exact = last - first <= _MAX_EXACT_CHUNKS
+        span = end_ns - start_ns
+        for number in range(first, last):
+            chunk = self._chunks[number]
+            for channel, count in self._counts(number).items():
+                if channel not in channels:
+                    continue
+                counts = made.setdefault(channel, [0] * buckets)
+                if not is_exact:
+                    _spread(counts, (start_ns, end_ns), (chunk.start_ns, chunk.end_ns), count)
+                    continue
+                for log_ns, _offset in self._entries(number, channel):
+                    if start_ns <= log_ns < end_ns:
+                        counts[(log_ns - start_ns) * buckets // span] += 1
+        return dict(made)
+
+    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
+        """See `RawFile`."""
+        return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
+
+    def _counts(self, number: int) -> Mapping[int, int]:
+        """The messages of each channel in a chunk; it is read where its indexes are not there."""
+        chunk = self._chunks[number]
+        counts = chunk.counts
+        if len(counts) < chunk.channel_count:
+            missing = set(chunk.channels) - counts.keys()
+            for each in self._messages(number, missing):
+                counts[each.channel] = counts.get(each.channel, 0) + 1
+        return counts
+
+    # ---- chunks
+
+    def check(
+        self, progress: Callable[[int, int], object] | None = None, most_bytes: int | None = None
+    ) -> bool:
+        """Read every chunk once, so that `damage` is complete; False when ``most_bytes`` didn't suffice."""
+        done, whole = 0, sum(each.length for each in self._chunks)
+        expanded = 0
+        for number, chunk in enumerate(self._chunks):
+            expanded += chunk.uncompressed_bytes
+            if most_bytes is not None and expanded > most_bytes:
+                return False
+            self._chunk(number)
+            done += chunk.length
+            if progress is not None:
+                progress(done, whole)
+        return True
+
+    def _messages(self, number: int, channels: Collection[int]) -> Iterator[RawMessage]:
+        chunk = self._chunk(number)
+        if chunk is not None:
+            for each in chunk.messages(self._chunks[number], channels):
+                yield self._owned(each, chunk)
+
+    def _owned(self, raw: RawMessage, chunk: _Loaded) -> RawMessage:
+        if len(chunk.data) <= _LARGE_CHUNK_BYTES:
+            return raw
+        return raw._replace(data=memoryview(bytes(raw.data)))
+
+    def _chunk(self, number: int) -> _Loaded | None:
+        """A chunk's records; None when it is damaged."""
+        with self._lock:
+            self._check_open()
+            known = self._cache.get(number)
+            if known is not None:
+                self._cache.move_to_end(number)
+                return known
+            if number in self._broken:
+                return None
+            info = self._chunks[number]
+            if self._budget is not None:
+                self._budget.spend(max(info.length, info.uncompressed_bytes))
+            self._make_room(info.uncompressed_bytes)
+            try:
+                made = _Loaded(read_chunk(self._file, info))
+            except (ValueError, OSError) as error:
+                self._bad[number] = self._damage_of(info)
+                if isinstance(error, ValueError):  # a disk may answer again
+                    self._broken.add(number)
+                return None
+            self._bad.pop(number, None)
+            self._cache[number] = made
+            self._cached_bytes += len(made.data)
+            return made
+
+    def _damage_of(self, info: ChunkInfo) -> Damage:
+        counts = info.counts
+        own = {
+            number
+            for number, each in self._index.definitions.channels.items()
+            if number in counts and "nep.role" in dict(each.metadata)
+        }
+        is_known = len(counts) == info.channel_count > 0
+        count = sum(many for channel, many in counts.items() if channel not in own) if is_known else None
+        return Damage(info.offset, info.length, info.start_ns, info.end_ns, count)
+
+    def _make_room(self, size: int) -> None:
+        while self._cache and self._cached_bytes + size > self._cache_bytes:
+            self._cached_bytes -= len(self._cache.popitem(last=False)[1].data)
+
+    def _check_open(self) -> None:
+        if self._file.closed:
+            raise ClosedError(f"recording '{self.path.name}'")
+
+    def close(self) -> None:
+        """See `RawFile`."""
+        with self._lock:
+            self._file.close()
+            self._cache.clear()
+            self._cached_bytes = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
+    """Add the messages of a chunk to the equal parts of `whole`, as if they came evenly."""
+    (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
+    first = (chunk_start - start) * buckets // (end - start)
+    last = (chunk_end - start) * buckets // (end - start)
+    if first == last:
+        if 0 <= first < buckets:
+            counts[first] += count
+        return
+
+    def until(at: int) -> int:
+        """How many come before the end of a part."""
+        if at < first:
+            return 0
+        if at >= last:
+            return count
+        part_end = start + (at + 1) * (end - start) // buckets
+        return count * (part_end - chunk_start) // (chunk_end - chunk_start)
+
+    shown = range(max(0, first), min(last, buckets - 1) + 1)
+    before = until(shown.start - 1)
+    for at in shown:
+        so_far = until(at)
+        counts[at] += so_far - before
+        before = so_far
+
+
+def _log_ns(raw: RawMessage) -> int:
+    return raw.log_ns

@@ -1,0 +1,60 @@
+"""Walk over the records of an MCAP file without reading their content."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import BinaryIO, NamedTuple
+
+from nep.recordings.limits import RECORD_COST_BYTES, ReadBudget
+from nep.recordings.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
+
+__all__ = ["Place", "walk"]
+
+_SMALL_WINDOW, _LARGE_WINDOW = 4_096, 1_048_576
+_SPEND_EVERY = 1_000
+
+
+class Place(NamedTuple):
+    """A record in a file. ``begin``: the first bytes of its content, as many as were read with its head."""
+
+    offset: int
+    opcode: int
+    length: int
+    begin: bytes = b""
+
+    @property
+    def end(self) -> int:
+        """Offset of the record that follows."""
+        return self.offset + HEAD_BYTES + self.length
+
+
+def walk(
+    file: BinaryIO,
+    size: int,
+    budget: ReadBudget,
+    offset: int = len(MAGIC),
+    begin_bytes: int = 64,
+) -> Iterator[Place]:
+    """Yield the records from an offset on, up to ``size`` or to bytes that can't be a record.
+
+    The file is read in windows that grow while records are short: millions of empty records take a second,
+    and of gigabytes of chunks only the heads are read. Raises `RecordingTooLargeError`, `OSError`.
+    """
+    window, base, step, count = b"", offset, _SMALL_WINDOW, 0
+    while offset + HEAD_BYTES <= size:
+        at = offset - base
+        if at + HEAD_BYTES + begin_bytes > len(window):
+            step = min(2 * step, _LARGE_WINDOW) if at <= len(window) else _SMALL_WINDOW
+            file.seek(offset)
+            window, base, at = file.read(max(step, HEAD_BYTES + begin_bytes)), offset, 0
+            if len(window) < HEAD_BYTES:
+                return
+        opcode, length = RECORD_HEAD.unpack_from(window, at)
+        if (not 0 < opcode <= Opcode.DATA_END and opcode < 0x80) or offset + HEAD_BYTES + length > size:
+            return
+        at += HEAD_BYTES
+        count += 1
+        if count % _SPEND_EVERY == 0:
+            budget.spend(_SPEND_EVERY * RECORD_COST_BYTES)
+        yield Place(offset, opcode, length, window[at : at + min(length, begin_bytes)])
+        offset += HEAD_BYTES + length
