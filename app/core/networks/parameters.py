@@ -5,7 +5,6 @@ Values are heard on the topic on which a node tells them; they are set by a call
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -18,6 +17,7 @@ from app.core.network.nodes import NodeEntry
 from app.core.network.source import Job
 from app.core.network.topics import Topic, key_of
 from app.core.network.watches import Watching
+from app.core.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
@@ -295,9 +295,8 @@ def _whole(said: str) -> int:
 
 def _decimal(said: str) -> float:
     try:
-        value = float(said.replace(",", "."))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):  # which no JSON has
-        raise ValueError(_("write a number"))
-    return value
+        return parse_number(said)
+    except TypedNumberError as error:
+        if error.has_separators:
+            raise ValueError(_("write a number with at most one comma or point")) from None
+        raise ValueError(_("write a number")) from None

@@ -79,8 +79,9 @@ def test_a_number_is_no_name_of_a_field() -> None:
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("12.5", 12.5), ("Aiko", "Aiko"), ('"12"', "12"), (" true ", True), ("[1, 2]", [1, 2]), ("NaN", "NaN")],
-)
+    [("12.5", 12.5), ("Aiko", "Aiko"), ('"12"', "12"), (" true ", True), ("[1, 2]", [1, 2]), ("NaN", "NaN"),
+     ("0,2", 0.2), ('"0,2"', "0,2"), ("[1,2]", [1, 2]), ("1.234,5", "1.234,5"), ("007", "007"), ("+3", "+3")],
+)  # fmt: skip
 def test_a_value_is_json_or_else_a_text(text, value) -> None:
     assert value_typed(text) == value
 

@@ -91,7 +91,7 @@ def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
     for text, said in (("9", "the most is 2"), ("1,3", "1.3 shakes the head"), ("-1e9", "the least is 0")):
         shown.set("speed", text)
         assert said in settled(session, shown)
-    for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]", "1.2.3"):
+    for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]"):
         shown.set("speed", text)
         assert (shown.refusal, shown.setting) == ("write a number", "")
     shown.set("gait", "fly")

@@ -264,7 +264,8 @@ def test_every_kind_has_a_sentence_and_each_slot_takes_what_it_shows(kind: str) 
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [("", 0), ("2", 2), ("2 s", 2), ("0,5 s", 0.5), ("1.5 min", 90), ("1 h", 3600), ("250 ms", 0.25),
-     ("-1", None), ("soon", None), ("nan", None), ("1e9", None), ("s", None)],
+     ("-1", None), ("soon", None), ("nan", None), ("1e9", None), ("s", None),
+     ("1.234,5 s", None), ("1 234 s", None)],
 )  # fmt: skip
 def test_times_are_read_as_people_write_them(text: str, seconds: float | None) -> None:
     assert read_time(text) == seconds
@@ -274,7 +275,7 @@ def test_limits_are_numbers_where_numbers_are_compared_and_else_what_json_says()
     number, text = AlarmCondition("below"), AlarmCondition("equals")
     assert read_limit(number, "20 %") == 20
     assert read_limit(number, "0,4") == 0.4
-    for wrong in ("", "x", "nan", "inf"):
+    for wrong in ("", "x", "nan", "inf", "1.234,5", "1 234"):
         part = PhrasePart("limit", "")
         assert taken(AlarmRule("r", number), part, wrong) is None
     assert [read_limit(text, each) for each in ("true", "null", "idle", '"5"', "5", "{}", "")] == [

@@ -86,7 +86,9 @@ def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_t
     assert slider.field.property("wrong") == "true"
 
 
-@pytest.mark.parametrize(("typed", "given"), [("two", "two"), ("2,5", 2.5), ("", None)])
+@pytest.mark.parametrize(
+    ("typed", "given"), [("two", "two"), ("2,5", 2.5), ("1.234,5", "1.234,5"), ("", None)]
+)
 def test_a_field_gives_numbers_and_what_is_none_as_it_was_typed(qtbot, theme, typed, given) -> None:
     form = form_of(qtbot, theme, Parameter("x", "x", "number", minimum=0))
     field = child(form, QLineEdit)
@@ -94,6 +96,7 @@ def test_a_field_gives_numbers_and_what_is_none_as_it_was_typed(qtbot, theme, ty
     assert form.input() == ({} if given is None else {"x": given})
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert field.text() == (typed if given != 2.5 else field.text())
+    assert bool(field.sentence) is isinstance(given, str)
 
 
 def test_a_whole_number_says_so_about_a_fraction(qtbot, theme) -> None:

@@ -6,6 +6,7 @@ import './focus_after_delete';
 import './mutators';
 import {giveBlocklyOurWords} from './blockly_words';
 import './near';
+import './number_field';
 import {type Packed, backpackButton, registerBackpack, showContents} from './backpack';
 import {Carrying} from './carrying';
 import {Clipboard} from './clipboard';

@@ -2,9 +2,9 @@
 import * as Blockly from 'blockly/core';
 import {freePlace, inSight, obstacles} from './free_place';
 import {helpFor} from './help';
+import {Hint} from './hint';
 import {lazy, t} from './words';
 
-const SHOWN_MS = 6000;
 /** How near a gap was meant, in pixels of the screen. */
 const NEAR = 30;
 const ASIDE = 28;
@@ -28,21 +28,14 @@ interface Refusal {
 }
 
 export class WrongDrops {
-  private readonly bubble = document.createElement('div');
-  private timer = 0;
+  private readonly hint: Hint;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg) {
-    this.bubble.className = 'nepWhy';
-    this.bubble.setAttribute('role', 'status');
-    workspace.getInjectionDiv().append(this.bubble);
-    workspace.addChangeListener((event) => {
-      if (event.type === Blockly.Events.VIEWPORT_CHANGE) this.hide();
-    });
-    workspace.getInjectionDiv().addEventListener('pointerdown', () => this.hide(), true);
+    this.hint = new Hint(workspace);
   }
 
   dispose(): void {
-    window.clearTimeout(this.timer);
+    this.hint.dispose();
   }
 
   /** Says why it did not join, if it was let go at something; moves it aside when it covers that. */
@@ -58,27 +51,8 @@ export class WrongDrops {
   private tell(block: Blockly.BlockSvg, refusal: Refusal | null): void {
     if (!refusal) return;
     const at = Blockly.utils.svgMath.wsToScreenCoordinates(this.workspace, refusal.place);
-    this.say(refusal.sentence, at);
+    this.hint.show(refusal.sentence, at);
     this.moveAside(block, refusal.by);
-  }
-
-  hide(): void {
-    if (!this.bubble.textContent) return;
-    window.clearTimeout(this.timer);
-    this.bubble.textContent = '';
-  }
-
-  private say(sentence: string, at: Blockly.utils.Coordinate): void {
-    window.clearTimeout(this.timer);
-    this.bubble.textContent = sentence;
-    const frame = this.workspace.getInjectionDiv().getBoundingClientRect();
-    const {offsetWidth, offsetHeight} = this.bubble;
-    const left = Math.max(12, Math.min(at.x - frame.left, frame.width - offsetWidth - 12));
-    const below = at.y - frame.top + 26;
-    const top = below + offsetHeight + 12 < frame.height ? below : at.y - frame.top - offsetHeight - 26;
-    this.bubble.style.left = `${left}px`;
-    this.bubble.style.top = `${Math.max(12, top)}px`;
-    this.timer = window.setTimeout(() => this.hide(), SHOWN_MS);
   }
 
   private moveAside(block: Blockly.BlockSvg, by: Blockly.BlockSvg): void {
@@ -87,7 +61,7 @@ export class WrongDrops {
     const inputs = by.getHeightWidth();
     const right = Math.max(its.right, by.getRelativeToSurfaceXY().x + inputs.width);
     its.right = right;
-    const said = this.bubble.getBoundingClientRect();
+    const said = this.hint.bounds;
     const corner = (x: number, y: number) =>
       Blockly.utils.svgMath.screenToWsCoordinates(this.workspace, new Blockly.utils.Coordinate(x, y));
     const [from, to] = [corner(said.left, said.top), corner(said.right, said.bottom)];

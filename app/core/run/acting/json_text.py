@@ -14,6 +14,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
+from app.core.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
@@ -90,9 +91,14 @@ def read_json(text: str) -> JsonText:
 
 
 def value_typed(text: str) -> object:
-    """What a person means by a value: JSON where it is some, else the text itself."""
+    """Return the value that a person typed: JSON or a number with a decimal comma, else the text itself."""
     said = text.strip()
-    return json.loads(said) if said and find_json_fault(said) is None else text
+    if said and find_json_fault(said) is None:
+        return json.loads(said)
+    try:
+        return parse_number(said) if "," in said else text
+    except TypedNumberError:
+        return text
 
 
 def pretty(value: object) -> str:

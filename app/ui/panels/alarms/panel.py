@@ -26,6 +26,7 @@ from app.ui.panels.alarms.phrases import (
     NEW_ACTIONS,
     PhrasePart,
     example_of,
+    rejection_of,
     taken,
     typed_now,
     with_action,
@@ -303,6 +304,7 @@ class AlarmsPanel(PanelWidget):
             typed_now(rule, part),
             example_of(part, rule),
             lambda text: self._take(row, part, text),
+            rejection=rejection_of(part, rule),
         )
         self.field.ended.connect(self._field_ended)
         self.field.offer(self._existing(part, row))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from string import Formatter
 from typing import Literal
 
+from app.core.typed_number import SEPARATORS, TypedNumberError, parse_number
 from nep.i18n import _, lazy, pgettext, plazy
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.rule import KEEP_S, NEEDS_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar
@@ -264,12 +265,12 @@ _WRONG = object()
 def read_limit(condition: AlarmCondition, text: str) -> object:
     """A number where one is needed; else what JSON says of it, or the text as it is."""
     if condition.kind in NUMBER_KINDS:
-        figures = text.replace("%", "").replace(",", ".").split()
+        figures, *words = text.replace("%", " ").split() or [""]
+        if any(each[0].isdigit() for each in words):
+            return _WRONG  # "1 234"
         try:
-            number = float(figures[0]) if figures else math.nan
-        except ValueError:
-            return _WRONG
-        if not math.isfinite(number):
+            number = parse_number(figures)
+        except TypedNumberError:
             return _WRONG
         return int(number) if number.is_integer() and abs(number) < 2**53 else number
     try:
@@ -281,15 +282,14 @@ def read_limit(condition: AlarmCondition, text: str) -> object:
 
 def read_time(text: str) -> float | None:
     """Seconds of "2", "2 s", "1.5 min", "3 h"; nothing is 0. None for what is no time."""
-    words = text.replace(",", ".").split()
-    if not words:
+    typed = text.strip()
+    if not typed:
         return 0.0
-    joined = "".join(words)
     for unit, size in (("min", 60.0), ("ms", 0.001), ("h", 3600.0), ("s", 1.0), ("", 1.0)):
-        if joined.endswith(unit):
+        if typed.endswith(unit):
             try:
-                seconds = float(joined[: len(joined) - len(unit)]) * size
-            except ValueError:
+                seconds = parse_number(typed[: len(typed) - len(unit)]) * size
+            except TypedNumberError:
                 return None
             return round(seconds, 6) if 0 <= seconds <= 86_400 else None
     return None
@@ -319,6 +319,19 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
     if made.is_about_value:
         made = replace(made, path=condition.path)
     return replace(rule, condition=made)
+
+
+def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
+    """Return what a slot takes, for a text that it rejects."""
+    match part.role:
+        case "limit" if rule.condition.kind in NUMBER_KINDS:
+            return _(SEPARATORS)
+        case "time":
+            return _("Write a time such as 2 s, 1.5 min or 250 ms.")
+        case "payload":
+            return _("Write the message as JSON, such as {example}.").format(example='{"x": 1}')
+        case _:
+            return ""
 
 
 def example_of(part: PhrasePart, rule: AlarmRule) -> str:

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QPoint, QRect, QRectF, QSize, QStringListModel, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QFont, QKeyEvent, QPainter, QPen
-from PySide6.QtWidgets import QCompleter, QLineEdit, QStyledItemDelegate, QWidget
+from PySide6.QtWidgets import QCompleter, QLineEdit, QStyledItemDelegate, QToolTip, QWidget
 
 from app.ui.panels.alarms.phrases import PhrasePart
+from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -92,7 +93,8 @@ class AlarmSlot(PaintedButton):
 class SlotField(QLineEdit):
     """Lies over a slot while one types; what exists is offered. Enter and Tab take it, Esc gives up.
 
-    ``take`` is given the text and says whether it can be that; what can't stays, with an edge in red.
+    ``take`` is given the text and says whether it can be that; what can't stays, with an edge in red and the
+    sentence ``rejection``.
     """
 
     ended = Signal()
@@ -105,10 +107,13 @@ class SlotField(QLineEdit):
         text: str,
         example: str,
         take: Callable[[str], bool],
+        *,
+        rejection: str = "",
     ) -> None:
         """``row`` is what the sentence of the ``slot`` lies in: the field is higher than a line of it."""
         super().__init__(text, row)
         self.slot, self._take, self._is_over = slot, take, False
+        self._rejection = rejection
         self.setAccessibleName(slot.accessibleName())
         self.setPlaceholderText(example)
         self.setProperty("focusRadius", theme.radius("small"))
@@ -196,6 +201,11 @@ class SlotField(QLineEdit):
             self.setProperty("wrong", "true" if wrong else "")
             self.style().unpolish(self)
             self.style().polish(self)
+            self.setToolTip(plain.tip(self._rejection) if wrong else "")
+            if wrong and self.hasFocus():
+                QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.toolTip(), self)
+            elif not wrong:
+                QToolTip.hideText()
 
     def leave(self, *, keeps_focus: bool = True) -> None:
         """The field goes; the keyboard goes back to its slot."""

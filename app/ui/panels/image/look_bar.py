@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.core.messages.picture import Picture
 from app.core.messages.picture_look import COLOUR_MAPS, MOST_CONTRAST, PLAIN, PictureLook
+from app.core.typed_number import parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow
@@ -134,7 +135,7 @@ class LookBar(QWidget):
 
     def _read_range(self) -> None:
         try:
-            low, high = (float(field.text().replace(",", ".")) for field in (self.low, self.high))
+            low, high = (parse_number(field.text()) for field in (self.low, self.high))
         except ValueError:  # one is not whole yet, and says so
             return
         if low < high:

@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
 
 from app.core.run.acting.json_text import value_typed
+from app.core.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
 from app.ui.widgets.menus import EditMenu
@@ -21,6 +22,7 @@ WIDER = {("float", "int")}
 NEEDS = {
     "int": lazy("{name} needs a whole number."),
     "float": lazy("{name} needs a number."),
+    "separators": lazy("{name} needs a number with at most one comma or point."),
     "json": lazy("{name} needs JSON, such as {example}."),
 }
 
@@ -138,7 +140,7 @@ class RequestForm(QWidget):
         meant = self._meant(name, text)
         field = self.fields[name]
         if meant is None:
-            said = NEEDS[self._kinds[name]]
+            said = NEEDS["separators" if self._has_separators(name, text) else self._kinds[name]]
             self.problems[name] = _(said).format(name=name, example="[1, 2]")
             if isinstance(field, QLineEdit):
                 self._mark(field, wrong=True)
@@ -163,6 +165,15 @@ class RequestForm(QWidget):
         if not is_number or (isinstance(value, float) and not math.isfinite(value)):
             return None
         return None if kind == "int" and isinstance(value, float) else (value,)
+
+    def _has_separators(self, name: str, text: str) -> bool:
+        if self._kinds[name] not in {"int", "float"}:
+            return False
+        try:
+            parse_number(text)
+        except TypedNumberError as error:
+            return error.has_separators
+        return False
 
     def _put(self, name: str, value: object) -> None:
         self._request = {**self._request, name: value}

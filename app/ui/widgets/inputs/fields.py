@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPlainTextEdit, QSizePolicy, QWidget
 
+from app.core.typed_number import parse_number
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -124,13 +123,11 @@ class NumberEdit(QLineEdit):
             self.emptied.emit()
             return
         try:
-            value = float(self.text().strip().replace(",", "."))
-        except ValueError:
-            self._judge(_("This needs a number."))
+            value = parse_number(self.text())
+        except ValueError as error:
+            self._judge(str(error))
             return
-        if not math.isfinite(value):
-            self._judge(_("This needs a number."))
-        elif self._minimum is not None and value < self._minimum:
+        if self._minimum is not None and value < self._minimum:
             self._judge(_("The least is {value}.").format(value=self._limit(self._minimum)))
         elif self._maximum is not None and value > self._maximum:
             self._judge(_("The most is {value}.").format(value=self._limit(self._maximum)))

@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.core.typed_number import parse_number
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.base import VALUE_WIDTH, Control, Tell, connect
@@ -79,12 +80,11 @@ def step_of(parameter: Parameter) -> float:
 
 
 def read_number(typed: str, *, whole: bool) -> object:
-    """What was typed as a number; None for nothing, the text itself when it is none."""
-    text = typed.strip().replace(",", ".")
-    if not text:
+    """Return the number that was typed, None for nothing, or the text itself when it is no number."""
+    if not typed.strip():
         return None
     try:
-        number = float(text)
+        number = parse_number(typed)
     except ValueError:
         return typed  # the check of the action says what is wrong with it
     return int(number) if whole and number.is_integer() else number

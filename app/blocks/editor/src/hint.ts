@@ -1,0 +1,57 @@
+// A sentence in a box next to a place on the canvas; it goes after some seconds, at the next click or when the view moves.
+import * as Blockly from 'blockly/core';
+
+const SHOWN_MS = 6000;
+const EDGE = 12;
+const GAP = 26;
+const hints = new WeakMap<Blockly.Workspace, Hint>();
+
+export class Hint {
+  private readonly box = document.createElement('div');
+  private timer = 0;
+
+  constructor(private readonly workspace: Blockly.WorkspaceSvg) {
+    hints.set(workspace, this);
+    this.box.className = 'nepWhy';
+    this.box.setAttribute('role', 'status');
+    workspace.getInjectionDiv().append(this.box);
+    workspace.addChangeListener((event) => {
+      if (event.type === Blockly.Events.VIEWPORT_CHANGE) this.hide();
+    });
+    workspace.getInjectionDiv().addEventListener('pointerdown', () => this.hide(), true);
+  }
+
+  /** The hint of a tab's workspace. */
+  static of(workspace: Blockly.Workspace | null | undefined): Hint | null {
+    return (workspace && hints.get(workspace)) ?? null;
+  }
+
+  dispose(): void {
+    window.clearTimeout(this.timer);
+  }
+
+  /** Shows a sentence below this place of the page, or above it where there is no room. */
+  show(sentence: string, at: Blockly.utils.Coordinate): void {
+    window.clearTimeout(this.timer);
+    this.box.textContent = sentence;
+    const frame = this.workspace.getInjectionDiv().getBoundingClientRect();
+    const {offsetWidth, offsetHeight} = this.box;
+    const left = Math.max(EDGE, Math.min(at.x - frame.left, frame.width - offsetWidth - EDGE));
+    const below = at.y - frame.top + GAP;
+    const top = below + offsetHeight + EDGE < frame.height ? below : at.y - frame.top - offsetHeight - GAP;
+    this.box.style.left = `${left}px`;
+    this.box.style.top = `${Math.max(EDGE, top)}px`;
+    this.timer = window.setTimeout(() => this.hide(), SHOWN_MS);
+  }
+
+  hide(): void {
+    if (!this.box.textContent) return;
+    window.clearTimeout(this.timer);
+    this.box.textContent = '';
+  }
+
+  /** Where the box is in the page. */
+  get bounds(): DOMRect {
+    return this.box.getBoundingClientRect();
+  }
+}

@@ -1,0 +1,56 @@
+// Blockly's number field removes commas, so that 0,2 became 2. Ours takes comma and point as decimal separators, and
+// rejects what is no number, with a sentence; the field keeps the value it had.
+import * as Blockly from 'blockly/core';
+import {Hint} from './hint';
+import {parseNumber, type Rejection} from './typed_number';
+import {lazy, t} from './words';
+
+const SENTENCES: Readonly<Record<Rejection, string>> = {
+  'separators': lazy('Write a number with at most one comma or point, such as 1234.5 or 1234,5.'),
+  'not a number': lazy('This needs a number.'),
+};
+/** Where a number may begin: no sentence is shown yet. */
+const UNFINISHED = /^\s*[+\u2212-]?[.,]?\s*$/;
+
+class NumberField extends Blockly.FieldNumber {
+  private problem: Rejection | null = null;
+
+  protected override doClassValidation_(value?: unknown): number | null {
+    const number = typeof value === 'string' ? parseNumber(value) : value;
+    return typeof number === 'number' && Number.isFinite(number) ? super.doClassValidation_(number) : null;
+  }
+
+  protected override doValueInvalid_(value: unknown, fires = true): void {
+    super.doValueInvalid_(value, fires);
+    if (!this.isBeingEdited_) return;
+    const typed = String(value);
+    const problem = parseNumber(typed);
+    this.problem = typeof problem === 'string' ? problem : null;
+    if (this.problem && !UNFINISHED.test(typed)) this.explain(t(SENTENCES[this.problem]));
+    else this.hint?.hide();
+  }
+
+  protected override doValueUpdate_(value: number): void {
+    super.doValueUpdate_(value);
+    if (this.isBeingEdited_ && this.problem) this.hint?.hide();
+    this.problem = null;
+  }
+
+  override onFinishEditing_(value: unknown): void {
+    super.onFinishEditing_(value);
+    if (this.problem) this.explain(`${t(SENTENCES[this.problem])} ${t('The field keeps {number}.', {number: String(value)})}`);
+    this.problem = null;
+  }
+
+  private get hint(): Hint | null {
+    return Hint.of(this.getSourceBlock()?.workspace);
+  }
+
+  private explain(sentence: string): void {
+    const {left, bottom} = this.getScaledBBox();
+    this.hint?.show(sentence, new Blockly.utils.Coordinate(left, bottom));
+  }
+}
+
+Blockly.fieldRegistry.unregister('field_number');
+Blockly.fieldRegistry.register('field_number', NumberField);

@@ -1,0 +1,43 @@
+"""Numbers as people type them: comma and point are both decimal separators.
+
+``editor/src/typed_number.ts`` reads the number fields of blocks by the same rules; both are tested with
+``tests/data/typed_numbers.json``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+
+from nep.i18n import _, lazy
+
+NOT_A_NUMBER = lazy("This needs a number.")
+SEPARATORS = lazy("Write a number with at most one comma or point, such as 1234.5 or 1234,5.")
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+_GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re.ASCII)
+
+
+class TypedNumberError(ValueError):
+    """A text is no number; ``has_separators`` when only its separators are wrong. Its text is a sentence."""
+
+    def __init__(self, *, has_separators: bool) -> None:
+        super().__init__(_(SEPARATORS if has_separators else NOT_A_NUMBER))
+        self.has_separators = has_separators
+
+
+def parse_number(text: str) -> float:
+    """Return the number that a person typed.
+
+    Thousands separators are rejected instead of removed: "1.234" may mean 1234 or 1.234, and a robot that
+    moves a thousand times too far can't be undone.
+
+    Raises:
+        TypedNumberError: The text is no finite number.
+    """
+    typed = unicodedata.normalize("NFKC", text).strip().replace("\N{MINUS SIGN}", "-")
+    if _NUMBER.fullmatch(typed):
+        number = float(typed.replace(",", "."))
+        if math.isfinite(number):
+            return number
+    raise TypedNumberError(has_separators=_GROUPED.fullmatch(typed) is not None)
