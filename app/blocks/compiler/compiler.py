@@ -137,6 +137,8 @@ class _Compiler:
         ]
         self._notes.check_starts(len(functions))
         self._ends.tell(self._notes, self._workspace)
+        self._notes.check_unknown()
+        self._notes.check_names()
         for found in ConflictFinder(self._workspace, self._catalogue, self._shaping.called).conflicts():
             self._notes.conflict(found)
         body: list[ast.stmt] = [
@@ -367,7 +369,9 @@ class _Compiler:
 
     def _variable(self, id: str) -> str:
         if id not in self._variables:
-            self._variables[id] = self._names.new(self._workspace.variables.get(id, id), "variable")
+            is_nameless = id in self._workspace.nameless
+            words = id if is_nameless else self._workspace.variables.get(id, id)
+            self._variables[id] = self._names.new(words, "variable")
         return self._variables[id]
 
     # ---- what is known about a block

@@ -50,7 +50,7 @@ class Lowering:
         self._by_name = {function.name: function for function in reversed(self._by_id.values())}
         scripts = tuple(tuple(map(self._shaped, script)) for script in workspace.scripts)
         shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
-        self.workspace = Workspace(scripts, {**workspace.variables, **shown})
+        self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
 
     def function(self, definition: Placed) -> Function | None:
         """The function that this block defines; None if it is switched off."""

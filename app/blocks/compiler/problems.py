@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from app.blocks.compiler.conflicts import Conflict
+from app.blocks.compiler.foreign import OURS
 from app.blocks.model.block import Block
-from app.blocks.model.block_text import label, label_of_type, reading
-from app.blocks.model.fields import Field, FieldError, TextField, ValueInput
+from app.blocks.model.block_text import label, label_of_unknown, reading
+from app.blocks.model.fields import Argument, Field, FieldError, TextField, ValueInput, VariableField
 from app.blocks.model.program import Problem, Severity
 from app.blocks.model.workspace import Placed, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
@@ -49,7 +50,7 @@ class ProblemCollector:
 
     def label(self, placed: Placed, block: Block | None) -> str:
         """The words that name a block in a sentence."""
-        return label_of_type(placed.type) if block is None else label(placed, block)
+        return label_of_unknown(placed) if block is None else label(placed, block)
 
     def check_starts(self, starts: int) -> None:
         """Nothing starts: an empty workspace is no problem, blocks without a start are."""
@@ -181,20 +182,76 @@ class ProblemCollector:
             )  # fmt: skip
             return True
         if block is None:
-            self._note(
-                "warning", placed, None, name,
-                _(
-                    "This file uses “{block}”, which no connected robot can do. "
-                    "It is kept and skipped."
-                ).format(block=name),
-                style="robot" if placed.type.startswith("robot_") else None,
-            )  # fmt: skip
+            self._unknown(placed, name)
             return True
         if isinstance(robot, str) and block.robot is not None and not self._can(robot, block):
             sentence = _("{robot} can't do this, so {block} will be skipped.")
             self._note("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
             return True
         return False
+
+    def _unknown(self, placed: Placed, name: str) -> None:
+        """A block of a robot, a program or a version that is not here."""
+        own = self._catalogue.blocks.get(OURS.get(placed.type, ""))
+        prefixes = {each.partition("_")[0] for each in self._catalogue.blocks}
+        if placed.type.startswith("robot_"):
+            sentence = _(
+                "This file uses “{block}”, which no connected robot supports. It is kept but skipped."
+            )
+            self._note("warning", placed, None, name, sentence.format(block=name), style="robot")
+        elif own is not None:
+            words = label(Placed("", own.type), own)
+            sentence = _(
+                "“{block}” belongs to another program and can't run here. It is kept but skipped. "
+                "“{own_block}” does the same."
+            )
+            self._note(
+                "warning", placed, None, name, sentence.format(block=name, own_block=words),
+                mend=_("Show “{block}”").format(block=words), mend_action=f"point.block:{own.type}",
+            )  # fmt: skip
+        elif placed.type.partition("_")[0] in prefixes:
+            sentence = _("“{block}” is not known to this version of NEP Studio. It is kept but skipped.")
+            self._note("warning", placed, None, name, sentence.format(block=name))
+        else:
+            sentence = _("“{block}” belongs to another program and can't run here. It is kept but skipped.")
+            self._note("warning", placed, None, name, sentence.format(block=name))
+
+    def check_unknown(self) -> None:
+        """Tell of unknown blocks inside blocks that are skipped themselves."""
+        told = {id for id, _sentence in self._problems}
+        for placed in self._enabled_blocks():
+            if placed.type not in self._catalogue.blocks and placed.id not in told:
+                self._unknown(placed, self.label(placed, None))
+
+    def _enabled_blocks(self) -> Iterator[Placed]:
+        """Yield the blocks that nobody switched off, in the order of the page."""
+        waiting = [placed for script in reversed(self._workspace.scripts) for placed in reversed(script)]
+        while waiting:
+            placed = waiting.pop()
+            if placed.enabled:
+                yield placed
+                inner = [each for chain in placed.inputs.values() for each in chain]
+                waiting += reversed(inner)
+
+    def check_names(self) -> None:
+        """Tell of variables whose names the file does not say."""
+        told: set[str] = set()
+        for placed in self._enabled_blocks() if self._workspace.nameless else ():
+            block = self._catalogue.blocks.get(placed.type)
+            for argument in block.arguments if block is not None else ():
+                id = _variable(argument, placed)
+                if id not in self._workspace.nameless or id in told:
+                    continue
+                told.add(id)
+                name = self.label(placed, block)
+                self._note(
+                    "warning", placed, block, name,
+                    _(
+                        "The file does not say the name of the variable in “{block}”. Name it, or choose "
+                        "another variable in the block."
+                    ).format(block=name),
+                    mend=_("Name it"), mend_action=f"variable.rename:{id}",
+                )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
         """Every block of a robot that is not connected, also in scripts and bodies that can't run."""
@@ -312,6 +369,16 @@ class ProblemCollector:
 def _is_literal(placed: Placed, name: str) -> bool:
     inner = placed.inputs.get(name, ())
     return bool(inner) and inner[0].type == "values_boolean"
+
+
+def _variable(argument: Argument, placed: Placed) -> str:
+    """The id of the variable in a field; "" for a field of another kind, and for what is no variable."""
+    if not isinstance(argument, VariableField):
+        return ""
+    try:
+        return str(argument.read(placed.fields.get(argument.name)))
+    except FieldError:
+        return ""
 
 
 def _written(placed: Placed, block: Block, name: str) -> object:

@@ -30,7 +30,7 @@ def reading(
     """
     block = blocks.get(placed.type)
     if block is None:
-        return label_of_type(placed.type)
+        return label_of_unknown(placed)
 
     def place(match: re.Match[str]) -> str:
         argument = block.argument(match[1])
@@ -39,7 +39,8 @@ def reading(
         if match[1] == "ROBOT" and not robot:
             return ""
         if isinstance(argument, VariableField):
-            return variables.get(_saved_variable(argument, placed), argument.value)
+            id = _saved_variable(argument, placed)
+            return variables.get(id, id or argument.value)
         if isinstance(argument, Field) and not argument.silent:
             words = _field(argument, placed)
             return f"“{words}”" if is_text and isinstance(argument, TextField) else words
@@ -79,6 +80,19 @@ def label_of_type(block_type: str) -> str:
         if block_type.startswith("robot_") and verb in block_type:
             return block_type.partition(verb)[2].replace("_", " ")
     return block_type.partition("_")[2].replace("_", " ") or block_type
+
+
+def label_of_unknown(placed: Placed) -> str:
+    """Return the words on a block that nobody describes, as the editor writes them on its grey block."""
+    if placed.type.startswith("robot_"):
+        return label_of_type(placed.type)
+    words = re.sub(r"[_\s]+", " ", placed.type).strip()
+    values = [
+        str(each)
+        for each in placed.fields.values()
+        if isinstance(each, (str, int, float)) and not isinstance(each, bool)
+    ]
+    return " ".join([words, *values])[:_LONGEST]
 
 
 def _field(argument: Field, placed: Placed) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from app.blocks.model.names import Unique
+from nep.i18n import _
 
 MAX_DEPTH = 40
 _MANUAL = "MANUALLY_DISABLED"
@@ -41,10 +42,15 @@ class Placed:
 
 @dataclass(frozen=True)
 class Workspace:
-    """All scripts (the blocks that hang together from each top block) and the variables: id -> name."""
+    """All scripts (the blocks that hang together from each top block) and the variables: id -> name.
+
+    ``nameless`` are the ids of variables that blocks use and whose names the file does not say; they have a
+    placeholder among the names.
+    """
 
     scripts: tuple[tuple[Placed, ...], ...]
     variables: Mapping[str, str]
+    nameless: frozenset[str] = frozenset()
 
     def all_blocks(self) -> list[Placed]:
         """Every block, shadows too."""
@@ -83,7 +89,26 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
     for variable in _list(saved.get("variables")):
         if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
             variables[str(variable["id"])] = str(variable.get("name") or variable["id"])
-    return Workspace(tuple(script for script in scripts if script), variables)
+    return _with_unlisted(Workspace(tuple(script for script in scripts if script), variables))
+
+
+def _with_unlisted(workspace: Workspace) -> Workspace:
+    """Add the variables that blocks use and the list of variables lacks."""
+    names = dict(workspace.variables)
+    nameless: set[str] = set()
+    for block in workspace.all_blocks():
+        for saved in block.fields.values():
+            id = saved.get("id") if isinstance(saved, Mapping) else None
+            if not isinstance(id, str) or not id or (id in names and id not in nameless):
+                continue
+            name = saved.get("name") if isinstance(saved, Mapping) else None
+            if isinstance(name, str) and name:
+                names[id] = name
+                nameless.discard(id)
+            else:
+                names[id] = _("variable without a name")
+                nameless.add(id)
+    return replace(workspace, variables=names, nameless=frozenset(nameless))
 
 
 def _list(saved: object) -> Sequence[object]:

@@ -60,7 +60,7 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
     """The behaviour in a file's bytes; ``path`` and ``name`` are for the sentence. Raises DocumentError."""
     name = name or path.name
     try:
-        content = deep_json.loads(data.decode("utf-8", "surrogatepass"))
+        content = deep_json.loads(data)  # UTF-8, or UTF-16 or UTF-32 as some editors on Windows save it
     except (ValueError, RecursionError) as error:
         damaged = _("{file} is damaged or not a behaviour").format(file=name)
         raise DocumentError(path, damaged, _(FROM_BEFORE)) from error

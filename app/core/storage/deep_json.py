@@ -24,7 +24,10 @@ _one_at_a_time = threading.Lock()
 
 
 def loads(text: str | bytes) -> object:
-    """The value of a JSON text. ValueError for what is none, RecursionError beyond 9000 levels."""
+    """Return the value of a JSON text; bytes may be UTF-8, UTF-16 or UTF-32, with or without a mark.
+
+    ValueError for what is no JSON, RecursionError beyond 9000 levels.
+    """
     return deeply(lambda: json.loads(text))
 
 

@@ -191,7 +191,7 @@ class Settings:
 
     def _read(self) -> dict[str, object]:
         try:
-            text = read_whole(self.path).decode("utf-8")
+            text = read_whole(self.path).decode("utf-8-sig")
         except FileNotFoundError:
             self.are_new = True
             return {}

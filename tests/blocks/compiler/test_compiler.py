@@ -136,7 +136,10 @@ def test_a_robot_that_was_never_seen_is_named_too():
 def test_an_unknown_block_is_kept_and_skipped():
     saved = workspace(started(block("magic_wave_wand"), say("Hi")))
     assert sentences(saved) == [
-        ("warning", "This file uses “wave wand”, which no connected robot can do. It is kept and skipped.")
+        (
+            "warning",
+            "“magic wave wand” belongs to another program and can't run here. It is kept but skipped.",
+        )
     ]
     assert play(saved).link.invoked == [("Pepper", "say", {"text": "Hi"})]
 

@@ -94,6 +94,14 @@ def test_bytes_that_were_changed_are_a_sentence_or_open(tmp_path: Path) -> None:
         document.program()  # whatever came through: problems, never a traceback
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-32"])
+def test_behaviour_in_another_unicode_encoding_opens(tmp_path: Path, encoding: str) -> None:
+    path = behaviour(tmp_path / "Mine.nepb", {"type": "values_text", "fields": {"TEXT": "¡Hola! 🤖"}})
+    written = read_file(path)
+    path.write_bytes(path.read_text("utf-8").encode(encoding))
+    assert read_file(path) == written
+
+
 @pytest.mark.parametrize(("version", "reason"), [
     (2, "newer NEP Studio (version 2) and is left as it is; update this one"),
     (99, "newer NEP Studio"), (0, "does not say its version"), (-1, "does not say its version"),

@@ -169,3 +169,18 @@ def test_without_a_new_one_they_are_about_the_list_that_a_block_makes(qtbot, vie
     them = person(state=saved)
     them.open_category("Lists")
     assert "names" in them.ask("document.querySelector('.blocklyFlyout .lists_add').textContent")
+
+
+def test_variable_without_a_name_gets_a_placeholder_that_is_not_saved(qtbot, view, person) -> None:
+    saved = workspace(started(block("variables_set", "set", VAR={"id": "gone"}, VALUE=number(3))))
+    saved["blocks"]["blocks"][0] |= {"x": 60, "y": 60}  # type: ignore[index]
+    them = person(state=saved)
+    them.wait_for(
+        "document.querySelector('[data-id=set]').textContent.includes('without\\u00a0a\\u00a0name')"
+    )
+    assert "variables" not in them.newest()
+    view.edit_variable({"do": "rename", "id": "gone", "name": "score"})
+    qtbot.waitUntil(lambda: "variables" in them.newest(), timeout=WAIT_MS)
+    assert them.newest()["variables"] == [{"name": "score", "id": "gone"}]
+    view.undo()
+    qtbot.waitUntil(lambda: "variables" not in them.newest(), timeout=WAIT_MS)

@@ -22,8 +22,10 @@ def changed(**values: object) -> bytes:
     return json.dumps({**json.loads(layout_bytes("Mine", "developer", SAVED)), **values}).encode()
 
 
-def test_what_is_written_is_read():
-    found = read_layout(layout_bytes("Mine", "developer", SAVED), "file", PANELS)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_what_is_written_is_read(encoding: str):
+    saved = layout_bytes("Mine", "developer", SAVED).decode().encode(encoding)
+    found = read_layout(saved, "file", PANELS)
     assert (found.name, found.base, found.saved, found.unknown) == ("Mine", "developer", SAVED, ())
 
 

@@ -136,6 +136,7 @@ def test_a_value_can_be_given_only_while_the_behaviour_runs(shown: MainWindow, c
 @pytest.mark.parametrize(
     ("words", "value"),
     [("3", 3), ("-1", -1), ("2,5", 2.5), (" 7 ", 7), ("true", True), ("No", False), ("", ""), ("Ada", "Ada"),
+     ("0,2", 0.2), ("1.234,5", "1.234,5"), ("1_000", "1_000"),
      ("1e999", "1e999"), ("nan", "nan"), ("18446744073709551615", 2**64 - 1)],
 )  # fmt: skip
 def test_what_is_typed_is_a_number_where_it_is_one(words: str, value: object) -> None:

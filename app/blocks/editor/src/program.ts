@@ -4,6 +4,7 @@ import {withoutTypeChecks} from './checker';
 import type {Culling} from './culling';
 import {freePlace, inSight, obstacles} from './free_place';
 import {type BlockState, UNKNOWN_BLOCK, wrapUnknown, wrapWholeStack, unwrapUnknown} from './unknown_blocks';
+import {NamelessVariables} from './nameless_variables';
 import {keepTyped} from './notes';
 import {withDeferredWords} from './blockly_patches';
 
@@ -24,9 +25,11 @@ export class Program {
   private timer = 0;
   private historyTold = 'false false';
   private loading = false;
+  private readonly nameless: NamelessVariables;
 
   constructor(private readonly workspace: Blockly.WorkspaceSvg, private readonly culling: Culling,
     private readonly listener: Listener) {
+    this.nameless = new NamelessVariables(workspace);
     workspace.addChangeListener((event) => this.onEvent(event));
   }
 
@@ -106,7 +109,7 @@ export class Program {
     const state = Blockly.serialization.workspaces.save(this.workspace) as Json;
     const blocks = state['blocks'] as {blocks: BlockState[]} | undefined;
     if (blocks) state['blocks'] = {...blocks, blocks: blocks.blocks.map(unwrapUnknown)};
-    return {...this.rest, ...state};
+    return {...this.rest, ...this.nameless.withoutThem(state)};
   }
 
   /** The newest JSON; tells about it at once when the window does not have it yet. */
@@ -162,6 +165,7 @@ export class Program {
     Blockly.utils.dom.startTextWidthCache();
     try {
       this.loadOthers(others, how);
+      this.nameless.create(Array.isArray(tops) ? tops as BlockState[] : []);
       this.workspace.setResizesEnabled(false);
       withoutTypeChecks(() => withDeferredWords(() => {
         for (const top of Array.isArray(tops) ? tops : []) this.append(top as BlockState, how);

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.core.session import Session
+from app.core.typed_number import TypedNumberError, parse_number
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from nep.i18n import _, ngettext, pgettext
@@ -120,10 +121,11 @@ class VariableCommands:
                     _("The behaviour has ended meanwhile: “{name}” is as it was").format(name=name)
                 )
 
+        is_number = now is not None and now.kind == "number"
         self._ask().ask(
             _("Another value for “{name}”").format(name=name),
             _("Use it"),
-            lambda _words: "",
+            lambda words: separators_refusal(words) if is_number else "",
             take,
             now.text if now is not None and now.kind in ("number", "text", "boolean") else "",
         )
@@ -175,6 +177,15 @@ def _names(field: object, id: str) -> bool:
     return isinstance(field, Mapping) and field.get("id") == id
 
 
+def separators_refusal(words: str) -> str:
+    """Return why a number with several separators can't be the value of a variable; "" for other words."""
+    try:
+        parse_number(words)
+    except TypedNumberError as error:
+        return str(error) if error.has_separators else ""
+    return ""
+
+
 def value_of(words: str) -> str | float | bool:
     """What a person typed: a number where it is one, yes or no (also “true”, “false”), else the text."""
     plain = words.strip()
@@ -184,11 +195,7 @@ def value_of(words: str) -> str | float | bool:
     if said in ("false", _("no").casefold()):
         return False
     try:
-        return int(plain)
-    except ValueError:
-        pass
-    try:
-        number = float(plain.replace(",", ".", 1))
+        number = parse_number(plain)
+        return int(plain) if plain.lstrip("+-").isdecimal() else number
     except ValueError:
         return words
-    return number if abs(number) < float("inf") else words

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import orjson
 
+from app.core.storage import deep_json
 from app.errors import AppError
 from app.ui.shell.docking.dock import kind_of
 from app.ui.shell.docking.layouts import LAYOUTS
@@ -59,8 +60,8 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     Raises `LayoutFileError`.
     """
     try:
-        told = orjson.loads(data)
-    except orjson.JSONDecodeError as error:
+        told = deep_json.loads(data)
+    except (ValueError, RecursionError) as error:
         raise LayoutFileError(_("it is damaged, or no layout of Studio")) from error
     if not isinstance(told, dict) or told.get("format") != FORMAT:
         raise LayoutFileError(_("it is no layout of Studio"))

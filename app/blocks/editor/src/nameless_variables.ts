@@ -1,0 +1,62 @@
+// Variables that blocks of a file use and whose names the file does not say. Blockly would make names up, and they would be
+// saved; ours have a placeholder until a person names them.
+import * as Blockly from 'blockly/core';
+import {argsOf, definitionOf} from './definitions';
+import type {BlockState} from './unknown_blocks';
+import {t} from './words';
+
+type Json = Record<string, unknown>;
+
+export class NamelessVariables {
+  /** The placeholders by the variables' ids. */
+  private readonly placeholders = new Map<string, string>();
+
+  constructor(private readonly workspace: Blockly.Workspace) {}
+
+  /** Creates the variables that these blocks need, before the blocks are made. */
+  create(tops: readonly BlockState[]): void {
+    this.placeholders.clear();
+    const variables = this.workspace.getVariableMap();
+    const waiting = tops.filter(isState);
+    for (let state = waiting.pop(); state; state = waiting.pop()) {
+      for (const id of unnamed(state)) {
+        if (variables.getVariableById(id)) continue;
+        const name = this.freeName(t('variable without a name'));
+        this.placeholders.set(id, name);
+        variables.createVariable(name, '', id);
+      }
+      for (const each of [...Object.values(state.inputs ?? {}), state.next]) {
+        waiting.push(...[each?.block, each?.shadow].filter(isState));
+      }
+    }
+  }
+
+  private freeName(words: string): string {
+    const taken = this.workspace.getVariableMap().getAllVariables().map((each) => each.getName());
+    let name = words;
+    for (let number = 2; taken.includes(name); number++) name = `${words} ${number}`;
+    return name;
+  }
+
+  /** What is saved, without variables that nobody has named. */
+  withoutThem(state: Json): Json {
+    const {variables, ...others} = state;
+    if (!this.placeholders.size || !Array.isArray(variables)) return state;
+    const named = (variables as Blockly.IVariableState[]).filter(({id, name}) => this.placeholders.get(id ?? '') !== name);
+    return named.length ? {...others, variables: named} : others;
+  }
+}
+
+/** The ids in a block's variable fields that stand there without a name. */
+function unnamed(state: BlockState): string[] {
+  const definition = definitionOf(state.type);
+  const names = definition ? argsOf(definition).filter((each) => each.type === 'field_variable').map((each) => each.name ?? '') : [];
+  return names.flatMap((name) => {
+    const {id, name: said} = (state.fields?.[name] ?? {}) as {id?: unknown; name?: unknown};
+    return typeof id === 'string' && id && typeof said !== 'string' ? [id] : [];
+  });
+}
+
+function isState(each: unknown): each is BlockState {
+  return typeof each === 'object' && each !== null;
+}

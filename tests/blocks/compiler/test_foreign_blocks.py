@@ -1,0 +1,72 @@
+"""Blocks of other programs and variables without a name: what a person is told about them."""
+
+from __future__ import annotations
+
+from app.blocks import Program, compile_behaviour
+from app.blocks.compiler.foreign import OURS
+from app.blocks.model.workspace import parse_workspace
+from app.blocks.toolbox.catalogue import categories
+from tests.blocks.samples import block, robot, started, workspace
+
+
+def compiled(*blocks: dict[str, object], **others: object) -> Program:
+    return compile_behaviour(workspace(started(*blocks)) | others, [robot()])
+
+
+def test_unknown_blocks_are_named_as_on_the_canvas_also_inside_others() -> None:
+    inner = block("logic_boolean", "z", BOOL="TRUE")
+    foreign = block("controls_if", "q") | {"inputs": {"IF0": {"block": inner}}}
+    program = compiled(
+        foreign,
+        block("lamp_toggle_now", "p", COLOUR="red"),
+        block("control_wait", "w", SECONDS=block("lamp_level", "v")),
+        block("robot_nao_do_wave", "r", ROBOT="Pepper"),
+        block("control_levitate", "n"),
+    )
+    told = {problem.block_id: problem for problem in program.problems}
+    assert {id: told[id].subject for id in ("q", "z", "p", "v", "r", "n")} == {
+        "q": "controls if",
+        "z": "logic boolean TRUE",
+        "p": "lamp toggle now red",
+        "v": "lamp level",
+        "r": "wave",
+        "n": "control levitate",
+    }
+    assert all(problem.subject in problem.sentence for problem in told.values())
+    assert "no connected robot" in told["r"].sentence
+    assert not any("robot" in told[id].sentence for id in "qzpv")
+    assert "version" in told["n"].sentence
+    assert (told["q"].mend_action, told["p"].mend_action) == ("point.block:control_if", None)
+
+
+def test_unknown_blocks_that_are_switched_off_are_not_told_of() -> None:
+    program = compiled(block("lamp_toggle_now", "p") | {"enabled": False})
+    assert program.problems == ()
+
+
+def test_proposed_blocks_exist_and_stand_for_blocks_that_do_not() -> None:
+    ours = {each.type for category in categories() for each in category.blocks}
+    assert set(OURS.values()) <= ours
+    assert not ours & OURS.keys()
+
+
+def test_variable_whose_name_the_file_lacks_is_a_problem_that_names_it() -> None:
+    program = compiled(
+        block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}},
+        block("variables_change", "c") | {"fields": {"VAR": {"id": "gone"}}},
+        block("variables_set", "t") | {"fields": {"VAR": {"id": "told", "name": "speed"}}},
+        block("variables_set", "u") | {"fields": {"VAR": {"id": "listed"}}},
+        variables=[{"id": "listed", "name": "count"}],
+    )
+    (problem,) = (each for each in program.problems if each.severity == "warning")
+    assert (problem.block_id, problem.mend_action) == ("s", "variable.rename:gone")
+    assert {each.id for each in program.variables} == {"gone", "told", "listed"}
+    assert "count" not in program.readings["s"]
+    assert "speed" in program.readings["t"]
+
+
+def test_renaming_finds_the_variable() -> None:
+    saved = workspace(started(block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}}))
+    parsed = parse_workspace(saved)
+    assert parsed.nameless == {"gone"}
+    assert parsed.variables["gone"]
