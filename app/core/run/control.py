@@ -23,6 +23,7 @@ from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop import RobotStopper, report_of
 from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
 from app.core.run.asking import Asking
+from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
@@ -108,9 +109,9 @@ class Runs:
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
         self.ran_blocks: frozenset[str] = frozenset()  # so far, also those between two looks of a slow window
-        self.block_errors: Mapping[str, str] = {}
+        self._errors = BlockErrors()
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
-        self._warned_edits = self.blocks_revision = 0
+        self.blocks_revision = 0
         self.values: Mapping[str, VariableValue] = {}
         """What the run's variables hold, by their ids; after its end what they held then."""
         self.values_revision = 0
@@ -139,6 +140,11 @@ class Runs:
         return self._trial.value
 
     @property
+    def block_errors(self) -> Mapping[str, str]:
+        """What is wrong with blocks, until they are repaired or the next Run."""
+        return self._errors.by_block
+
+    @property
     def block_warnings(self) -> Mapping[str, str]:
         """The blocks at which a person is warned, each with its sentence; also after the run."""
         return self._warnings.by_block
@@ -149,8 +155,8 @@ class Runs:
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
             self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
         self._settle()
-        if self.block_warnings and self.document is not None and self.document.edits != self._warned_edits:
-            self._warnings.clear()
+        edits = 0 if self.document is None else self.document.edits
+        if self._warnings.clear_if_edited(edits) | self._errors.forget_repaired():
             self.blocks_revision += 1
         if self.active:
             self._follow_breakpoints()
@@ -363,8 +369,7 @@ class Runs:
             case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
                 self._on_error(event)
             case "warning" if self.active and self.document is not None:
-                self._warnings.add(event.blocks[0], event.text, event.count)
-                self._warned_edits = self.document.edits
+                self._warnings.add(event.blocks[0], event.text, event.count, self.document.edits)
                 self.blocks_revision += 1
             case "print":
                 self._on_print(event)
@@ -426,6 +431,7 @@ class Runs:
         self._trial.begin(wanted)
         self._alerts.resolve("program")
         self._warnings.begin()
+        self._errors.begin(wanted)
         self._set_errors({})
         self._mark()
         try:
@@ -481,7 +487,7 @@ class Runs:
             self._run = RunState(
                 nothing_in=program, last_words=before.last_words, last_status=before.last_status
             )
-        self._set_errors(wrong)
+        self._set_errors(wrong, not_started=True)
         return None
 
     def _begin_now(self, wanted: Wanted) -> None:
@@ -509,13 +515,13 @@ class Runs:
         self._robots.end()
         if not self.active:
             return  # Stop was first
-        finished = event.ok and not self.block_errors
+        finished = event.ok and not self._run.errors
         if finished:
             self._mark()
         # the end of a program is a stop like any other: every robot that it used is told and must answer
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
-        if not event.ok and not self.block_errors:
+        if not event.ok and not self._run.errors:
             self._alerts.put("program", "error", _("The behaviour ended by itself."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
@@ -585,8 +591,8 @@ class Runs:
         report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
         self._post_event(StopDone(number, report))
 
-    def _set_errors(self, errors: Mapping[str, str]) -> None:
-        self.block_errors = errors
+    def _set_errors(self, errors: Mapping[str, str], *, not_started: bool = False) -> None:
+        self._errors.put(errors, not_started=not_started)
         self._run = replace(self._run, errors=errors)
         self.blocks_revision += 1
 

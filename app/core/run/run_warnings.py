@@ -16,18 +16,23 @@ class RunWarnings:
         self.by_block: Mapping[str, str] = {}
         self._counts: dict[tuple[str, str], int] = {}
         self._logged: dict[tuple[str, str], int] = {}
+        self._edits = 0
 
     def begin(self) -> None:
         """Another run begins."""
         self.by_block = {}
         self._counts, self._logged = {}, {}
 
-    def clear(self) -> None:
-        """The blocks were changed: nothing stands at them any more."""
+    def clear_if_edited(self, edits: int) -> bool:
+        """Remove the warnings if there were edits since the newest one; return whether any were removed."""
+        if not self.by_block or edits == self._edits:
+            return False
         self.by_block = {}
+        return True
 
-    def add(self, block: str, sentence: str, count: int) -> None:
-        """It was so often so in this run."""
+    def add(self, block: str, sentence: str, count: int, edits: int = 0) -> None:
+        """Add a warning that this run has given ``count`` times; ``edits`` of the behaviour so far."""
+        self._edits = edits
         key = (block, sentence)
         self._counts[key] = count
         self.by_block = {**self.by_block, block: counted(sentence, count)}

@@ -17,7 +17,8 @@ def test_it_stands_at_its_block_with_its_count_until_the_next_run() -> None:
     warnings.add("a", SAID, 12)
     warnings.add("b", SAID, 1)
     assert warnings.by_block == {"a": f"{SAID} (12 times)", "b": SAID}
-    warnings.clear()
+    assert not warnings.clear_if_edited(0)
+    assert warnings.clear_if_edited(1)
     assert warnings.by_block == {}
     warnings.add("a", SAID, 13)
     assert warnings.by_block == {"a": f"{SAID} (13 times)"}

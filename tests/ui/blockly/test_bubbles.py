@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from PySide6.QtCore import Qt
 
 from app.blocks import editor_definitions
 from app.ui.blockly.view import BlocklyView
@@ -60,3 +61,14 @@ def test_a_block_that_is_scrolled_out_of_sight_takes_its_bubble_along(qtbot, vie
     bubble, _its = shown_beside(qtbot, them, view, "w")
     view.show_block("far")
     qtbot.waitUntil(lambda: them.box(".nepBubble > path")["bottom"] < bubble["top"] - 300, timeout=WAIT_MS)
+
+
+def test_bubble_of_a_block_below_the_toolbox_is_hidden(qtbot, view, person) -> None:
+    them = person(state=workspace(wait_block("w", 20, 20)))
+    shown_beside(qtbot, them, view, "w")
+    visible = "document.querySelector('.nepBubble').checkVisibility({visibilityProperty: true})"
+    assert them.ask(visible)
+    them.open_category("Control")  # its blocks lie over this one
+    them.wait_for(visible, False)
+    them.press(Qt.Key_Escape)
+    them.wait_for(visible)

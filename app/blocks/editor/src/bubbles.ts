@@ -77,6 +77,8 @@ export class Bubbles {
     const at = block.getRelativeToSurfaceXY();
     const row = Math.min(block.height, ROW);
     const isInSight = at.x < view.right && at.x + block.width > view.left && at.y < view.bottom && at.y + row > view.top;
+    // Not in part below the toolbox or its blocks, where its sentence is cut off.
+    bubble.group.style.visibility = isInSight ? '' : 'hidden';
     const kept = (value: number, least: number, most: number) => isInSight ? Math.max(least, Math.min(most, value)) : value;
     const beside = at.x + block.width + GAP;
     const fits = beside + width + EDGE <= view.right || !isInSight;

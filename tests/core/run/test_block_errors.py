@@ -1,0 +1,67 @@
+"""The error at a block goes when the block is repaired, and stays for every other edit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.core.documents.document import Document
+from app.core.run.block_errors import BlockErrors
+from app.core.run.wanted import Wanted
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from tests.blocks.fakes import until
+from tests.blocks.samples import block, number, started, text, workspace
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> Iterator[Document]:
+    """Of a session that was never started: it has no sockets."""
+    made = Session(Settings(tmp_path), address="127.0.0.1:9", journal_folder=tmp_path, start_processes=False)
+    yield made.document
+    made.close()
+
+
+def waiting(seconds: dict[str, object] | None, lines: str = "Hello") -> dict[str, object]:
+    wait = block("control_wait", "w") if seconds is None else block("control_wait", "w", SECONDS=seconds)
+    return workspace(started(block("messages_write", "p", VALUE=text(lines)), wait))
+
+
+def test_error_of_a_program_that_stopped_goes_when_its_block_changes(document: Document) -> None:
+    soon = text("soon")
+    document.edited(waiting(soon))
+    errors = BlockErrors()
+    errors.begin(Wanted(document))
+    errors.put({"w": "“wait” needs a number"}, not_started=False)
+    assert not errors.forget_repaired()
+    document.edited(waiting(soon, "Other"))
+    assert not errors.forget_repaired()
+    document.edited(waiting(number(2), "Other"))
+    assert errors.forget_repaired()
+    assert errors.by_block == {}
+
+
+def test_error_of_a_deleted_block_goes(document: Document) -> None:
+    soon = text("soon")
+    document.edited(waiting(soon))
+    errors = BlockErrors()
+    errors.begin(Wanted(document))
+    errors.put({"w": "“wait” needs a number"}, not_started=False)
+    document.edited(workspace(started()))
+    assert errors.forget_repaired()
+
+
+def test_error_that_kept_a_program_from_starting_goes_when_the_blocks_are_right(document: Document) -> None:
+    wait = block("control_wait_until", "w")
+    document.edited(workspace(started(wait)))
+    wanted, errors = Wanted(document), BlockErrors()
+    errors.begin(wanted)
+    errors.put(wanted.problems(document.program()), not_started=True)
+    assert list(errors.by_block) == ["w"]
+    document.edited(workspace(started(block("messages_write", VALUE=text("Hello")), wait)))
+    assert not errors.forget_repaired()
+    document.edited(workspace(started(block("control_wait_until", "w", CONDITION=block("values_boolean")))))
+    until(errors.forget_repaired)
+    assert errors.by_block == {}
