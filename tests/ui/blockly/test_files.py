@@ -162,3 +162,13 @@ def test_random_programs_come_back_as_they_were(view, person):
         program = Maker(seed).program()
         view.load(program)
         assert them.newest() == program, f"seed {seed}"
+
+
+def test_canvas_is_covered_before_the_blocks_of_a_long_program_are_made(view, person):
+    them = person({**WAIT, "id": "old"})
+    them.ask("""(seen => new MutationObserver(() => window.seen = [...(window.seen ?? []), seen()])
+        .observe(document.body, {childList: true}) ?? 0)(() => [!!document.querySelector('.nepOpening'),
+            !!document.querySelector('[data-id=old]'), !!document.querySelector('[data-id=w299]')])""")
+    view.load(workspace(*({**WAIT, "id": f"w{number}", "y": 60 * number} for number in range(300))))
+    assert len(them.tops()) == 300
+    assert them.ask("[window.seen[0], window.seen.at(-1)]") == [[True, True, False], [False, False, True]]

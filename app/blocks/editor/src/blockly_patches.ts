@@ -110,6 +110,38 @@ placing.positionNewBlock = function (from, made) {
   place.call(this, from, made);
 };
 
+// ---- the width of words
+
+interface Sized {
+  textElement_: SVGTextElement | null;
+  updateSize_(margin?: number): void;
+}
+
+/** While blocks are loaded: the font of each class of text. */
+const fonts = new Map<string, {size: string; weight: string; family: string}>();
+
+/**
+ * Blockly asks for the style of each new text, and each time the page works out anew the styles of all that was added.
+ * All text of a class has one font, so it is asked once a load; what was measured is in Blockly's own cache then.
+ */
+const field = Blockly.Field.prototype as unknown as Sized;
+const updateSize = field.updateSize_;
+field.updateSize_ = function (margin) {
+  const text = this.textElement_;
+  if (holding && text?.isConnected) {
+    const name = text.className.baseVal;
+    const {size, weight, family} = fonts.get(name) ?? fontOf(text);
+    fonts.set(name, {size, weight, family});
+    Blockly.utils.dom.getFastTextWidthWithSizeString(text, size, weight, family);
+  }
+  updateSize.call(this, margin);
+};
+
+function fontOf(text: SVGTextElement): {size: string; weight: string; family: string} {
+  const {fontSize, fontWeight, fontFamily} = window.getComputedStyle(text);
+  return {size: fontSize, weight: fontWeight, family: fontFamily};
+}
+
 // ---- words for screen readers
 
 type Told = (Blockly.Field | Blockly.BlockSvg) & Tells;
@@ -123,14 +155,17 @@ interface Tells {
 const later = new Set<Told>();
 let holding = 0;
 
-/** While `load` makes blocks, their words for screen readers wait; a block's were made four times before. */
+/** While `load` makes blocks, their words for screen readers wait and the fonts of texts are asked once. */
 export function withDeferredWords<T>(load: () => T): T {
   holding += 1;
   try {
     return load();
   } finally {
     holding -= 1;
-    if (!holding) tellLater();
+    if (!holding) {
+      fonts.clear();
+      tellLater();
+    }
   }
 }
 

@@ -14,6 +14,7 @@ import {type Begin, EmptyCanvas, Pointer, type Wanted} from './guidance';
 import {binButton} from './bin';
 import {chooseAll, frameButton} from './frame';
 import {HelpCard, focusedBlock, registerHelpMenu} from './help';
+import {Inbox} from './inbox';
 import {iconElement} from './icons';
 import {useClipboard, useOwnKeys} from './keys';
 import {registerMenu, registerPictureMenu, trimMenu} from './menu';
@@ -352,13 +353,14 @@ async function start(bridge: Bridge): Promise<void> {
   await Promise.allSettled([document.fonts.load('600 15px Inter'), document.fonts.load('500 14px Inter')]);
   const editor = new Editor(bridge, beginning.pinned, beginning.theme);
   followModality();
-  bridge.told.connect((name, payload) => {
+  const inbox = new Inbox((name, payload) => {
     try {
       editor.receive(name, payload);
     } catch (error) {
       bridge.failed(`${name}: ${error instanceof Error ? error.message : String(error)}`);
     }
   });
+  bridge.told.connect((name, payload) => inbox.take(name, payload));
   window.addEventListener('error', (event) => bridge.failed(event.message));
   window.addEventListener('unhandledrejection', (event) => bridge.failed(String(event.reason)));
   bridge.ready();

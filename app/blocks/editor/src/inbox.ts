@@ -1,0 +1,44 @@
+// What the window tells the page, in its order. A long program takes a second to make, in which the page paints nothing:
+// the canvas is covered first, so that nobody takes the blocks of before for those of the new title.
+import {t} from './words';
+
+/** A program as long as this may take longer than an eye blinks. */
+const LONG_CHARACTERS = 12_000;
+/** A page that nobody sees paints nothing: it waits no longer than this. */
+const UNSEEN_MS = 100;
+
+export class Inbox {
+  private waiting: [name: string, payload: string][] | null = null;
+  private readonly cover = document.createElement('div');
+
+  constructor(private readonly receive: (name: string, payload: string) => void) {
+    this.cover.className = 'nepOpening';
+    this.cover.setAttribute('role', 'status');
+  }
+
+  take(name: string, payload: string): void {
+    if (this.waiting) this.waiting.push([name, payload]);
+    else if (name === 'tab' && payload.length >= LONG_CHARACTERS) this.takeAfterPaint(name, payload);
+    else this.receive(name, payload);
+  }
+
+  private takeAfterPaint(name: string, payload: string): void {
+    this.waiting = [[name, payload]];
+    this.cover.textContent = t('Opening…');
+    document.body.append(this.cover);
+    let isDone = false;
+    const go = () => {
+      if (isDone) return;
+      isDone = true;
+      const told = this.waiting ?? [];
+      this.waiting = null;
+      try {
+        for (const [each, its] of told) this.receive(each, its);
+      } finally {
+        this.cover.remove();
+      }
+    };
+    window.requestAnimationFrame(() => window.setTimeout(go));
+    window.setTimeout(go, UNSEEN_MS);
+  }
+}
