@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 
-from app.core.documents.file_format import BehaviourFile
+from app import resources
+from app.blocks.model.workspace import saved_blocks
+from app.core.documents.file_format import SUFFIX, BehaviourFile, read_file
 from nep.i18n import translate
 
 NAME, ABOUT, TEXT, LABEL, NOTE = (
@@ -50,6 +53,16 @@ def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
         name=say(NAME, example.name),
         workspace=workspace if isinstance(workspace, Mapping) else example.workspace,
         others=others,
+    )
+
+
+@lru_cache(maxsize=1)
+def example_block_ids() -> frozenset[str]:
+    """Return the ids of all blocks of the examples that Studio ships; a person's own blocks have others."""
+    return frozenset(
+        str(block.get("id"))
+        for path in sorted(resources.path("examples").glob(f"*{SUFFIX}"))
+        for block in saved_blocks(read_file(path).workspace)
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from app import resources
+from app.core.documents.file_format import read_file
 from app.ui.panels.base import Panel
 from app.ui.panels.first_steps.panel import HINT_AFTER_S, KEPT, FirstStepsPanel
 from app.ui.panels.first_steps.steps import SAY, STEPS, TURN, Built, Now, built_in, shown_by
@@ -62,6 +63,21 @@ def test_each_step_is_done_by_what_shows_it_and_stays_done() -> None:
         done, before = shown_by(now, done), done
         assert done - before == {step}
     assert shown_by(Now(), done) == done == {step.id for step in STEPS}
+
+
+def test_blocks_of_an_example_teach_nothing(panel, window) -> None:
+    window.session.join(pepper())
+    shipped = read_file(min(resources.path("examples").glob("*.nepb"))).workspace
+    tops = shipped["blocks"]["blocks"]
+    build(panel, *tops)
+    assert panel.done == {"robot"}
+    build(panel, *tops, block("events_started", block(SAYS, block(TURNS))))
+    assert panel.done == {"robot", "start", "say", "turn"}
+
+
+def test_a_stop_of_other_blocks_is_not_the_last_step() -> None:
+    done = {"robot", "start", "say", "run", "turn"}
+    assert shown_by(Now(True, Built(), stopped=True), done) == done
 
 
 def test_a_stop_before_anything_ran_teaches_nothing() -> None:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QAction, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
+from app.core.documents.examples import example_block_ids
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.first_steps.steps import START, STEPS, Built, Lesson, Now, built_in, shown_by
@@ -177,7 +178,7 @@ class FirstStepsPanel(PanelWidget):
         mine = runs.document is document
         edition = (document.key, document.revision, document.edits, document.mends)
         if self._built[0] != edition:
-            self._built = (edition, built_in(document.workspace))
+            self._built = (edition, built_in(document.workspace, example_block_ids()))
             for row in self.rows:
                 row.show_hint(loose=bool(row.step.takes) and row.step.takes in self._built[1].loose)
         return Now(

@@ -66,15 +66,18 @@ class Now:
     stopped: bool = False
 
 
-def built_in(workspace: Mapping[str, object]) -> Built:
-    """What these blocks have."""
+def built_in(workspace: Mapping[str, object], others: Collection[str] = ()) -> Built:
+    """What a person has built of these blocks; those with the ids ``others`` are of an example."""
     started: list[Script] = []
     loose: list[Script] = []
+    is_started = False
     for top in _tops(workspace):
-        (started if top.get("type") == START else loose).append(tuple(_inside(top)))
+        own = tuple((kind, id) for kind, id in _inside(top) if id not in others)
+        (started if top.get("type") == START else loose).append(own)
+        is_started |= top.get("type") == START and top.get("id") not in others
     below = {end for end in (SAY, TURN) if _has(started, end)}
     return Built(
-        bool(started),
+        is_started,
         frozenset(id for script in started for kind, id in script if kind.endswith(SAY)),
         TURN in below,
         frozenset(end for end in (SAY, TURN) if end not in below and _has(loose, end)),
@@ -101,7 +104,7 @@ def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
         found.add("run")
     if now.built.turns:
         found.add("turn")
-    if now.stopped and {"run", "turn"} <= found:
+    if now.stopped and now.built.turns and {"run", "turn"} <= found:
         found.add("stop")
     return frozenset(found)
 
