@@ -15,7 +15,7 @@ class ActiveAlert:
 
     ``title`` says what is wrong, ``detail`` what it means, ``button`` and ``action`` the next step (words,
     and the name of a command of the window). ``since_s`` is on the clock that `Alerts` was given; ``count``
-    is how often it happened since it was last cured.
+    is how often it happened since it was last cured. ``for_developers``: only the Developer layout tells it.
     """
 
     id: str
@@ -26,6 +26,7 @@ class ActiveAlert:
     action: str | None
     since_s: float
     count: int
+    for_developers: bool = False
 
 
 class Alerts:
@@ -49,6 +50,14 @@ class Alerts:
             )
         return self._sorted
 
+    def to_tell(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
+        """Return errors and warnings, worst first; those for developers only when asked for."""
+        return [
+            alert
+            for alert in self.active
+            if alert.severity != "info" and (for_developers or not alert.for_developers)
+        ]
+
     def put(
         self,
         id: str,
@@ -59,13 +68,15 @@ class Alerts:
         button: str | None = None,
         action: str | None = None,
         count: int = 1,
+        for_developers: bool = False,
     ) -> None:
         """Say that a problem is present. Said again, its words are renewed and ``count`` is added."""
         if severity not in SEVERITIES:
             raise ValueError(f"no severity '{severity}'; use one of {', '.join(SEVERITIES)}")
         old = self._alerts.get(id)
         if old is None:
-            new = ActiveAlert(id, severity, title, detail, button, action, self._clock(), count)
+            now = self._clock()
+            new = ActiveAlert(id, severity, title, detail, button, action, now, count, for_developers)
         else:
             new = replace(
                 old,
@@ -75,6 +86,7 @@ class Alerts:
                 button=button,
                 action=action,
                 count=old.count + count,
+                for_developers=for_developers,
             )
         if new != old:
             self._alerts[id] = new

@@ -40,7 +40,8 @@ class AlertsPanel(PanelWidget):
         if alerts.revision == self._seen:
             return
         self._seen = alerts.revision
-        active = list(alerts.active)
+        is_plain = self.density == "comfortable"  # the Behaviour layout: nobody there looks after ports
+        active = [alert for alert in alerts.active if not (is_plain and alert.for_developers)]
         if active != self.shown:
             self._show(active)
 

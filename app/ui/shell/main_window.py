@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QKeyCombination, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QKeyCombination, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QContextMenuEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenuBar, QStackedWidget, QVBoxLayout, QWidget
 
@@ -19,7 +19,7 @@ from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, ShowToast
 from app.ui.shell.bars.app_bar import AppBar, robots_chip
-from app.ui.shell.bars.banner import AlertBanner, BannerSpacer
+from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.developer_tools import DeveloperTools
 from app.ui.shell.bars.question_card import QuestionCard
 from app.ui.shell.bars.run_bar import RunBar, ToolBar
@@ -50,6 +50,7 @@ TICK_MS = 33
 SMALLEST = QSize(960, 540)  # on a screen of 1024 x 600 the system's own bars take some
 FIRST_SIZE = QSize(1440, 900)
 FACTS_EVERY = 8  # ticks
+OPEN_ALERTS = "panel:alerts"
 BLOCK_KEYS = {
     QKeySequence.StandardKey.Copy: "copy",
     QKeySequence.StandardKey.Cut: "cut",
@@ -99,7 +100,7 @@ class MainWindow(QMainWindow):
         self.benches: dict[str, Workbench] = {}
         self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
         self._facts = StatusFacts(session)
-        self._alerts_seen = -1
+        self._alerts_seen = (-1, False)
         self._source_seen = session.sources_shown
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs twice as often as the tick
@@ -142,16 +143,15 @@ class MainWindow(QMainWindow):
         self.pages = QStackedWidget()
         self.pages.addWidget(self.start)
         self.status = StatusBar(theme)
-        self.room = BannerSpacer(self.banner, self.pages)
-        middle = QWidget()
+        self.middle = middle = QWidget()
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        for widget in (self.run_bar, self.tool_bar, self.room):
+        for widget in (self.run_bar, self.tool_bar):
             column.addWidget(widget)
         column.addWidget(self.pages, 1)
         column.addWidget(self.status)
-        self.banner.setParent(middle)  # over the pages, which it does not move
+        self.banner.setParent(middle)  # over a bar's free area: in no layout, so it moves nothing
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
         self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
@@ -165,7 +165,7 @@ class MainWindow(QMainWindow):
         self.tools = DeveloperTools(self, self.tool_bar, commands, self.session)
         self.bar.layout_chosen.connect(lambda layout: run(f"layout.{layout}"))
         self.use_robot.clicked.connect(actions["robots.start"].trigger)
-        self.status.opened.connect(actions["network.others"].trigger)
+        self.status.pressed.connect(run)
         start.virtual_robot.connect(actions["robots.virtual"].trigger)
         start.new_behaviour.connect(actions["file.new"].trigger)
         start.learn_pressed.connect(actions["help.first_steps"].trigger)
@@ -178,7 +178,7 @@ class MainWindow(QMainWindow):
         actions["help.first_steps"].triggered.connect(lambda: start.offer_first_steps(False))
         self.banner.on_action = run
         self.banner.on_dismiss = self.session.alerts.dismiss
-        self.banner.on_more = self._show_all_alerts
+        self.banner.on_more = partial(run, OPEN_ALERTS)
         self.pages.currentChanged.connect(self._page_changed)
         self.bench_made.connect(shortcuts.tell)
         shortcuts.changed.connect(self._show_keys)
@@ -192,10 +192,6 @@ class MainWindow(QMainWindow):
     def _page_changed(self) -> None:
         self.commands.view.show_keys()
         self.tools.refresh()
-
-    def _show_all_alerts(self) -> None:
-        self._run("layout.developer")
-        self.open_panel("alerts")
 
     def _file_dialogs(self) -> FileDialogs:
         if has_system_dialogs(os.environ, sys.platform):
@@ -431,8 +427,6 @@ class MainWindow(QMainWindow):
             self._show_session()
         with guarded(lazy("ask a question")):
             self.question.refresh()
-        with guarded(lazy("make room for what is said")):
-            self.room.follow()
         with guarded(lazy("show another source")):
             self._follow_source()
         with guarded(lazy("let panels rest")):
@@ -470,18 +464,19 @@ class MainWindow(QMainWindow):
     def _show_facts(self) -> None:
         """Figures that nobody can read 30 times a second."""
         facts, document = self._facts, self.session.document
-        self.status.link = facts.remote_access()[1]
+        alerts = facts.alerts(for_developers=self.showing == "developer")
+        self.status.commands = {alerts[1]: OPEN_ALERTS, facts.remote_access()[1]: "network.others"}
         if self.showing == "behaviour":
             self.status.show_facts(
                 (facts.health(), facts.saved()),
                 (facts.armed(), facts.recording(), facts.topics(), facts.remote_access_quietly()),
             )
         elif self.showing == "developer":
-            left: tuple[Fact, ...] = (facts.master(), facts.remote_access(), facts.traffic())
+            left: tuple[Fact, ...] = (alerts, facts.master(), facts.remote_access(), facts.traffic())
             left = (*left, facts.armed(), facts.lost())
             right: tuple[Fact, ...] = (facts.recording(), facts.ring(), facts.shown(), facts.window())
             if self.session.replay is not None:
-                left = facts.replayed()
+                left = (alerts, *facts.replayed())
                 right = (
                     facts.recording(),
                     facts.ring(),
@@ -508,12 +503,17 @@ class MainWindow(QMainWindow):
         return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
 
     def _show_alerts(self) -> None:
-        alerts = self.session.alerts
-        if alerts.revision == self._alerts_seen:
-            return
-        self._alerts_seen = alerts.revision
-        shown = [a for a in alerts.active if a.severity != "info" and not alerts.dismissed(a.id)]
-        self.banner.show_alerts(shown)
+        """Show the alerts for whoever uses this layout, in the free area of its bar."""
+        alerts, is_developer = self.session.alerts, self.showing == "developer"
+        if (alerts.revision, is_developer) != self._alerts_seen:
+            self._alerts_seen = (alerts.revision, is_developer)
+            told = alerts.to_tell(for_developers=is_developer)
+            self.banner.show_alerts([alert for alert in told if not alerts.dismissed(alert.id)])
+        hosts: Mapping[str, StartPage | RunBar] = {START: self.start, "behaviour": self.run_bar}
+        host = hosts.get(self.showing, self.tool_bar)
+        self.run_bar.share(has_banner=bool(self.banner.identity))
+        area = host.banner_area() if self.banner.identity else QRect()
+        self.banner.follow(QRect(host.mapTo(self.middle, area.topLeft()), area.size()))
 
     def _panel_failed(self, name: str, sentence: str) -> None:
         self.session.console.add("error", f"panel {name}", sentence)

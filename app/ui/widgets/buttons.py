@@ -171,14 +171,26 @@ class Button(PaintedButton):
         self._least: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
-    def set_word(self, text: str, icon: str | None = None) -> None:
-        """Another word, and another icon when one is given; the place stays."""
-        if text == self.text() and icon in {None, self.icon_name}:
+    def set_word(self, text: str, icon: str | None = None, *, name: str = "") -> None:
+        """Show another word, and another icon when one is given; the place stays.
+
+        A screen reader says ``name`` instead of the word, where there is one.
+        """
+        same = text == self.text() and (name or text) == self.accessibleName()
+        if same and icon in {None, self.icon_name}:
             return
-        self.say(text)
+        self.say(text, name)
         self.icon_name = icon if icon is not None else self.icon_name
         self.updateGeometry()
         self.update()
+
+    def set_size(self, size: Size) -> None:
+        """Change the height, font and padding to those of another size."""
+        if self.measure != _MEASURES[size]:
+            self.measure = _MEASURES[size]
+            self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
+            self.updateGeometry()
+            self.update()
 
     def set_kind(self, kind: Kind) -> None:
         """Filled or outlined from now on."""
@@ -186,13 +198,16 @@ class Button(PaintedButton):
             self.kind = kind
             self.update()
 
-    def sizeHint(self) -> QSize:
-        font = self._theme.font(self.measure.font)
-        width = paint.width_of(font, self.text()) + 2 * self.measure.padding
+    def width_with(self, text: str) -> int:
+        """Return the width that the button wants with this word."""
+        width = paint.width_of(self._theme.font(self.measure.font), text) + 2 * self.measure.padding
         if self.icon_name is not None:
-            width += self.icon_side() + (self.measure.gap if self.text() else 0)
-        height = max(self.measure.height, round(paint.height_of(font)) + 8)
-        return QSize(round(width) + 1, height)
+            width += self.icon_side() + (self.measure.gap if text else 0)
+        return round(width) + 1
+
+    def sizeHint(self) -> QSize:
+        high = round(paint.height_of(self._theme.font(self.measure.font))) + 8
+        return QSize(self.width_with(self.text()), max(self.measure.height, high))
 
     def minimumSizeHint(self) -> QSize:
         wanted = self.sizeHint()

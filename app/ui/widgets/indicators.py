@@ -6,8 +6,18 @@ import re
 from collections.abc import Sequence
 from math import isfinite
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPainterPath, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui.text import plain
@@ -190,15 +200,19 @@ class StatusIcon(QWidget):
 
 
 class StatusItem(QWidget):
-    """One fact in the status bar: perhaps an icon, and a few words."""
+    """One fact in the status bar: perhaps an icon, and a few words. One with a ``command`` can be pressed."""
 
     ICON = 14
+    pressed = Signal(str)
+    """The command of an item that was pressed, by the mouse or by Enter or Space."""
 
     def __init__(self, theme: Theme, icon: str = "", text: str = "", status: str | None = None) -> None:
         super().__init__()
         self._theme = theme
         self._icon, self._text, self._status = "", "", status
+        self.command = ""
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+        self.setProperty("focusRadius", theme.radius("small"))
         theme.changed.connect(self.updateGeometry)
         self.set(icon, text, status)
 
@@ -218,6 +232,26 @@ class StatusItem(QWidget):
         if self.sizeHint() != before:
             self.updateGeometry()
         self.update()
+
+    def set_command(self, command: str) -> None:
+        """Let a press run a command, or with "" none."""
+        if command != self.command:
+            self.command = command
+            self.setFocusPolicy(Qt.FocusPolicy.TabFocus if command else Qt.FocusPolicy.NoFocus)
+            self.setCursor(Qt.CursorShape.PointingHandCursor if command else Qt.CursorShape.ArrowCursor)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if self.command and self.rect().contains(event.position().toPoint()):
+            self.pressed.emit(self.command)
+        else:
+            super().mouseReleaseEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        keys = {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
+        if self.command and event.key() in keys and not event.isAutoRepeat():
+            self.pressed.emit(self.command)
+        else:
+            super().keyPressEvent(event)
 
     def _side(self) -> float:
         return self._theme.scaled(self.ICON)

@@ -1,18 +1,21 @@
-"""A banner never moves what is under the mouse: a click that was aimed at something lands there."""
+"""A banner lies in the free area of the bar that shows: it covers no tab, title or tool, it moves nothing."""
 
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, Qt
-from PySide6.QtGui import QCursor, QEnterEvent
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, Qt
+from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
+from app.core.run.view import RunView
 from app.ui.shell.bars.banner import FRESH_S
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.main_window import MainWindow
+from app.ui.shell.main_window import FACTS_EVERY, MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
+
+SMALL = (960, 600)
 
 
 class Mouse:
@@ -20,12 +23,11 @@ class Mouse:
 
     def __init__(self, window: MainWindow) -> None:
         self.window, self.now, self.at = window, 100.0, QPoint(0, 0)
-        window.room.mouse_at = lambda: self.at
-        window.room.clock = lambda: self.now
+        window.banner.mouse_at = lambda: self.at
+        window.banner.clock = lambda: self.now
 
-    def over(self, widget: QWidget, down: int | None = None) -> None:
-        middle = widget.rect().center()
-        self.at = widget.mapToGlobal(QPoint(middle.x(), middle.y() if down is None else down))
+    def over(self, widget: QWidget) -> None:
+        self.at = widget.mapToGlobal(widget.rect().center())
         self.window.tick()
 
     def under_it(self) -> QWidget | None:
@@ -36,15 +38,19 @@ class Mouse:
 @pytest.fixture
 def mouse(qtbot, window: MainWindow, commands: Commands) -> Mouse:
     window.show()
-    window.show_layout("developer")
-    qtbot.waitUntil(lambda: window.bench is not None and window.bench.docks["topics"].shown())
-    QApplication.processEvents()
+    show(window, "developer")
+    assert window.bench is not None
+    topics = window.bench.docks["topics"]
+    qtbot.waitUntil(topics.shown)
     return Mouse(window)
 
 
-def places(window: MainWindow) -> dict[str, QPoint]:
-    assert window.bench is not None
-    return {name: dock.mapToGlobal(QPoint()) for name, dock in window.bench.docks.items() if dock.shown()}
+def show(window: MainWindow, layout: str) -> None:
+    if layout == "start":
+        window.show_start()
+    else:
+        window.show_layout(layout)
+    settle(window)
 
 
 def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
@@ -53,113 +59,78 @@ def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
 
 
 def settle(window: MainWindow) -> None:
-    for _ in range(5):  # Qt lays out what lies in what was laid out
+    for _ in range(FACTS_EVERY):  # Qt lays out what lies in what was laid out
         window.tick()
         QApplication.processEvents()
 
 
-def test_pages_stay_while_the_mouse_is_over_them_and_make_room_when_it_has_left(
-    qtbot, window: MainWindow, mouse: Mouse
+def place(window: MainWindow, widget: QWidget) -> QRect:
+    return QRect(widget.mapTo(window, QPoint()), widget.size())
+
+
+def places(window: MainWindow) -> dict[QWidget, QRect]:
+    """Where everything is that can be pressed, but for the banner and what is drawn over the window."""
+    found = (*window.findChildren(QAbstractButton), window.pages)
+    return {
+        each: place(window, each)
+        for each in found
+        if each.isVisible() and not window.banner.isAncestorOf(each)
+    }
+
+
+@pytest.mark.parametrize("layout", ["start", "behaviour", "developer"])
+@pytest.mark.parametrize("size", [(1280, 800), (1600, 1000), SMALL])
+def test_a_banner_covers_nothing_that_can_be_pressed_and_moves_nothing(
+    window: MainWindow, mouse: Mouse, layout: str, size: tuple[int, int]
 ) -> None:
-    assert window.bench is not None
-    topics = window.bench.docks["topics"].panel
-    mouse.over(topics)
-    before, under = places(window), mouse.under_it()
-    say(window)
-    assert window.banner.isVisible()
-    assert (places(window), mouse.under_it()) == (before, under)
-    assert window.room.height() == 0
-    assert window.banner.geometry().top() == window.pages.geometry().top(), "it lies over them"
-    for widget in (window.tool_bar, topics):
-        mouse.over(widget)
-        QApplication.processEvents()
-    after = places(window)
-    assert after["topics"].y() - before["topics"].y() == window.room.height() > 50, "the mouse was away"
-    assert window.banner.geometry().bottom() < window.pages.geometry().top()
-    window.session.alerts.resolve("one")
-    window.tick()
-    QApplication.processEvents()
-    assert not window.banner.isVisible()
-    assert places(window) == after, "nothing comes under the mouse where the banner was"
-    mouse.over(window.tool_bar)
-    qtbot.waitUntil(lambda: places(window) == before)
-
-
-def test_what_is_under_the_real_mouse_stays_where_it_is(
-    qtbot, window: MainWindow, commands: Commands
-) -> None:
-    window.show()
-    window.show_layout("developer")
-    qtbot.waitUntil(lambda: window.bench is not None and window.bench.docks["topics"].isVisible())
-    assert window.bench is not None
-    topics = window.bench.docks["topics"]
-    QApplication.processEvents()
-    QCursor.setPos(topics.mapToGlobal(topics.rect().center()))
-    before = topics.mapToGlobal(QPoint())
-    say(window)
-    assert window.banner.isVisible()
-    assert topics.mapToGlobal(QPoint()) == before
-
-
-def test_it_comes_below_where_the_mouse_is_at_its_place(window: MainWindow, mouse: Mouse) -> None:
-    mouse.over(window.pages, down=20)
-    before, under = places(window), mouse.under_it()
-    say(window)
-    assert (places(window), mouse.under_it()) == (before, under)
-    assert window.banner.geometry().bottom() == window.pages.geometry().bottom()
-    mouse.over(window.tool_bar)
-    QApplication.processEvents()
-    assert window.banner.geometry().top() == window.room.y()
-    assert window.room.height() == window.banner.height() > 50
-
-
-def test_it_leaves_the_lower_edge_when_the_mouse_leaves_the_upper_one(
-    window: MainWindow, mouse: Mouse
-) -> None:
-    """What it covers down there, such as the newest line of the Console, is wanted again."""
-    mouse.over(window.pages, down=20)
+    window.resize(*size)
+    show(window, layout)
     before = places(window)
     say(window)
-    low = window.banner.geometry()
-    assert low.bottom() == window.pages.geometry().bottom()
-    mouse.over(window.pages, down=window.pages.height() - 20)
-    assert window.banner.geometry() == low, "the mouse went straight to it"
-    mouse.over(window.pages, down=20)
-    assert window.banner.geometry() == low
-    mouse.over(window.pages)
-    assert window.banner.geometry().top() == window.pages.geometry().top()
+    if (layout, size) == ("developer", SMALL):  # its tools leave no room: the status bar tells
+        assert "1 alert" in window.status.words()
+        return
+    assert window.banner.isVisible()
     assert places(window) == before
-    mouse.over(window.pages, down=20)
-    QApplication.processEvents()
-    assert window.room.height() == window.banner.height(), "what it covers up there is below it then"
+    banner = place(window, window.banner)
+    assert window.rect().contains(banner)
+    pages = {window.pages} if layout == "start" else set()
+    assert not [each for each, rect in before.items() if rect.intersects(banner) and each not in pages]
+    window.banner.banner.close_button.click()
+    settle(window)
+    assert not window.banner.isVisible()
+    assert places(window) == before, "no strip is left"
 
 
-def test_going_to_what_it_covers_makes_room_while_the_mouse_is_on_it(
+def test_on_the_start_page_it_covers_no_words(window: MainWindow, mouse: Mouse) -> None:
+    show(window, "start")
+    say(window)
+    assert place(window, window.banner).bottom() <= place(window, window.start._question).top()
+
+
+def test_words_beside_it_are_shortened_but_not_those_that_ask_somebody_to_act(
     window: MainWindow, mouse: Mouse
 ) -> None:
-    assert window.bench is not None
-    mouse.over(window.bench.docks["topics"].panel)
+    show(window, "behaviour")
+    bar = window.run_bar
+    wide = bar.sentence.width()
     say(window)
-    before = window.banner.geometry()
-    mouse.over(window.banner.banner)
+    bar.sentence.show_words("Running", "It waits until a face is seen, which takes a while. " * 2)
+    beside = window.banner.x() - bar.sentence.x()
+    assert bar.sentence.width() == wide, "only the painting ends before the banner"
+    assert beside < bar.sentence.full_width()
+    title = "Pepper did not answer. Switch it off by hand."
+    bar.show_view(RunView("unanswered", title, "It may still move, so look at it now.", title))
     QApplication.processEvents()
-    assert window.room.height() == before.height()
-    assert window.banner.geometry() == before, "the banner itself stays under the mouse"
+    assert bar.banner_area().x() >= bar.sentence.x() + bar.sentence.full_width()
 
 
-def test_a_press_just_when_it_came_goes_to_what_was_there(window: MainWindow, mouse: Mouse) -> None:
-    assert window.bench is not None
-    mouse.over(window.bench.docks["topics"].panel)
-    covered = window.pages.mapToGlobal(QPoint(120, 20))
-    mouse_was, mouse.at = mouse.at, covered
-    under = mouse.under_it()
-    mouse.at = mouse_was
+def test_a_press_just_when_it_came_is_not_taken(window: MainWindow, mouse: Mouse) -> None:
+    mouse.at = window.middle.mapToGlobal(window.tool_bar.banner_area().center())
     say(window)
-    mouse.at = covered  # on its way to a button that was there, and pressed at once
-    assert mouse.under_it() is under
+    assert not window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
     mouse.now += FRESH_S
     window.tick()
-    assert mouse.under_it() is not under
     assert window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
 
 
@@ -170,42 +141,29 @@ def test_its_button_does_not_become_another_one_under_the_mouse(window: MainWind
     QApplication.sendEvent(window.banner.banner, QEnterEvent(at, at, at))
     say(window, "worse")
     assert window.banner.identity == "mild"
-    assert window.banner.banner.more.text() == "and 1 more"
+    assert window.banner.banner.more.accessibleName() == "and 1 more"
     QApplication.sendEvent(window.banner.banner, QEvent(QEvent.Type.Leave))
     mouse.over(window.tool_bar)
     assert window.banner.identity == "worse"
 
 
-def test_nothing_moves_while_a_button_is_held(window: MainWindow, mouse: Mouse) -> None:
-    mouse.over(window.tool_bar)
-    held = window.pages
-    before = places(window)
-    QTest.mousePress(held, Qt.MouseButton.LeftButton)
-    if QApplication.mouseButtons():  # a slider that is drawn, a line between panels
-        say(window)
-        assert places(window) == before
-    QTest.mouseRelease(held, Qt.MouseButton.LeftButton)
-    say(window, "again")
-    assert window.room.height() > 0
-
-
-def test_it_keeps_to_the_window_when_that_changes(window: MainWindow, mouse: Mouse) -> None:
-    assert window.bench is not None
-    mouse.over(window.bench.docks["topics"].panel)
+def test_it_goes_with_the_bar_when_the_layout_changes(window: MainWindow, mouse: Mouse) -> None:
     say(window)
-    window.resize(1200, 760)
-    QApplication.processEvents()
-    window.tick()
-    assert window.banner.width() == window.pages.width()
-    assert window.banner.geometry().top() == window.pages.geometry().top()
-    window.show_layout("behaviour")
-    QApplication.processEvents()
-    window.tick()
-    assert window.banner.geometry().top() >= window.run_bar.geometry().bottom()
+    assert window.tool_bar.geometry().contains(window.banner.geometry())
+    show(window, "behaviour")
+    assert window.run_bar.geometry().contains(window.banner.geometry())
+
+
+def test_the_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mouse) -> None:
+    step = {"button": "Open the connection doctor", "action": "help.doctor"}
+    window.session.alerts.put("one", "warn", "It is one.", **step)
+    settle(window)
+    button = window.banner.banner.button
+    assert button.accessibleName() == "Open the connection doctor"
+    assert "Open the connection doctor" in (button.text(), button.toolTip())
 
 
 def test_a_banner_that_stands_there_is_not_painted_again(window: MainWindow, mouse: Mouse) -> None:
-    mouse.over(window.tool_bar)
     say(window)
     mouse.now += FRESH_S
     settle(window)
@@ -225,30 +183,26 @@ def test_a_banner_that_stands_there_is_not_painted_again(window: MainWindow, mou
     assert not {QEvent.Type.Paint, QEvent.Type.ZOrderChange, QEvent.Type.Resize} & set(changed)
 
 
-def test_longer_words_of_the_same_alert_move_nothing_either(qtbot, window: MainWindow, mouse: Mouse) -> None:
-    assert window.bench is not None
-    mouse.over(window.tool_bar)
-    say(window)
-    mouse.over(window.bench.docks["topics"].panel)
-    before, low = places(window), window.banner.height()
-    window.session.alerts.put("one", "error", "It is one. " * 60, "Mend it.")
-    window.tick()
-    qtbot.waitUntil(lambda: window.banner.height() > low)
-    assert places(window) == before
-    mouse.over(window.tool_bar)
-    QApplication.processEvents()
-    assert window.room.height() == window.banner.height()
-
-
-def test_on_the_start_page_it_covers_no_words_though_the_mouse_is_over_the_page(
-    window: MainWindow, mouse: Mouse
-) -> None:
-    window.show_start()
+def test_an_alert_for_developers_is_told_in_their_layout_only(window: MainWindow, mouse: Mouse) -> None:
+    window.session.alerts.put("ports", "warn", "Port 7000 is taken.", for_developers=True)
     settle(window)
-    mouse.over(window.start)
-    question = window.start._question
-    before = question.mapTo(window, QPoint())
+    assert window.banner.identity == "ports"
+    for layout in ("behaviour", "start"):
+        show(window, layout)
+        assert window.banner.identity == ""
+        assert not any("alert" in words for words in window.status.words())
+    show(window, "developer")
+    assert window.banner.identity == "ports"
+
+
+def test_the_count_of_alerts_opens_them_by_mouse_and_by_keyboard(window: MainWindow, mouse: Mouse) -> None:
+    show(window, "behaviour")
     say(window)
-    assert window.banner.isVisible()
-    assert question.mapTo(window, QPoint()) == before, "nothing moved"
-    assert window.banner.banner.mapTo(window, QPoint(0, window.banner.banner.height())).y() <= before.y()
+    (item,) = [each for each in window.status.items() if each.text == "1 alert"]
+    assert item.focusPolicy() & Qt.FocusPolicy.TabFocus
+    opened: list[str] = []
+    window.open_panel = opened.append  # type: ignore[assignment,method-assign]
+    QTest.mouseClick(item, Qt.MouseButton.LeftButton)
+    QTest.keyClick(item, Qt.Key.Key_Return)
+    assert opened == ["alerts", "alerts"]
+    assert window.showing == "behaviour"

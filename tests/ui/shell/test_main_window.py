@@ -459,7 +459,7 @@ def test_an_alert_is_a_banner_until_it_is_cured(qtbot, window: MainWindow, comma
     banner = window.banner.banner
     assert window.banner.isVisible()
     assert "The camera is silent." in banner.accessibleName()
-    assert banner.more.text() == "and 1 more"
+    assert banner.more.accessibleName() == "and 1 more"
     QTest.mouseClick(banner.button, Qt.MouseButton.LeftButton)
     assert panel(window, "developer", "inspector").topics == ["/camera"]
     alerts.resolve("two")

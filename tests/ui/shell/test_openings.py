@@ -23,7 +23,7 @@ from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.table_panel import TablePanel
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
-from app.ui.shell.main_window import MainWindow
+from app.ui.shell.main_window import FACTS_EVERY, MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.panels.test_behaviour import Editor
 from tests.ui.shell_parts import Answers, free_address
@@ -224,7 +224,8 @@ def test_toasts_and_banners(window: MainWindow) -> None:
         window.session.alerts.put(
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )
-        window.tick()
+        for _ in range(FACTS_EVERY):  # the status bar tells of alerts, too
+            window.tick()
         window.session.alerts.resolve("x")
         window.tick()
 

@@ -1,8 +1,6 @@
-"""The alert under the run bar: one at a time, with its next step, where it moves nothing under the mouse.
+"""The alert in the free area of the bar that shows: one at a time, with its next step. It moves nothing.
 
-It lies over the upper edge of the pages as soon as it is wanted, or over the lower one while the mouse is at
-the upper. Room is made for it, and taken away, only while the mouse is neither over the pages nor pressed:
-then a click that was aimed at something lands there.
+A banner above the panels would have to cover tabs and titles, or to move them under the mouse.
 """
 
 from __future__ import annotations
@@ -10,28 +8,31 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Sequence
-from html import escape
 from typing import Protocol
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
-from PySide6.QtGui import QCursor, QMoveEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QPoint, QRect, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QCursor, QFont, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
+from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.buttons import Button, IconButton
+from app.ui.widgets.buttons import Button, IconButton, Size
 from app.ui.widgets.cards import AlertBox
-from app.ui.widgets.labels import label
 from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
-LEAST_HEIGHT = 52
+LEAST_WIDTH = 140  # px at 100 % text; with less room only the status bar tells of alerts
+LEAST_WORDS = 240  # px at 100 % text: with less the next step is its icon alone
+FONTS = ("bodyLarge", "body", "small")
+TALL = 44  # px at 100 % text: lower banners have small buttons
 STEP_ICONS = {
     "help.doctor": "stethoscope",
     "help.report": "message-square-warning",
     "robots.virtual": "bot",
     "file.open": "folder-open",
 }
+NEXT = "arrow-right"
 FRESH_S = 0.5
 """So long after it came under a mouse the banner lets a press through to what was there before."""
 
@@ -64,11 +65,89 @@ class AlertLike(Protocol):
         """The next step's name in the table of actions."""
 
 
+class BannerWords(QWidget):
+    """A bold sentence and a plain one, in as many lines as there is room for; the tooltip has all of both."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._title, self._detail = "", ""
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        theme.changed.connect(self.update)
+
+    def show_words(self, title: str, detail: str) -> None:
+        """Show other sentences."""
+        if (title, detail) != (self._title, self._detail):
+            self._title, self._detail = title, detail
+            self.setToolTip(plain.tip(f"{title}\n{detail}".strip()))
+            self.update()
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(0, 0)
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, round(2 * paint.height_of(self._theme.font("body"))))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        # the largest font in which all of it has room, else the smallest
+        kind = next((each for each in FONTS if self.lines(each)[1]), FONTS[-1])
+        lines, high = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
+        top = (self.height() - high * len(lines)) / 2
+        for line in lines:
+            left = 0.0
+            for text, font, role in line:
+                area = QRectF(left, top, self.width() - left, high)
+                paint.words(painter, area, text, font, self._theme.colour(role))
+                left += paint.width_of(font, text + " ")
+            top += high
+        painter.end()
+
+    def lines(self, kind: str) -> tuple[list[list[tuple[str, QFont, str]]], bool]:
+        """Return the lines as pieces of text with font and colour, and whether they hold all of the words.
+
+        The last line is elided where it is painted.
+        """
+        plain_font, bold = self._theme.font(kind), self._theme.font(kind)
+        bold.setWeight(QFont.Weight.DemiBold)
+        rows = max(1, int(self.height() / paint.height_of(plain_font)))
+        lines: list[list[tuple[str, QFont, str]]] = [[]]
+        left = 0.0
+        for sentence, font, role in (
+            (self._title, bold, "text"),
+            (self._detail, plain_font, "textSecondary"),
+        ):
+            rest = sentence.split()
+            while rest:
+                fitting = _fitting(font, rest, self.width() - left)
+                if fitting < len(rest) and len(lines) == rows:
+                    lines[-1].append((" ".join(rest), font, role))
+                    return lines, False
+                if not fitting and not lines[-1]:
+                    fitting = 1
+                if fitting:
+                    piece = " ".join(rest[:fitting])
+                    lines[-1].append((piece, font, role))
+                    left += paint.width_of(font, piece + " ")
+                    del rest[:fitting]
+                if rest:
+                    lines.append([])
+                    left = 0.0
+        return lines, True
+
+
+def _fitting(font: QFont, words: Sequence[str], width: float) -> int:
+    """Return how many of the words fit into one line of this width."""
+    count = len(words)
+    while count and paint.width_of(font, " ".join(words[:count])) > width:
+        count -= 1
+    return count
+
+
 class Banner(AlertBox):
     """Icon, a bold sentence, a plain one, one button with the next step, perhaps a second one, and close."""
 
-    icon_side, icon_left, left, high, gap = 20, 16, 48, 8, 8
-    least_words = 360
+    icon_side, icon_left, left, high, gap = 18, 12, 40, 0, 6
 
     pressed = Signal()
     second_pressed = Signal()
@@ -78,17 +157,17 @@ class Banner(AlertBox):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
-        self.setMinimumHeight(LEAST_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._words = ("", "")
+        self._others = 0
+        self._step = ""
+        self._icon: str | None = None
         self._announced = ""
-        self.words = label("", "lead", wrap=True)
-        self.words.setTextFormat(Qt.TextFormat.RichText)
-        theme.changed.connect(self._write)
+        self.words = BannerWords(theme)
         self.more = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
-        self.close_button = IconButton(theme, "x", _("Close this message"), size=32)
+        for button in (self.button, self.second):
+            button.let_shrink()
+        self.close_button = IconButton(theme, "x", _("Close this message"), size=26)
         self.text_column.addWidget(self.words)
         for widget in (self.more, self.second, self.button, self.close_button):
             self.button_row.addWidget(widget)
@@ -109,33 +188,45 @@ class Banner(AlertBox):
         icon: str | None = None,
     ) -> None:
         """Say what is wrong; ``others`` counts the alerts that wait behind this one."""
-        self.button.icon_name = icon
+        self._icon = self.button.icon_name = icon
         self.set_status(status)
-        self._words = (title, detail)
-        self._write()
+        self.words.show_words(title, detail)
         spoken = f"{title} {detail}".strip()
         self.setAccessibleName(spoken)
         news = FIGURES.sub("", spoken)
         if news != self._announced:  # a count that goes on is no news
             self._announced = news
             paint.announce(self, spoken)
-        for widget, text in ((self.button, button), (self.second, second)):
-            widget.set_word(text or "")
-            paint.show_when(widget, bool(text))
-        more = ngettext("and {count} more", "and {count} more", others).format(count=others)
-        self.more.set_word(more if others else "")
-        paint.show_when(self.more, others > 0)
+        self._step, self._others = button or "", others
+        self.second.set_word(second or "")
+        for widget, shown in ((self.button, button), (self.second, second), (self.more, others)):
+            paint.show_when(widget, bool(shown))
+        self._fit()
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self.mouse_left.emit()
 
-    def _write(self) -> None:
-        title, detail = (escape(words) for words in self._words)
-        quiet = self._theme.hex("textSecondary")
-        self.words.setText(
-            f'<span style="font-weight:600">{title}</span> <span style="color:{quiet}">{detail}</span>'
+    def _fit(self) -> None:
+        """Low: the buttons are small. Narrow: the next step is its icon, the count of the others a figure."""
+        scaled = self._theme.scaled
+        size: Size = "form" if self.height() >= scaled(TALL) else "small"
+        for button in (self.button, self.second):
+            button.set_size(size)
+        count = ngettext("and {count} more", "and {count} more", self._others).format(count=self._others)
+        wanted = (
+            self.more.width_with(count),
+            self.button.width_with(self._step),
+            self.second.sizeHint().width(),
         )
+        beside = zip((self.more, self.button, self.second), wanted, strict=True)
+        taken = sum(width + self.gap for button, width in beside if not button.isHidden())
+        room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - taken
+        is_narrow = room < scaled(LEAST_WORDS)
+        self.more.set_word(f"+{self._others}" if is_narrow else count, name=count)
+        self.button.icon_name = NEXT if is_narrow and self._icon is None else self._icon
+        self.button.set_word("" if is_narrow else self._step, name=self._step)
+        self.button.setToolTip(plain.tip(self._step if is_narrow else ""))
 
     def icon_top(self) -> float:
         return (self.height() - self.icon_side) / 2
@@ -144,17 +235,29 @@ class Banner(AlertBox):
 class AlertBanner(QWidget):
     """Where the banner is: shows the worst alert that was not closed, and goes when it is cured."""
 
-    def __init__(self, theme: Theme, banner: Banner | None = None) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        banner: Banner | None = None,
+        *,
+        mouse_at: Callable[[], QPoint] = QCursor.pos,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """``mouse_at`` tells where the mouse is on the screen, ``clock`` gives monotonic seconds."""
         super().__init__()
         self.banner = banner if banner is not None else Banner(theme)
+        self.mouse_at, self.clock = mouse_at, clock
+        self._theme = theme
         self._alert: AlertLike | None = None
         self._alerts: Sequence[AlertLike] = ()
         self._offer: tuple[Callable[[], object], Callable[[], object]] | None = None
+        self._placed = ""
+        self._fresh_until = 0.0
         self.on_action: Callable[[str], object] = lambda _name: None
         self.on_dismiss: Callable[[str], object] = lambda _alert_id: None
         self.on_more: Callable[[], object] = lambda: None
         row = QHBoxLayout(self)
-        row.setContentsMargins(8, 8, 8, 0)
+        row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self.banner)
         self.banner.pressed.connect(self._next_step)
         self.banner.second_pressed.connect(lambda: self._answer(1))
@@ -241,111 +344,22 @@ class AlertBanner(QWidget):
     def _more(self) -> None:
         self.on_more()
 
+    def follow(self, area: QRect) -> None:
+        """Lie in this area of the parent; called with every tick, as the bars change with what happens.
 
-class BannerSpacer(QWidget):
-    """The room between bars and pages; the banner lies over it, or over pages that may not move yet."""
-
-    def __init__(
-        self,
-        place: AlertBanner,
-        pages: QWidget,
-        *,
-        mouse_at: Callable[[], QPoint] | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        """All three have the same parent; ``mouse_at`` tells where the mouse is on the screen."""
-        super().__init__()
-        self._place, self._pages = place, pages
-        self.mouse_at: Callable[[], QPoint] = mouse_at or QCursor.pos
-        self.clock = clock
-        self._is_low = False
-        self._said = ""
-        self._fresh_until = 0.0
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFixedHeight(0)
-        place.installEventFilter(self)
-
-    @property
-    def height_wanted(self) -> int:
-        """The height of the banner in this width; 0 while there is none."""
-        layout = self._place.layout()
-        if self._place.isHidden() or layout is None:
-            return 0
-        return max(layout.totalHeightForWidth(self.width()), self._place.minimumSizeHint().height())
-
-    def follow(self) -> None:
-        """Put the banner where it may be now, and make room when nothing moves under the mouse; each tick."""
-        wanted = self.height_wanted
-        if not wanted and not self.height():
-            self._said = ""
-            return  # where the mouse is costs a way to the screen and back, 30 times a second
-        mouse = self._mouse()
-        if wanted:
-            self._note_change(mouse)
-        if wanted != self.height() and self._may_move(mouse, wanted):
-            self.setFixedHeight(wanted)
-            self._is_low = False
-        if wanted:
-            if self._is_low and self._may_rise(mouse, wanted):
-                self._is_low = False
-            self._lay(wanted)
-            fresh = self.clock() < self._fresh_until
-            self._place.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, fresh)
-        else:
-            self._said = ""
-
-    def _note_change(self, mouse: QPoint) -> None:
-        """Another banner: it goes where the mouse is not, and is not pressed by a click meant for another."""
-        said = self._place.identity
-        if said == self._said:
-            return
-        first, self._said = not self._said, said
-        self._place.raise_()
-        wanted = self.height_wanted
-        top = QRect(0, self.y(), self.width(), wanted)
-        if first:
-            self._is_low = wanted > self.height() and top.contains(mouse)
-        if wanted > self.height() or self._place.geometry().contains(mouse):
-            self._fresh_until = self.clock() + FRESH_S
-
-    def _may_move(self, mouse: QPoint, wanted: int) -> bool:
-        """Whether the pages may move: the mouse is not over them, nor over what would come under it."""
-        if QApplication.mouseButtons() or QApplication.activePopupWidget() is not None:
-            return False
-        if wanted and not self._is_low and self._place.geometry().contains(mouse):
-            return mouse.y() < self.y() + wanted  # the banner stays where it is
-        return not self.geometry().united(self._pages.geometry()).contains(mouse)
-
-    def _may_rise(self, mouse: QPoint, wanted: int) -> bool:
-        """Whether the mouse is neither where the banner is, at the lower edge, nor where it would go.
-
-        Nothing that it covers down there can be uncovered by going to it, as it can be at the upper edge.
+        Another banner that comes under the mouse is not pressed by a click that was meant for what was there.
         """
-        if QApplication.mouseButtons() or QApplication.activePopupWidget() is not None:
-            return False
-        above = QRect(self.x(), self.y(), self.width(), wanted)
-        return not above.contains(mouse) and not self._place.geometry().contains(mouse)
+        if not self.identity:
+            self._placed = ""
+            return
+        paint.show_when(self, area.width() >= self._theme.scaled(LEAST_WIDTH))
+        if area != self.geometry() or self.identity != self._placed:
+            self._placed = self.identity
+            self.setGeometry(area)
+            self.raise_()
+            self._fresh_until = self.clock() + FRESH_S if self._is_under_mouse() else 0.0
+        fresh = self.clock() < self._fresh_until
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, fresh)
 
-    def _lay(self, wanted: int) -> None:
-        top = self._pages.geometry().bottom() + 1 - wanted if self._is_low else self.y()
-        place = QRect(self.x(), top, self.width(), wanted)
-        if place != self._place.geometry():
-            self._place.setGeometry(place)
-
-    def _mouse(self) -> QPoint:
-        at, parent = self.mouse_at(), self.parentWidget()
-        return parent.mapFromGlobal(at) if parent is not None else at
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in {QEvent.Type.Show, QEvent.Type.Hide, QEvent.Type.LayoutRequest}:
-            self.follow()
-        return super().eventFilter(watched, event)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        if event.size().width() != event.oldSize().width():
-            self.follow()
-
-    def moveEvent(self, event: QMoveEvent) -> None:
-        super().moveEvent(event)
-        self.follow()
+    def _is_under_mouse(self) -> bool:
+        return self.rect().contains(self.mapFromGlobal(self.mouse_at()))

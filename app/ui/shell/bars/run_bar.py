@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from collections.abc import Iterable
+
+from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
@@ -23,6 +25,9 @@ LEAST_RESULT_PX = 110  # where there is less for both, a good result is shortene
 EDGES_PX = 150  # the button for the speed, the mark, and what is between all of them
 LEAST_ROOM_PX = 600  # below that even Run is an icon, so that nothing of a stop's result is cut
 LEAST_SENTENCE = 30  # px at 100 % text
+WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and of the bar: what happens now beside an alert
+BANNER_PX = 300  # at 100 % text: with less room an alert lies over the state of the tool bar, too
+BANNER_EDGE, GAP = 3, 8
 QWIDGETSIZE_MAX = 16777215  # Qt's own: no limit
 DOT = 10
 HALO = 16
@@ -44,6 +49,11 @@ class Mark(QWidget):
         self._theme = theme
         self._state = "ready"
         self.setFixedSize(20, 20)
+
+    @property
+    def state(self) -> str:
+        """The state that is shown: one of the six of Run and Stop."""
+        return self._state
 
     def show_state(self, state: str) -> None:
         """One of the six states of Run and Stop."""
@@ -85,7 +95,14 @@ class Sentence(QWidget):
         self._theme = theme
         self._title, self._detail, self._is_alarm = "", "", False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._shared_px: float | None = None
         theme.changed.connect(self.updateGeometry)
+
+    def keep_to(self, width: float | None) -> None:
+        """Paint the words in this width only, as an alert lies over the rest; None: in all of it."""
+        if width != self._shared_px:
+            self._shared_px = width
+            self.update()
 
     @property
     def colour_role(self) -> str:
@@ -119,14 +136,15 @@ class Sentence(QWidget):
         return QSize(0, self.sizeHint().height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        if self.width() < self._theme.scaled(LEAST_SENTENCE):
+        width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
+        if width < self._theme.scaled(LEAST_SENTENCE):
             return  # two letters and dots say nothing; its tooltip and a screen reader say all
         painter = QPainter(self)
-        lines = self.lines(self.width())
+        lines = self.lines(width)
         top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
         for text, font, role in lines:
             high = paint.height_of(font)
-            paint.words(painter, QRectF(0, top, self.width(), high), text, font, self._theme.colour(role))
+            paint.words(painter, QRectF(0, top, width, high), text, font, self._theme.colour(role))
             top += high
         painter.end()
 
@@ -271,6 +289,12 @@ class Bar(QWidget):
         painter.end()
 
 
+def free_area(bar: Bar, left: int, beside: Iterable[QWidget]) -> QRect:
+    """Return the area of the bar from ``left`` to the first of these widgets, above the bar's line."""
+    right = min((each.x() for each in beside), default=bar.width()) - GAP
+    return QRect(left, BANNER_EDGE, max(0, right - left), bar.height() - 1 - 2 * BANNER_EDGE)
+
+
 class RunBar(Bar):
     """60 px: three large buttons, what happens now, what the last stop brought, and Stop."""
 
@@ -320,6 +344,30 @@ class RunBar(Bar):
         """Let its buttons trigger these; the button for the speed offers full speed and slow motion."""
         bind(self, actions)
         self._paces.addActions([actions[name] for name in PACES])
+
+    def banner_area(self) -> QRect:
+        """Return where an alert may lie: beside what happens now, which is whole while somebody must act.
+
+        The reminder of the last stop may be covered; buttons and the result of a stop may not.
+        """
+        left = self.sentence.x() + self._sentence_px() + GAP
+        beside: list[QWidget] = [
+            each for each in (self.restart, self.confirm, self.stop) if not each.isHidden()
+        ]
+        if not self.result.isHidden() and self.result.look != "reminder":
+            beside.append(self.result)
+        return free_area(self, round(left), beside)
+
+    def share(self, *, has_banner: bool) -> None:
+        """Leave room for an alert beside what happens now, or take all of it again."""
+        self.sentence.keep_to(self._sentence_px() if has_banner else None)
+
+    def _sentence_px(self) -> float:
+        """Return how wide what happens now is beside an alert, whatever its words are at the moment."""
+        if self.mark.state == "unanswered":
+            return self.sentence.full_width()
+        scaled = self._theme.scaled
+        return max(scaled(SENTENCE_PX), min(scaled(WIDE_SENTENCE_PX), SENTENCE_SHARE * self.width()))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -403,6 +451,20 @@ class ToolBar(Bar):
             row.addWidget(button)
         row.addSpacing(-4)
         row.addWidget(self.stop)
+
+    def banner_area(self) -> QRect:
+        """Return where an alert may lie: between the tools and the state, in a narrow bar over the state."""
+        shown = [each for each in self._tools() if not each.isHidden()]
+        left = max((each.geometry().right() + 1 for each in shown), default=0) + GAP
+        buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
+        beside: list[QWidget] = [each for each in buttons if not each.isHidden()]
+        states = [each for each in (self.mark, self.words) if not each.isHidden()]
+        area = free_area(self, left, [*beside, *states])
+        return area if area.width() >= self._theme.scaled(BANNER_PX) else free_area(self, left, beside)
+
+    def _tools(self) -> list[QWidget]:
+        items = (self.tools.itemAt(place) for place in range(self.tools.count()))
+        return [tool for item in items if item is not None and (tool := item.widget()) is not None]
 
     def use(self, actions: Actions) -> None:
         """Let its buttons trigger these."""

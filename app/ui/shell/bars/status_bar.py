@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_words
@@ -40,16 +40,23 @@ class StatusFacts:
         self._clock = clock
         self.window_ms = 0.0
 
+    def alerts(self, *, for_developers: bool = False) -> Fact:
+        """How many alerts there are; nothing when there are none."""
+        alerts = self._session.alerts.to_tell(for_developers=for_developers)
+        if not alerts:
+            return NOTHING
+        icon, status = _worst(alert.severity for alert in alerts)
+        words = ngettext("{count} alert", "{count} alerts", len(alerts))
+        return icon, words.format(count=len(alerts)), status
+
     def health(self) -> Fact:
         """Say how many alerts there are, how much Health has to look at, or that Pepper is well.
 
         A robot that has told nothing yet is only connected.
         """
-        alerts = [alert for alert in self._session.alerts.active if alert.severity != "info"]
-        if alerts:
-            icon, status = _worst(alert.severity for alert in alerts)
-            words = ngettext("{count} alert", "{count} alerts", len(alerts))
-            return icon, words.format(count=len(alerts)), status
+        alerts = self.alerts()
+        if alerts != NOTHING:
+            return alerts
         known = self._session.fleet.links
         links = [
             link for link in known if link.state != "away"
@@ -228,10 +235,9 @@ class StatusFacts:
 
 
 class StatusBar(QWidget):
-    """26 px: facts at the left and at the right, divided by lines. `opened` is told of a press on `link`."""
+    """26 px: facts at the left and at the right, divided by lines. A press on some runs a command."""
 
-    opened = Signal()
-    link = ""
+    pressed = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -242,6 +248,8 @@ class StatusBar(QWidget):
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(16, 0, 16, 0)
         self._row.setSpacing(0)
+        self.commands: Mapping[str, str] = {}
+        """The command that a press on these words runs."""
         self._left: list[tuple[StatusItem, Separator]] = []
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
@@ -249,6 +257,7 @@ class StatusBar(QWidget):
     def _grow(self, items: list[tuple[StatusItem, Separator]], count: int, *, right: bool) -> None:
         while len(items) < count:
             item, line = StatusItem(self._theme), Separator(self._theme, upright=True)
+            item.pressed.connect(self.pressed)
             holder = QWidget()
             row = QHBoxLayout(holder)
             row.setContentsMargins(0, 0, 0, 0)
@@ -267,20 +276,20 @@ class StatusBar(QWidget):
             for index, (item, line) in enumerate(items):
                 fact = shown[index] if index < len(shown) else NOTHING
                 item.set(*fact)
+                item.set_command(self.commands.get(fact[1], ""))
                 holder = item.parentWidget()
                 if holder is not None:
                     holder.setVisible(bool(fact[1]))
                     holder.setContentsMargins(10 if (at_right or index) else 0, 0, 0, 0)
                 paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        under = self.childAt(event.position().toPoint())
-        if isinstance(under, StatusItem) and under.text == self.link:
-            self.opened.emit()
+    def items(self) -> list[StatusItem]:
+        """Return the items that show a fact now, from left to right."""
+        return [item for item, _line in (*self._left, *self._right) if item.text]
 
     def words(self) -> list[str]:
         """All facts shown now, from left to right."""
-        return [item.text for item, _line in (*self._left, *self._right) if item.text]
+        return [item.text for item in self.items()]
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -36,9 +36,10 @@ from app.ui.widgets.buttons import LinkButton
 from nep.i18n import _, lazy, ngettext, translate
 
 WIDTH, MARGIN, CARD_GAP = 1080, 24, 16
-BANNER_ROOM, HIGH = 40, 640
-"""More room above the question, where the page is high enough: a banner that may not move the page covers no
-words there."""
+TOP = 35
+BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
+"""More room above the question, where the page is high enough: an alert covers no words there. In a low page
+it has one line (px at 100 % text)."""
 EXAMPLES_SHOWN = 4
 EXAMPLES_MARGIN = 60  # so much around them, that their heading is in sight, too
 ALL_WORDS = {
@@ -149,6 +150,7 @@ class StartPage(QWidget):
         self._open.clicked.connect(self.open_pressed)
         self._build(examples)
         theme.changed.connect(self._restyle)
+        theme.changed.connect(self._fit_room)
         theme.changed.connect(self._fit_cards)
         self._restyle()
 
@@ -161,7 +163,7 @@ class StartPage(QWidget):
         content.setProperty("bare", "true")
         content.setMaximumWidth(WIDTH)
         column = self._content = QVBoxLayout(content)
-        column.setContentsMargins(0, 35, 0, 24)
+        column.setContentsMargins(0, TOP, 0, 24)
         column.setSpacing(0)
         self._banner_room = QSpacerItem(0, 0, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
         column.addSpacerItem(self._banner_room)
@@ -216,12 +218,14 @@ class StartPage(QWidget):
         whole.addWidget(area, 1)
         whole.addWidget(line)
 
+    def banner_area(self) -> QRect:
+        """Return where an alert may lie: above the question, as it is before anybody scrolls."""
+        high = TOP + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
+        return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        room = BANNER_ROOM if self.height() >= HIGH else 0
-        if room != self._banner_room.sizeHint().height():
-            self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
-            self._content.invalidate()
+        self._fit_room()
         self._fit_cards()
 
     def event(self, event: QEvent) -> bool:
@@ -229,6 +233,13 @@ class StartPage(QWidget):
         if event.type() in {QEvent.Type.LayoutRequest, QEvent.Type.FontChange, QEvent.Type.Polish}:
             self._fit_cards()
         return done
+
+    def _fit_room(self) -> None:
+        least = round(self._theme.scaled(BANNER_LINE)) + 2 * BANNER_GAP - TOP
+        room = max(BANNER_ROOM if self.height() >= HIGH else 0, least)
+        if room != self._banner_room.sizeHint().height():
+            self._banner_room.changeSize(0, room, QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
+            self._content.invalidate()
 
     def _fit_cards(self) -> None:
         """Large text in a small window: the cards stand below each other, in a low one without pictures.
