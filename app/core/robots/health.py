@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.alerts import Alerts
@@ -11,13 +11,14 @@ from app.core.network.topics import Topics
 from app.core.own_process import Fate
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
-from nep.i18n import _, lazy, ngettext
-from nep.protocol.graph_view import GraphView
+from nep.i18n import _, lazy, listed, ngettext
+from nep.protocol.graph_view import Alert, GraphView
 
 SILENT_S = 3.0
 CURE_S = 1.0
 AWAY_S = 5.0
 """A driver that is started again is back by then."""
+PORTS = "ports"
 ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 INSTALLATION = "installation"
@@ -175,23 +176,33 @@ class Health:
             self._alerts.resolve(INSTALLATION)
 
     def graph_alerts(self, view: GraphView) -> None:
-        """Take over what the master noticed (a name used twice, types that differ, a port that is taken)."""
+        """Take over what the master noticed (a name used twice, types that differ, ports that are taken)."""
         ids = set()
+        ports = [found for found in view.alerts if found.id.startswith("port:")]
         for found in view.alerts:
-            ids.add(found.id)
-            helps = found.id.startswith("port:")
-            self._alerts.put(
-                found.id,
-                "warn",
-                found.sentence,
-                found.hint,
-                button=_(ASK_DOCTOR) if helps else None,
-                action="help.doctor" if helps else None,
-                count=0,
-            )
+            if found not in ports:
+                ids.add(found.id)
+                self._alerts.put(found.id, "warn", found.sentence, found.hint, count=0)
+        if ports:
+            ids.add(PORTS)
+            self._tell_ports(ports)
         for gone in self._from_graph - ids:
             self._alerts.resolve(gone)
         self._from_graph = ids
+
+    def _tell_ports(self, taken: Sequence[Alert]) -> None:
+        """Say in one alert which ports of the original NEP are taken: only its programs need them."""
+        title, detail = taken[0].sentence, taken[0].hint
+        if len(taken) > 1:
+            numbers = sorted(
+                {found.id.removeprefix("port:") for found in taken}, key=lambda port: (len(port), port)
+            )
+            title = _("Ports {ports} are taken by other programs.").format(ports=listed(numbers))
+            detail = _("Programs of the original NEP can't join there. The connection doctor says why.")
+        step = _(ASK_DOCTOR)
+        self._alerts.put(
+            PORTS, "warn", title, detail, button=step, action="help.doctor", count=0, for_developers=True
+        )
 
     def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
         title = ngettext(

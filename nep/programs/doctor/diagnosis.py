@@ -9,7 +9,8 @@ from typing import Literal
 from nep.i18n import _
 from nep.programs.doctor.facts import Facts, FolderFact
 from nep.programs.doctor.finding import Finding, Severity
-from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals, ports
+from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals
+from nep.programs.doctor.original_ports import ports
 
 __all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
 

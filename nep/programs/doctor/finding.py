@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from nep.i18n import ngettext, number
+from nep.i18n import _, ngettext, number
 
-__all__ = ["Finding", "Severity", "ago"]
+__all__ = ["Finding", "Severity", "ago", "with_process"]
 
 Severity = Literal["error", "warning", "info", "ok"]
 
@@ -16,7 +16,7 @@ Severity = Literal["error", "warning", "info", "ok"]
 class Finding:
     """One thing that was looked at: how bad it is, a sentence, and what to do next ("" when nothing).
 
-    `id` begins with what it is about ("master:none", "port:7000"). `command` can be typed in a terminal.
+    `id` begins with what it is about ("master:none", "ports:taken"). `command` can be typed in a terminal.
     `instead` is the name that would do: of the topic that is meant, of the service to be called.
     """
 
@@ -46,3 +46,8 @@ def ago(seconds: float) -> str:
         return f"{number(seconds / 3600, '.1f')} h"
     days = round(seconds / 86_400)
     return ngettext("{count} day", "{count} days", days).format(count=days)
+
+
+def with_process(words: str, pid: int | None) -> str:
+    """Return what a program is called or where it is, with its process where that is known."""
+    return words if pid is None else _("{program} (process {pid})").format(program=words, pid=pid)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from nep.i18n import _, ngettext, number
-from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
-from nep.programs.doctor.finding import Finding, ago
+from nep.programs.doctor.facts import Facts, ProcessFact
+from nep.programs.doctor.finding import Finding, ago, with_process
 from nep.system.addresses import host_of, is_loopback
 
-__all__ = ["clocks", "loopback", "master_alerts", "masters", "originals", "ports"]
+__all__ = ["clocks", "loopback", "master_alerts", "masters", "originals"]
 
 SLOW_S = 0.5
 NOT_SERVED = ("0.5.4.6", "0.5.4.7")
-_AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
 _NATIVE = {"native", "gateway"}
 
 
@@ -237,61 +236,6 @@ def _several(facts: Facts) -> Iterator[Finding]:
     )
 
 
-def ports(facts: Facts) -> Iterator[Finding]:
-    """The ports where original programs ask."""
-    if not facts.joins_originals:
-        yield Finding("ports", "info", _("Programs of the original NEP are not joined (NEP_GATEWAY=0)."))
-        return
-    for port in facts.ports:
-        holder = port.holder
-        if not port.is_taken:
-            if facts.view is not None:
-                yield Finding(
-                    f"port:{port.port}",
-                    "info",
-                    _("Nobody listens on port {port}, {purpose}.").format(
-                        port=port.port, purpose=_(port.purpose)
-                    ),
-                    _("The master was started without its gateway.") if port.port != 12345 else "",
-                )
-        elif holder is not None and holder.is_master:
-            yield Finding(
-                f"port:{port.port}",
-                "ok",
-                _("The master holds port {port}, {purpose}.").format(port=port.port, purpose=_(port.purpose)),
-            )
-        else:
-            yield _taken(facts, port)
-
-
-def _taken(facts: Facts, port: PortFact) -> Finding:
-    holder = port.holder
-    name = holder.name if holder is not None else ""
-    if facts.platform == "darwin" and port.port == 7000 and (not name or name.startswith(_AIRPLAY)):
-        return Finding(
-            "port:7000",
-            "warning",
-            _("The AirPlay Receiver holds port 7000, {purpose}.").format(purpose=_(port.purpose)),
-            _("Switch it off in the system settings, under General, AirDrop & Handoff."),
-        )
-    if port.port == 12345:  # the originals' kill channel: whoever wants to end nodes holds it
-        return Finding(
-            "port:12345",
-            "info",
-            _("Port 12345 is held by {program}; original nodes take orders to end from there.").format(
-                program=_who(holder)
-            ),
-        )
-    return Finding(
-        f"port:{port.port}",
-        "warning",
-        _("Port {port}, {purpose}, is held by {program}.").format(
-            port=port.port, purpose=_(port.purpose), program=_who(holder)
-        ),
-        _("End that program; an original master may be one: this one joins its programs when it has gone."),
-    )
-
-
 def originals(facts: Facts) -> Iterator[Finding]:
     """Who is a program of the original NEP, and which of them cannot be served."""
     if facts.view is None:
@@ -340,19 +284,13 @@ def _wire(generation: str) -> str:
 
 def _master(facts: Facts, holder: ProcessFact | None) -> str:
     """Where it is: "127.0.0.1:7780 (process 12)"."""
-    return _with_process(facts.address, holder)
-
-
-def _with_process(words: str, holder: ProcessFact | None) -> str:
-    if holder is None or holder.pid is None:
-        return words
-    return _("{program} (process {pid})").format(program=words, pid=holder.pid)
+    return with_process(facts.address, holder.pid if holder is not None else None)
 
 
 def _who(holder: ProcessFact | None) -> str:
     if holder is None:
         return _("a program that the system does not name")
-    return _with_process(f"“{holder.name}”", holder)
+    return with_process(f"“{holder.name}”", holder.pid)
 
 
 def _other_port(number: str) -> int:

@@ -19,6 +19,7 @@ else:
 
 __all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
 
+_LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
 _NEAR = 20
 """A master's port is looked for so near to the usual one, when it listens on several."""
 
@@ -29,14 +30,25 @@ def listening() -> dict[int, int | None]:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
     except psutil.AccessDenied:  # macOS tells all of them to root only; its own to everybody
         connections = _own_connections()
-    found: dict[int, int | None] = {}
+    return holders(connections)
+
+
+def holders(connections: Iterable[object]) -> dict[int, int | None]:
+    """Return the process of each port that is listened on, None where the system does not tell it.
+
+    Several programs may listen on one port at different addresses: who is reached at 127.0.0.1 counts.
+    """
+    at_loopback: dict[int, int | None] = {}
+    elsewhere: dict[int, int | None] = {}
     for each in connections:
         if getattr(each, "status", "") != psutil.CONN_LISTEN:
             continue
-        port = getattr(getattr(each, "laddr", None), "port", None)
+        local = getattr(each, "laddr", None)
+        port = getattr(local, "port", None)
         if isinstance(port, int):
+            found = at_loopback if getattr(local, "ip", "") in _LOOPBACK else elsewhere
             found[port] = getattr(each, "pid", None) or found.get(port)
-    return found
+    return elsewhere | at_loopback
 
 
 def _own_connections() -> Iterable[object]:

@@ -99,11 +99,16 @@ def test_good_messages_are_nothing_to_tell(case: Case) -> None:
     assert case.alert() is None
 
 
-def test_a_taken_port_leads_to_the_doctor_and_other_notes_of_the_master_do_not(case: Case) -> None:
-    noticed = (Alert("port:7000", "Port 7000 is taken", "Close it."), Alert("name:x", "2 x", ""))
-    case.health.graph_alerts(GraphView(1, 1, alerts=noticed))
-    steps = {alert.id: (alert.button, alert.action) for alert in case.alerts.active}
-    assert steps == {"port:7000": ("Open the connection doctor", "help.doctor"), "name:x": (None, None)}
+def test_taken_ports_are_one_alert_for_developers_that_leads_to_the_doctor(case: Case) -> None:
+    ports = [Alert(f"port:{port}", f"Port {port} is taken", "Close it.") for port in (7000, 50000, 7777)]
+    case.health.graph_alerts(GraphView(1, 1, alerts=(*ports, Alert("name:x", "2 x", ""))))
+    told = {alert.id: (alert.action, alert.for_developers) for alert in case.alerts.active}
+    assert told == {"ports": ("help.doctor", True), "name:x": (None, False)}
+    (both,) = [alert.title for alert in case.alerts.active if alert.id == "ports"]
+    assert all(number in both for number in ("7000", "50000", "7777"))
+    assert [alert.id for alert in case.alerts.to_tell()] == ["name:x"]
+    case.health.graph_alerts(GraphView(1, 2, alerts=(ports[0],)))
+    assert [alert.title for alert in case.alerts.active] == ["Port 7000 is taken"]
     case.health.graph_alerts(GraphView(1, 2))
     assert not case.alerts.active
 

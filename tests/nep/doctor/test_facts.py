@@ -9,7 +9,9 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
+import psutil
 import pytest
 import typer
 
@@ -226,3 +228,13 @@ def test_programs_with_nodes_are_looked_at_for_their_files(master):
         assert (found.pid, found.name) == (program.process.pid, "Pepper")
         assert 5 < found.opened < 100
         assert found.limit == 256 or sys.platform == "darwin"
+
+
+def test_who_listens_at_another_address_of_a_port_does_not_hold_it_at_loopback():
+    listens = psutil.CONN_LISTEN
+    for order in (1, -1):
+        sockets = [
+            SimpleNamespace(status=listens, laddr=SimpleNamespace(ip=ip, port=7000), pid=pid)
+            for ip, pid in (("127.0.0.1", 41), ("192.168.1.5", 77))
+        ]
+        assert processes.holders(sockets[::order]) == {7000: 41}

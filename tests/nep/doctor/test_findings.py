@@ -65,7 +65,9 @@ def test_a_healthy_computer_has_no_warning():
     assert found()["master"].sentence == (
         "A master runs at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
     )
-    assert "The master holds port 7000" in found()["port:7000"].sentence
+    assert found()["ports"].sentence == (
+        "The master holds ports 7000 and 50000, where programs of the original NEP ask."
+    )
 
 
 def test_a_master_of_another_version_is_told_with_its_mend():
@@ -159,11 +161,42 @@ def test_two_masters_are_told_with_their_ports():
     assert "port 7780 (process 41), process 50" in one.sentence
 
 
-def test_a_taken_port_of_the_originals_is_a_warning_not_an_error():
-    made = found(ports=(PortFact(50000, "where newer ones ask", True, OTHER),))
-    assert made["port:50000"].severity == "warning"
-    assert "“python3 server.py” (process 77)" in made["port:50000"].sentence
-    assert worst(tuple(made.values())) == 1
+def originals_ports(*holders, numbers=(7000, 50000, 7777)):
+    return tuple(PortFact(n, "where some ask", True, each) for n, each in zip(numbers, holders, strict=True))
+
+
+def about_ports(**changes):
+    return {id: each for id, each in found(**changes).items() if id.startswith("port")}
+
+
+def test_taken_ports_of_the_originals_are_one_warning_that_names_who_holds_them():
+    made = about_ports(ports=originals_ports(OTHER, OTHER, OTHER))
+    assert list(made) == ["ports:taken"]
+    one = made["ports:taken"]
+    assert one.severity == "warning"
+    assert "Ports 7000, 50000 and 7777" in one.sentence
+    assert one.sentence.count("“python3 server.py” (process 77)") == 1
+    several = about_ports(ports=originals_ports(OTHER, None, ProcessFact(9, "redis")))["ports:taken"]
+    assert "7000 by “python3 server.py” (process 77), 50000 by another program" in several.sentence
+    single = about_ports(ports=originals_ports(OTHER, numbers=(50000,)))["ports:taken"]
+    assert single.sentence == "Port 50000, where some ask, is held by “python3 server.py” (process 77)."
+
+
+def test_another_master_on_a_port_is_not_the_one_that_is_asked():
+    second = ProcessFact(50, "python3 nep", is_master=True)
+    made = about_ports(ports=originals_ports(second, MASTER, numbers=(7000, 50000)))
+    assert "another master (process 50)" in made["ports:taken"].sentence
+    assert "port 50000," in made["ports"].sentence
+
+
+@pytest.mark.parametrize("gateway", [True, False])
+def test_a_master_holds_a_port_of_an_unknown_process_unless_it_says_that_it_does_not(gateway):
+    nodes = [node("gateway", "gateway")] if gateway else []
+    told = view(*nodes, alerts=[Alert("port:50000", "taken")])
+    made = about_ports(view=told, ports=originals_ports(None, None, numbers=(7000, 50000)))
+    taken = made["ports:taken"].sentence
+    assert "another program" in taken
+    assert ("Port 50000" in taken, "ports" in made) == (gateway, gateway)
 
 
 @pytest.mark.parametrize(
@@ -171,20 +204,19 @@ def test_a_taken_port_of_the_originals_is_a_warning_not_an_error():
 )
 def test_airplay_is_named_on_macos(holder):
     made = found(platform="darwin", ports=(PortFact(7000, "where old programs ask", True, holder),))
-    assert "AirPlay Receiver" in made["port:7000"].sentence
-    assert "AirDrop & Handoff" in made["port:7000"].mend
+    assert "AirPlay Receiver" in made["ports:airplay"].sentence
+    assert "AirDrop & Handoff" in made["ports:airplay"].mend
 
 
 def test_another_program_on_port_7000_of_a_mac_is_not_airplay():
     made = found(platform="darwin", ports=(PortFact(7000, "", True, OTHER),))
-    assert "python3 server.py" in made["port:7000"].sentence
+    assert "python3 server.py" in made["ports:taken"].sentence
 
 
 def test_a_master_without_gateway_and_a_wish_for_none():
-    one = found(ports=(PortFact(7000, "where old programs ask", False),))["port:7000"]
+    one = found(ports=(PortFact(7000, "where old programs ask", False),))["ports:free"]
     assert (one.severity, one.mend) == ("info", "The master was started without its gateway.")
-    assert set(found(joins_originals=False)) >= {"ports"}
-    assert "port:7000" not in found(joins_originals=False)
+    assert list(about_ports(joins_originals=False)) == ["ports"]
 
 
 def test_the_kill_channel_is_only_told():
@@ -240,7 +272,7 @@ def test_what_the_master_noticed_is_told_once():
     ]
     made = found(view=view(alerts=alerts))
     assert made["name:x"].mend == "Give each a name."
-    assert made["port:7000"].severity == "ok"  # judged by itself
+    assert "port:7000" not in made  # the doctor looks who holds it
 
 
 def test_folders_clocks_and_the_loopback():

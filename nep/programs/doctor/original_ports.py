@@ -1,0 +1,122 @@
+"""The part of the doctor's judgement that is about the fixed ports of the original NEP: one line for all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from nep.i18n import _, listed, ngettext
+from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
+from nep.programs.doctor.finding import Finding, with_process
+
+__all__ = ["ports"]
+
+KILL_PORT = 12345
+AIRPLAY_PORT = 7000
+_AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
+
+
+def ports(facts: Facts) -> Iterator[Finding]:
+    """Who holds the ports where programs of the original NEP ask."""
+    if not facts.joins_originals:
+        yield Finding("ports", "info", _("Programs of the original NEP are not joined (NEP_GATEWAY=0)."))
+        return
+    asked = [port for port in facts.ports if port.port != KILL_PORT]
+    own = [port for port in asked if port.is_taken and _is_masters(facts, port)]
+    taken = [port for port in asked if port.is_taken and port not in own]
+    airplay = [port for port in taken if _is_airplay(facts, port)]
+    yield from map(_airplay, airplay)
+    yield from _taken([port for port in taken if port not in airplay])
+    yield from _free([port for port in asked if not port.is_taken and facts.view is not None])
+    if own:
+        words = ngettext(
+            "The master holds port {ports}, where programs of the original NEP ask.",
+            "The master holds ports {ports}, where programs of the original NEP ask.",
+            len(own),
+        )
+        yield Finding("ports", "ok", words.format(ports=_numbers(own)))
+    yield from (_kill_port(port) for port in facts.ports if port.port == KILL_PORT and port.is_taken)
+
+
+def _is_masters(facts: Facts, port: PortFact) -> bool:
+    """Whether the master that is asked holds the port: no other master, nor one that says it could not."""
+    view, here = facts.view, facts.master_port
+    if here is None or (view is not None and any(each.id == f"port:{port.port}" for each in view.alerts)):
+        return False
+    if port.holder is not None and here.holder is not None:
+        return port.holder.pid == here.holder.pid
+    # the system names no process: a master with a gateway that does not complain has what it wants
+    return view is not None and any(node.generation == "gateway" for node in view.nodes.values())
+
+
+def _is_airplay(facts: Facts, port: PortFact) -> bool:
+    name = port.holder.name if port.holder is not None else ""
+    is_there = facts.platform == "darwin" and port.port == AIRPLAY_PORT
+    return is_there and (not name or name.startswith(_AIRPLAY))
+
+
+def _airplay(port: PortFact) -> Finding:
+    return Finding(
+        "ports:airplay",
+        "warning",
+        _("The AirPlay Receiver holds port 7000, {purpose}.").format(purpose=_(port.purpose)),
+        _("Switch it off in the system settings, under General, AirDrop & Handoff."),
+    )
+
+
+def _taken(ports: Sequence[PortFact]) -> Iterator[Finding]:
+    if not ports:
+        return
+    holders = [_holder(port.holder) for port in ports]
+    if len(ports) == 1:
+        sentence = _("Port {port}, {purpose}, is held by {program}.").format(
+            port=ports[0].port, purpose=_(ports[0].purpose), program=holders[0]
+        )
+    elif len(set(holders)) == 1:
+        sentence = _("Ports {ports}, where programs of the original NEP ask, are held by {program}.").format(
+            ports=_numbers(ports), program=holders[0]
+        )
+    else:
+        each = [
+            _("{port} by {program}").format(port=port.port, program=holder)
+            for port, holder in zip(ports, holders, strict=True)
+        ]
+        sentence = _("Ports where programs of the original NEP ask are held: {each}.").format(
+            each=listed(each)
+        )
+    yield Finding(
+        "ports:taken",
+        "warning",
+        sentence,
+        _("End that program to let programs of the original NEP join. Nothing else needs these ports."),
+    )
+
+
+def _free(ports: Sequence[PortFact]) -> Iterator[Finding]:
+    if ports:
+        words = ngettext(
+            "Nobody listens on port {ports}, where programs of the original NEP ask.",
+            "Nobody listens on ports {ports}, where programs of the original NEP ask.",
+            len(ports),
+        )
+        why = _("The master was started without its gateway.")
+        yield Finding("ports:free", "info", words.format(ports=_numbers(ports)), why)
+
+
+def _kill_port(port: PortFact) -> Finding:
+    return Finding(
+        f"port:{KILL_PORT}",
+        "info",
+        _("Port 12345 is held by {program}; original nodes take orders to end from there.").format(
+            program=_holder(port.holder)
+        ),
+    )
+
+
+def _numbers(ports: Sequence[PortFact]) -> str:
+    return listed([str(port.port) for port in ports])
+
+
+def _holder(holder: ProcessFact | None) -> str:
+    if holder is None:
+        return _("another program")
+    return with_process(_("another master") if holder.is_master else f"“{holder.name}”", holder.pid)
