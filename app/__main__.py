@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from app.missing_packages import why_not_imported
 from nep.errors import NepError
 from nep.i18n import _, begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
@@ -100,6 +101,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prepare_streams()
     try:
         return _main(words_given() if arguments is None else list(arguments))
+    except ImportError as error:
+        why = why_not_imported(error)
+        if not why:
+            raise
+        tell(f"nep-studio: {why}")
+        return 2
     finally:
         close_streams()
 

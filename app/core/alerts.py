@@ -107,6 +107,10 @@ class Alerts:
         """Whether this problem is present."""
         return id in self._alerts
 
+    def get(self, id: str) -> ActiveAlert | None:
+        """Return the problem of this id; None when it is not present."""
+        return self._alerts.get(id)
+
     def dismiss(self, id: str) -> None:
         """Hide it in the banner until it is cured and comes back; it stays among `active`."""
         if id in self._alerts and id not in self._dismissed:

@@ -19,6 +19,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication
 
 from app import resources
+from app.core.alerts import Alerts
 from app.core.documents.journal import left_behind, of_newer
 from app.core.documents.versions import bring_here
 from app.core.reports import studio_versions
@@ -27,6 +28,7 @@ from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
+from app.core.system_libraries import missing_libraries, tell_missing
 from app.ui.panels.registry import PanelRegistry
 from app.ui.self_drive import SelfDrive
 from app.ui.shell.bars.logo import LogoEngine
@@ -47,11 +49,10 @@ BEGUN = "begun"  # kept since the first start
 WEB_VIEW = "app.ui.blockly.view"
 SOON = (
     "app.ui.shell.dialogs.command_palette",
-    WEB_VIEW,
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
 )
-"""Imported after the first paint, though nobody has asked for them yet."""
+"""Imported after the first paint, as is the block editor, though nobody has asked for them yet."""
 
 _log = logging.getLogger(__name__)
 
@@ -112,8 +113,19 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
     """What a person needs a moment later: the panels, and the editor, which has then only to be started."""
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
-    modules = (partial(importlib.import_module, name) for name in SOON if web or name != WEB_VIEW)
-    return [*panels, *modules, *window.steps_ahead()]
+    modules = (partial(importlib.import_module, name) for name in SOON)
+    view = (partial(import_web_view, window.session.alerts),) if web else ()
+    return [*panels, *modules, *view, *window.steps_ahead()]
+
+
+def import_web_view(alerts: Alerts) -> None:
+    """Import the block editor, or say which system libraries it lacks."""
+    missing = missing_libraries()
+    if missing is None:
+        importlib.import_module(WEB_VIEW)
+    else:
+        tell_missing(alerts, missing)
+        sys.stderr.write(f"nep-studio: {missing.title} {missing.remedy}\n")
 
 
 def make_window(session: Session, options: Options) -> MainWindow:

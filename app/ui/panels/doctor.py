@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
+from app.core import system_libraries
 from app.core.network.topics import split_key
 from app.core.networks.networks import LOOK_COMMAND, lost_words, topic_words
 from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget
@@ -154,6 +155,9 @@ class DoctorPanel(PanelWidget):
     def _hindrances(self) -> Iterator[Hindrance]:
         """What hides messages in Studio itself; the panel that asked tells the rest."""
         session, topic = self.session, self.session.doctor.missed
+        libraries = session.alerts.get(system_libraries.ALERT)
+        if libraries is not None:
+            yield Hindrance(libraries.title, libraries.detail, "", lambda: None)
         if session.replay is not None and (topic or self._asker is not None):
             yield self._replay_hides(topic)
         network = session.live.networks.get(split_key(topic)[0])
@@ -270,6 +274,8 @@ class DoctorPanel(PanelWidget):
 
     def _step(self, finding: Finding) -> NextStep | None:
         kind, _colon, rest = finding.id.partition(":")
+        if kind == "studio" and not self._own[int(rest)].button:
+            return None
         if kind == "studio":
             return NextStep(self._own[int(rest)].button, self._own[int(rest)].run)
         if finding.id == "topic:near":

@@ -12,6 +12,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.blocks import Problem
+from app.core import system_libraries
 from app.core.documents.problems import Listed, Mend, listed
 from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
@@ -27,6 +29,7 @@ from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.blocks import Program
+    from app.core.alerts import ActiveAlert
     from app.core.documents.document import Document
     from app.robots.description.description import Robot
 
@@ -116,6 +119,7 @@ class ProblemsPanel(PanelWidget):
         super().__init__(context, _("Problems"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
+        self._of_editor: ActiveAlert | None = None
         self._found: tuple[Listed, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
@@ -138,9 +142,10 @@ class ProblemsPanel(PanelWidget):
         if program is None:
             self.checked.setText(_("Checking"))
             return
-        if program is self._program:
+        of_editor = self.session.alerts.get(system_libraries.ALERT)
+        if program is self._program and of_editor == self._of_editor:
             return
-        self._program = program
+        self._program, self._of_editor = program, of_editor
         self.checked.setText(_("Checked while you build"))
         found = listed(
             program.problems,
@@ -150,6 +155,9 @@ class ProblemsPanel(PanelWidget):
             VIRTUAL_ROBOTS,
             program.absent,
         )
+        if of_editor is not None:
+            sentence = f"{of_editor.title} {of_editor.detail}"
+            found = (Listed(Problem("error", None, None, of_editor.title, sentence), ()), *found)
         if found != self._found:
             self._found = found
             self._show(found)

@@ -5,14 +5,16 @@ from collections.abc import Callable
 import pytest
 from PySide6.QtCore import QBuffer, QIODevice, QPoint, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPixmap
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
+from app.core.system_libraries import ALERT, MissingLibraries
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.carried_blocks import BESIDE, CarriedPicture, brought_words
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
+from app.ui.widgets import EmptyState
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press, ticks
 from tests.ui.sample_data import PROGRAM, Invocation, pepper
@@ -444,3 +446,27 @@ def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(pane
     editor(panel).block_dropped.emit(place)
     assert window.commands == ["file.new"]
     assert editor(panel).count("bring_blocks") == 0, "no new one came: the block stays"
+
+
+def test_missing_system_libraries_are_told_in_place_of_the_blocks_and_the_program_is_there(
+    qtbot, window: Window
+) -> None:
+    lacks = MissingLibraries(("libnss3.so",), ("libnss3",))
+
+    def never(_parent: QWidget) -> Editor:
+        raise AssertionError("the editor can't be opened")
+
+    panel = BehaviourPanel(window.context(), never, lambda: lacks)
+    qtbot.addWidget(panel)
+    qtbot.addWidget(panel.replaces_title())
+    for _ in range(10):
+        panel.refresh()
+    (told,) = panel.findChildren(EmptyState)
+    words = " ".join(label.text() for label in told.findChildren(QLabel))
+    assert "sudo apt install libnss3" in words
+    alert = window.session.alerts.get(ALERT)
+    assert alert is not None
+    assert alert.severity == "error"
+    panel.set_mode("python")
+    assert panel.program.toPlainText()
+    panel.shut()

@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
+from app.core.system_libraries import MissingLibraries, tell_missing
 from app.ui.panels import console
 from app.ui.panels.base import Hindrance, PanelWidget, paused_hindrance
 from app.ui.panels.doctor import PANEL, DoctorPanel
@@ -368,3 +369,12 @@ def test_before_the_first_answer_it_says_that_it_looks(qtbot, qapp) -> None:
         qtbot.addWidget(widget)
     assert isinstance(panel, DoctorPanel)
     assert panel.empty.isVisible()
+
+
+def test_missing_system_libraries_of_the_block_editor_are_a_finding(panel, window) -> None:
+    tell_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
+    panel.refresh()
+    (found,) = [each for each in panel.shown if "libnss3.so" in each.sentence]
+    assert found.severity == "error"
+    assert "sudo apt install libnss3" in found.mend
+    assert not panel.rows[panel.shown.index(found)].button.isVisibleTo(panel)

@@ -5,6 +5,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.blocks import Problem
+from app.core.system_libraries import MissingLibraries, tell_missing
 from app.ui.panels.problems import PANEL, ProblemsPanel
 from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session
@@ -153,3 +154,11 @@ def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window)
     document.found, document.edits = document.found[:1], 32
     panel.refresh()
     assert not panel.others.isVisibleTo(panel)
+
+
+def test_an_editor_that_cannot_open_is_a_problem_whatever_the_blocks_are(panel, window) -> None:
+    before = len(panel.rows)
+    tell_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
+    panel.refresh()
+    assert len(panel.rows) == before + 1
+    assert "sudo apt install libnss3" in panel.rows[0].accessibleName()

@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Protocol, cast
 
 from PySide6.QtCore import Qt, SignalInstance
@@ -16,6 +17,7 @@ from app.core.documents.backpack import Backpack
 from app.core.documents.rename import why_not
 from app.core.documents.titles import told_apart
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
+from app.core.system_libraries import MissingLibraries, missing_libraries, tell_missing
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper
@@ -24,7 +26,7 @@ from app.ui.panels.behaviour.live_values import live_words
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
-from app.ui.widgets import label
+from app.ui.widgets import EmptyAction, EmptyState, label
 from app.ui.widgets.indicators import ROBOT_STATUS
 from nep.i18n import _, lazy, ngettext, pgettext
 
@@ -115,8 +117,16 @@ def blockly(parent: QWidget) -> Editor:
 class BehaviourPanel(PanelWidget):
     """The behaviour that is open: Blocks to build with, Python to read."""
 
-    def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
+    def __init__(
+        self,
+        context: PanelContext,
+        make_editor: Callable[[QWidget], Editor] = blockly,
+        missing: Callable[[], MissingLibraries | None] = missing_libraries,
+    ) -> None:
+        """``missing`` tells which system libraries the editor lacks; asked once, before ``make_editor``."""
         super().__init__(context, _("Behaviour"))
+        self._missing = missing
+        self._can_open = True
         self._bar = BehaviourTitle(self.theme)
         self._bar.mode.changed.connect(self.set_mode)
         self._bar.copy.clicked.connect(self.copy_program)
@@ -157,41 +167,45 @@ class BehaviourPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         documents, document = self.session.documents, self.session.document
-        runs = self.session.runs
-        self._bar.tabs.show_tabs(tab_facts(documents, runs), document.key)
-        if self.editor is None:
+        self._bar.tabs.show_tabs(tab_facts(documents, self.session.runs), document.key)
+        if self.editor is None and self._can_open:
             self.editor = self._open_editor()
-        if self._new("definitions", documents.definitions_revision):
-            self.editor.set_definitions(documents.definitions())
-        self._show_blocks(self.editor)
+        if self.editor is not None:
+            if self._new("definitions", documents.definitions_revision):
+                self.editor.set_definitions(documents.definitions())
+            self._show_blocks(self.editor)
         program = document.newest()
         if program is not None and program is not self._shown.get("facts"):
             self._shown["facts"] = program
             self._program_changed(program)
+        if self.editor is not None:
+            self._show_run(self.editor)
+
+    def _show_run(self, editor: Editor) -> None:
+        """Show on the blocks what runs, what was found, and what robots and variables tell."""
+        runs, document = self.session.runs, self.session.document
         mine = runs.document is document
         if self._new("blocks", (runs.blocks_revision, mine)):
-            self.editor.highlight(runs.running_blocks if mine else ())
-            self.editor.mark_stopped(runs.stopped_blocks if mine else ())
-            self.editor.set_errors(runs.block_errors if mine else {})
-            self.editor.set_warnings(runs.block_warnings if mine else {})
+            editor.highlight(runs.running_blocks if mine else ())
+            editor.mark_stopped(runs.stopped_blocks if mine else ())
+            editor.set_errors(runs.block_errors if mine else {})
+            editor.set_warnings(runs.block_warnings if mine else {})
         tried = runs.tried_value
         if self._new("tried", tried) and tried is not None and tried.document is document:
-            self.editor.show_value(tried.block, tried.words)
+            editor.show_value(tried.block, tried.words)
         alarms = alarms_of(self.session.fleet.links)
         if self._new("alarms", alarms):
-            self.editor.set_alarms(alarms)
+            editor.set_alarms(alarms)
         if self._new("values", (runs.values_revision, mine, self._watched)):
             values = runs.values if mine else {}
-            self.editor.set_variable_values(
-                {id: values[id].to_json() for id in self._watched if id in values}
-            )
+            editor.set_variable_values({id: values[id].to_json() for id in self._watched if id in values})
         if self._ticks % LIVE_EVERY == 0:
             self._show_live()
         if self._backpack is not None:
             self._backpack.tick()
-        self.waiting.tell(ready=self.editor.is_ready)
+        self.waiting.tell(ready=editor.is_ready)
         robot = bool(self.session.fleet.connected or self.session.coming)
-        self.editor.set_first_step(pgettext("block", "when started"), robot)
+        editor.set_first_step(pgettext("block", "when started"), robot)
 
     def show_current(self) -> None:
         """Show another tab at once: a person who pressed on it does not wait for the next tick."""
@@ -226,7 +240,12 @@ class BehaviourPanel(PanelWidget):
         self._shown[what] = now
         return True
 
-    def _open_editor(self) -> Editor:
+    def _open_editor(self) -> Editor | None:
+        missing = self._missing()
+        if missing is not None:
+            self._can_open = False
+            self._refuse(missing)
+            return None
         editor = self._make_editor(self._place)
         editor.changed.connect(self._edited)
         editor.recovered.connect(
@@ -256,6 +275,19 @@ class BehaviourPanel(PanelWidget):
             if had_focus:
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
         return editor
+
+    def _refuse(self, missing: MissingLibraries) -> None:
+        """Say in place of the blocks what to install; the program can be read all the same."""
+        tell_missing(self.session.alerts, missing)
+        state = EmptyState(self.theme, "circle-x", missing.title, missing.remedy)
+        if missing.command:
+            copy = partial(self._copy_command, missing.command)
+            state.set_actions([EmptyAction(_("Copy the command"), copy, "copy")])
+        self._place_column.addWidget(state)
+
+    def _copy_command(self, command: str) -> None:
+        QGuiApplication.clipboard().setText(command)
+        self.context.toast(_("Copied “{command}”").format(command=command))
 
     def _program_changed(self, program: Program) -> None:
         """The program is another one: its problems, the sensors it reads, its text."""

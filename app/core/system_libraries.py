@@ -1,0 +1,158 @@
+"""System libraries that Qt and its web engine need on Linux: which are missing, and how to install them.
+
+Wheels of PySide6 bring no system libraries, and Python's error names only the first one that is missing.
+Standard library only: it is asked when nothing else can be imported.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from app.core.alerts import Alerts
+from nep.i18n import _, listed, ngettext
+
+__all__ = ["ALERT", "LIBRARIES", "MissingLibraries", "missing_libraries", "named_in", "tell_missing"]
+
+ALERT = "system-libraries"
+LIBRARIES: Mapping[str, str] = {
+    "libEGL.so.1": "libegl1",
+    "libGL.so.1": "libgl1",
+    "libX11.so.6": "libx11-6",
+    "libXcomposite.so.1": "libxcomposite1",
+    "libXdamage.so.1": "libxdamage1",
+    "libXext.so.6": "libxext6",
+    "libXfixes.so.3": "libxfixes3",
+    "libXrandr.so.2": "libxrandr2",
+    "libXtst.so.6": "libxtst6",
+    "libasound.so.2": "libasound2",
+    "libdbus-1.so.3": "libdbus-1-3",
+    "libexpat.so.1": "libexpat1",
+    "libfontconfig.so.1": "libfontconfig1",
+    "libfreetype.so.6": "libfreetype6",
+    "libgbm.so.1": "libgbm1",
+    "libglib-2.0.so.0": "libglib2.0-0",
+    "libgthread-2.0.so.0": "libglib2.0-0",
+    "libnspr4.so": "libnspr4",
+    "libnss3.so": "libnss3",
+    "libnssutil3.so": "libnss3",
+    "libsmime3.so": "libnss3",
+    "libudev.so.1": "libudev1",
+    "libxcb.so.1": "libxcb1",
+    "libxcb-dri3.so.0": "libxcb-dri3-0",
+    "libxkbcommon.so.0": "libxkbcommon0",
+    "libxkbfile.so.1": "libxkbfile1",
+    "libz.so.1": "zlib1g",
+}
+"""Each library with its package in Debian and Ubuntu; `tools/system_packages.py` installs them.
+
+What only the plug-in for X11 needs, such as libxcb-cursor0, Qt itself names when it starts.
+"""
+_RENAMED = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
+_RENAMED_SINCE = {"debian": 13.0, "ubuntu": 24.04}
+_UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
+
+
+@dataclass(frozen=True)
+class MissingLibraries:
+    """What is missing: names of libraries, and the packages that bring those whose package is known."""
+
+    names: tuple[str, ...]
+    packages: tuple[str, ...]
+
+    @property
+    def command(self) -> str:
+        """What installs them on Debian and Ubuntu; "" when no package is known."""
+        return f"sudo apt install {' '.join(self.packages)}" if self.packages else ""
+
+    @property
+    def start_title(self) -> str:
+        """Say that there can be no window."""
+        words = ngettext(
+            "NEP Studio can't start: the system library {names} is missing.",
+            "NEP Studio can't start: the system libraries {names} are missing.",
+            len(self.names),
+        )
+        return words.format(names=listed(self.names))
+
+    @property
+    def start_remedy(self) -> str:
+        """Say how to get a window."""
+        if not self.command:
+            return _("Install what contains it, then start Studio again.")
+        words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
+        return words.format(command=self.command)
+
+    @property
+    def title(self) -> str:
+        """Say that there can be no block editor."""
+        words = ngettext(
+            "The block editor can't open: the system library {names} is missing.",
+            "The block editor can't open: the system libraries {names} are missing.",
+            len(self.names),
+        )
+        return words.format(names=listed(self.names))
+
+    @property
+    def remedy(self) -> str:
+        """Say how to get the block editor."""
+        if not self.command:
+            return _(
+                "Install what contains it, then start Studio again. The Developer layout works without it."
+            )
+        return _(
+            "On Debian and Ubuntu type “{command}” in a terminal, then start Studio again. "
+            "The Developer layout works without it."
+        ).format(command=self.command)
+
+
+def missing_libraries(
+    load: Callable[[str], object] = ctypes.CDLL,
+    system: str = sys.platform,
+    release: Callable[[], Mapping[str, str]] = platform.freedesktop_os_release,
+) -> MissingLibraries | None:
+    """Return the libraries that Qt's window and web engine need and this computer lacks; None when all load.
+
+    Each one is loaded, as importing Qt WebEngine would do: a library also fails when one that it needs fails.
+    """
+    if system != "linux":
+        return None
+    names: dict[str, None] = {}
+    for name in LIBRARIES:
+        try:
+            load(name)
+        except OSError as error:
+            names[named_in(str(error)) or name] = None
+    return _missing(tuple(names), release) if names else None
+
+
+def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
+    """Put the alert that the block editor can't open, on the start page already."""
+    alerts.put(ALERT, "error", missing.title, missing.remedy, count=0)
+
+
+def named_in(error: str) -> str:
+    """Return the library that an error of the dynamic linker names; "" when it names none."""
+    found = _UNOPENED.search(error)
+    return found[1] if found is not None else ""
+
+
+def _missing(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -> MissingLibraries:
+    packages = dict.fromkeys(LIBRARIES[name] for name in names if name in LIBRARIES)
+    is_renamed = _has_time64_names(release)
+    return MissingLibraries(
+        names, tuple(_RENAMED.get(each, each) if is_renamed else each for each in packages)
+    )
+
+
+def _has_time64_names(release: Callable[[], Mapping[str, str]]) -> bool:
+    """Whether this is a Debian or Ubuntu whose packages were renamed for 64-bit times."""
+    try:
+        told = release()
+        return float(told.get("VERSION_ID", "0")) >= _RENAMED_SINCE[told.get("ID", "")]
+    except (OSError, ValueError, KeyError):
+        return False
