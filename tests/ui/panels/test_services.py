@@ -217,3 +217,17 @@ def test_everything_is_said_and_fits_also_where_it_is_narrow(panel, qtbot) -> No
     assert unsaid(panel) == []
     panel.resize(400, 640)
     qtbot.waitUntil(lambda: panel.list.width() > 300)
+
+
+def test_nothing_of_an_answer_is_cut_off_at_the_width_of_the_developer_layout(window, panel, qtbot) -> None:
+    panel.resize(328, 700)
+    window.session.source.node.new_server("remember_face", lambda _request: {"ok": True}, threads=1)
+    press(panel.call_button)
+    answered(window, panel, qtbot)
+    assert panel.answer.chip.text.startswith("answered in ")
+    right = panel.mapToGlobal(panel.rect().topRight()).x()
+    for widget in (panel.answer.table, panel.answer.way, panel.answer.copy, panel.calls, panel.way):
+        assert widget.isVisible()
+        assert widget.mapToGlobal(widget.rect().topRight()).x() <= right
+    panel.resize(720, 640)
+    qtbot.waitUntil(lambda: panel.answer.copy.y() < panel.answer.chip.geometry().bottom())

@@ -298,3 +298,29 @@ def test_pictures_are_those_of_the_playhead(qtbot, window, session, path, whole)
     until(qtbot, window, lambda: image._message() is not None and image._message().seq == 35)
     go_to(qtbot, window, whole[2][0])  # before the first
     until(qtbot, window, lambda: image._stream.picture is None and image.pages.currentIndex() == 0)
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_the_timeline_keeps_its_height_however_often_a_recording_is_opened(
+    qtbot, window, session, path, moved
+):
+    window.resize(1440, 900)
+    window.show()
+    heights = []
+    for _ in range(3):
+        opened(qtbot, window, path)
+        bench = window.bench
+        qtbot.waitUntil(lambda bench=bench: not bench._size_timer.isActive())
+        QApplication.processEvents()
+        if moved and not heights:
+            line = QPoint(bench.width() // 2, bench.docks["timeline"].y() - 3)
+            assert bench.isSeparator(line)
+            QTest.mousePress(bench, Qt.MouseButton.LeftButton, pos=line)
+            QTest.mouseMove(bench, line - QPoint(0, 40))
+            qtbot.waitUntil(lambda bench=bench: bench.docks["timeline"].height() > 340)
+            QTest.mouseRelease(bench, Qt.MouseButton.LeftButton, pos=line - QPoint(0, 40))
+        heights.append(bench.docks["timeline"].height())
+        window.commands.run("replay.live")
+        window.tick()
+        QApplication.processEvents()
+    assert heights == pytest.approx([364 if moved else 324] * 3, abs=2)

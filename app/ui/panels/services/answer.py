@@ -7,8 +7,9 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.acting import call_words, time_words
 from app.core.run.acting.calling import CallRecord
@@ -26,6 +27,7 @@ MOST_ROWS = 500
 DEEPEST = 12
 TEXT_LETTERS = 200
 INDENT_PX = 14
+LEAST_PX, BESIDE_PX = 200, 420  # at 100 % text: of the whole, and with its head in one row
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ class AnswerView(QWidget):
 
     def __init__(self, theme: Theme, toast: ShowToast) -> None:
         super().__init__()
-        self._toast = toast
+        self._theme, self._toast = theme, toast
         self.record: CallRecord | None = None
         self.chip = Chip(theme)
         self.facts = ElidedLabel("small", "textTertiary")
@@ -132,20 +134,41 @@ class AnswerView(QWidget):
         self.pages = QStackedWidget()
         for page in (self.sentence, self.table, self.text):
             self.pages.addWidget(page)
-        head = QHBoxLayout()
-        head.setContentsMargins(12, 4, 8, 0)
-        head.setSpacing(8)
-        head.addWidget(label(_("Answer"), "title"))
-        head.addWidget(self.chip)
-        head.addWidget(self.facts, 1)
-        head.addWidget(self.way)
-        head.addWidget(self.copy)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
-        column.addLayout(head)
+        column.addLayout(self._make_head())
         column.addWidget(self.pages, 1)
         self.show_record(None)
+
+    def _make_head(self) -> QBoxLayout:
+        """Its title and how the call ended, beside or in a narrow panel above how the answer is shown."""
+        ended, shown = QHBoxLayout(), QHBoxLayout()
+        for row in (ended, shown):
+            row.setSpacing(8)
+        ended.addWidget(label(_("Answer"), "title"))
+        ended.addWidget(self.chip)
+        ended.addWidget(self.facts, 1)
+        shown.addStretch(1)
+        shown.addWidget(self.way)
+        shown.addWidget(self.copy)
+        self._head = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._head.setContentsMargins(12, 4, 8, 0)
+        self._head.setSpacing(4)
+        self._head.addLayout(ended, 1)
+        self._head.addLayout(shown)
+        return self._head
+
+    def minimumSizeHint(self) -> QSize:
+        """What is wider than the panel would be cut off with the values of the answer."""
+        return QSize(round(self._theme.scaled(LEAST_PX)), super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = self.width() < self._theme.scaled(BESIDE_PX)
+        way = QBoxLayout.Direction.TopToBottom if is_narrow else QBoxLayout.Direction.LeftToRight
+        if self._head.direction() != way:
+            self._head.setDirection(way)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
         """Show this call, or none."""

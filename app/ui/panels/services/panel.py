@@ -98,7 +98,7 @@ class ServicesPanel(PanelWidget):
         self.answer = AnswerView(self.theme, self.context.toast)
         columns: tuple[Column[CallRecord], ...] = (
             Column(
-                "at", lazy("Calls"), 76, lambda each: Cell(clock_of(each), role="textSecondary", mono=True)
+                "at", lazy("Calls"), 88, lambda each: Cell(clock_of(each), role="textSecondary", mono=True)
             ),
             Column(
                 "request",

@@ -55,6 +55,8 @@ class Workbench(QMainWindow):
         self._moved = False  # a person moved the lines between panels
         self._used: list[str] = []  # the panels that had the keyboard, the last one at the end
         self._halves: tuple[Dock, Dock] | None = None  # to be made equally large
+        self._heights: dict[str, int] = {}  # of panels below all others, as they were closed
+        self._reopened: Dock | None = None  # to have its height again
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
         # the width of the gaps was asked for before the property was there, and is remembered
@@ -139,6 +141,9 @@ class Workbench(QMainWindow):
         if halves is not None:
             way = ACROSS if halves[0].y() == halves[1].y() else DOWN
             self.resizeDocks(halves, [1, 1], way)
+        reopened, self._reopened = self._reopened, None
+        if reopened is not None and self._moved:
+            self._shrink_above(self._size_below(self._theme.scaled(1)))
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
             below = self._size_below(scale)
@@ -150,10 +155,28 @@ class Workbench(QMainWindow):
             dock = self.docks.get(name)
             if dock is None or dock.isHidden() or dock.isFloating() or self.dockWidgetArea(dock) != BELOW:
                 continue
-            high = round(min(height * scale, MOST_BELOW * self.height()))
+            high = self._heights.get(name) if self._moved else None
+            high = high or round(min(height * scale, MOST_BELOW * self.height()))
             self.resizeDocks([dock], [high], DOWN)
             return high
         return 0
+
+    def _shrink_above(self, below: int) -> None:
+        """Give the columns what is left above a panel of this height, each panel its share as it was."""
+        gap = self._theme.size("gap", self._layout.density)
+        columns: dict[int, list[Dock]] = {}
+        for dock in self.docks.values():
+            if (
+                self.dockWidgetArea(dock) == AREA
+                and not dock.isFloating()
+                and not dock.visibleRegion().isEmpty()
+            ):
+                columns.setdefault(dock.x(), []).append(dock)
+        margins = self.contentsMargins()
+        high = self.height() - margins.top() - margins.bottom() - below - gap
+        for docks in columns.values():
+            room, whole = high - gap * (len(docks) - 1), sum(dock.height() for dock in docks)
+            self.resizeDocks(docks, [round(room * dock.height() / whole) for dock in docks], DOWN)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
@@ -193,6 +216,9 @@ class Workbench(QMainWindow):
             return None
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
             join(self, self._layout, self.docks, dock)
+            self._size_timer.start(0)
+        if dock.isHidden() and name in self._layout.below:  # Qt gives it half of what it had
+            self._reopened = dock
             self._size_timer.start(0)
         dock.try_again()
         dock.show()
@@ -249,6 +275,8 @@ class Workbench(QMainWindow):
     def _closed(self, key: str) -> None:
         """A panel was closed: one beside the first of its kind ends, unless it is wanted back at once."""
         dock = self.docks.get(key)
+        if dock is not None and key in self._layout.below and not dock.isFloating():
+            self._heights[key] = dock.height()
         if dock is None or dock.number == 1:
             return
         state = dock.saved_state()
