@@ -271,12 +271,12 @@ class Topics:
 
     def add(self, name: str, batch: Batch, now: float) -> None:
         """Take over what arrived on a watched topic."""
+        if not batch.messages:  # a watched topic of which there is nothing, and perhaps never was
+            return
         topic = self._topics.get(name)
         if topic is None:
             topic = self._topics[name] = Topic(name, new=True, network=self._network)
             self.revision += 1
-        if not batch.messages:
-            return
         topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
         topic.newest = batch.messages[-1]
         topic.received += batch.arrived

@@ -324,3 +324,27 @@ def test_the_timeline_keeps_its_height_however_often_a_recording_is_opened(
         window.tick()
         QApplication.processEvents()
     assert heights == pytest.approx([364 if moved else 324] * 3, abs=2)
+
+
+def test_a_plotted_topic_that_is_not_in_the_recording_is_not_listed_in_it(qtbot, window, session, path):
+    window.show_layout("developer")
+    window.plot("/ghost", "x")
+    replay = opened(qtbot, window, path)
+    replay.seek(replay.start_ns + 1)
+    until(qtbot, window, lambda: replay.player.position_ns == replay.start_ns + 1)
+    for _ in range(5):
+        window.tick()
+    assert "/ghost" not in session.topics
+    assert "/a" in session.topics
+
+
+def test_reset_panels_ends_the_subscriptions_of_a_plot_and_keeps_its_curves(qtbot, window, session):
+    window.show()
+    window.show_layout("developer")
+    window.plot("/ghost", "x")
+    assert session.series.topics == ("/ghost",)
+    window.commands.run("layout.reset")
+    assert session.series.topics == ()
+    assert "plot" not in window.bench.open_names()
+    window.open_panel("plot")
+    assert session.series.topics == ("/ghost",)

@@ -7,7 +7,7 @@ part; a column grows with the text, up to what the layout lets it have.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow
@@ -92,6 +92,28 @@ def fit(
             [dock for dock, *_ in there], shares(heights, room, keep=fixed), Qt.Orientation.Vertical
         )
     bench.resizeDocks(heads, shares(wanted, wide, keep=keep), Qt.Orientation.Horizontal)
+
+
+def shrink_above(
+    bench: QMainWindow,
+    docks: Iterable[QDockWidget],
+    area: Qt.DockWidgetArea,
+    gap: int,
+    *,
+    below: int,
+) -> None:
+    """Give the columns of an area what is left above ``below`` px, each panel its share as it was."""
+    columns: dict[int, list[QDockWidget]] = {}
+    for dock in docks:
+        is_seen = not dock.isFloating() and not dock.visibleRegion().isEmpty()
+        if is_seen and bench.dockWidgetArea(dock) == area:
+            columns.setdefault(dock.x(), []).append(dock)
+    margins = bench.contentsMargins()
+    high = bench.height() - margins.top() - margins.bottom() - below
+    for column in columns.values():
+        room, whole = high - gap * (len(column) - 1), sum(dock.height() for dock in column)
+        heights = [round(room * dock.height() / whole) for dock in column]
+        bench.resizeDocks(column, heights, Qt.Orientation.Vertical)
 
 
 def _first(bench: QMainWindow, docks: Mapping[str, QDockWidget], names: Sequence[str]) -> QDockWidget | None:

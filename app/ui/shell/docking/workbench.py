@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered
 from app.ui.shell.docking.dock import Dock, key_of, kind_of, make_dock
 from app.ui.shell.docking.layouts import Fold, Layout
-from app.ui.shell.docking.sizes import fit
+from app.ui.shell.docking.sizes import fit, shrink_above
 from app.ui.theme.theme import Theme
 from nep.i18n import _
 
@@ -56,6 +56,7 @@ class Workbench(QMainWindow):
         self._used: list[str] = []  # the panels that had the keyboard, the last one at the end
         self._halves: tuple[Dock, Dock] | None = None  # to be made equally large
         self._heights: dict[str, int] = {}  # of panels below all others, as they were closed
+        self._set_aside: dict[str, Mapping[str, object]] = {}  # of panels that ended when all were put back
         self._reopened: Dock | None = None  # to have its height again
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setProperty("density", layout.density)
@@ -92,8 +93,10 @@ class Workbench(QMainWindow):
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
-            if old.number > 1:
-                self._end(old)
+            if old.description.several and old.key not in self._layout.at_first:
+                if old.number == 1:
+                    self._set_aside[old.key] = old.saved_state()
+                self._end(old)  # a plot would go on to look at its topics
         self._halves = None
         # All columns first, then what is below in each: the other way round the rows would cross the columns.
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
@@ -143,7 +146,9 @@ class Workbench(QMainWindow):
             self.resizeDocks(halves, [1, 1], way)
         reopened, self._reopened = self._reopened, None
         if reopened is not None and self._moved:
-            self._shrink_above(self._size_below(self._theme.scaled(1)))
+            gap = self._theme.size("gap", self._layout.density)
+            below = self._size_below(self._theme.scaled(1))
+            shrink_above(self, self.docks.values(), AREA, gap, below=below + gap)
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
             below = self._size_below(scale)
@@ -160,23 +165,6 @@ class Workbench(QMainWindow):
             self.resizeDocks([dock], [high], DOWN)
             return high
         return 0
-
-    def _shrink_above(self, below: int) -> None:
-        """Give the columns what is left above a panel of this height, each panel its share as it was."""
-        gap = self._theme.size("gap", self._layout.density)
-        columns: dict[int, list[Dock]] = {}
-        for dock in self.docks.values():
-            if (
-                self.dockWidgetArea(dock) == AREA
-                and not dock.isFloating()
-                and not dock.visibleRegion().isEmpty()
-            ):
-                columns.setdefault(dock.x(), []).append(dock)
-        margins = self.contentsMargins()
-        high = self.height() - margins.top() - margins.bottom() - below - gap
-        for docks in columns.values():
-            room, whole = high - gap * (len(docks) - 1), sum(dock.height() for dock in docks)
-            self.resizeDocks(docks, [round(room * dock.height() / whole) for dock in docks], DOWN)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.MouseButtonPress and isinstance(event, QMouseEvent):
@@ -201,6 +189,8 @@ class Workbench(QMainWindow):
         if name in self._layout.taller:
             dock.visibilityChanged.connect(lambda: self._size_timer.start(0))
         self.docks[key] = dock
+        if key in self._set_aside:
+            dock.give_back(self._set_aside.pop(key))
         return dock
 
     def open(self, name: str) -> Dock | None:
