@@ -12,6 +12,7 @@ import importlib
 import logging
 import os
 import runpy
+import subprocess
 import sys
 import threading
 import time
@@ -137,12 +138,22 @@ def _main(given: Sequence[str]) -> int:
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
     allow_many()
-    from app.ui.application import Options, run  # noqa: PLC0415  without a window nothing loads Qt
+    from app.ui.application import RESTART, Options, run  # noqa: PLC0415  without a window nothing loads Qt
 
     code = run(
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
     )
+    if code == RESTART:
+        start_again(options.theme)
+        code = 0
     return end_process(code)
+
+
+def start_again(theme: str | None) -> None:
+    """Start Studio as a process of its own, once this one has closed everything."""
+    from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  for this alone
+
+    subprocess.Popen(studio_command(theme), stdin=subprocess.DEVNULL, env=fresh_environ(os.environ))
 
 
 def self_test(folder: Path, *, web: bool) -> int:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
+
+from nep.i18n import LANG_VARIABLE
 
 Fate = Literal["", "replaced", "gone"]
 
@@ -14,6 +17,17 @@ def module_command(module: str) -> list[str]:
     if getattr(sys, "frozen", False):
         return [sys.executable, "--module", module]
     return [sys.executable, "-m", module]
+
+
+def studio_command(theme: str | None = None) -> list[str]:
+    """The command that starts Studio itself as this one was, without the files that it was given."""
+    own = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
+    return [*own, *(("--theme", theme) if theme is not None else ())]
+
+
+def fresh_environ(environ: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment without the language that `nep.i18n.begin` set, so that the settings count."""
+    return {name: value for name, value in environ.items() if name not in {LANG_VARIABLE, "LANGUAGE"}}
 
 
 class OwnProgram:

@@ -45,6 +45,8 @@ from app.ui.theme.theme import MODES, Theme
 from nep.i18n import ENGLISH, _, language, listed
 
 LOG_EVERY_MS = 500
+RESTART = -1
+"""What `run` returns when a person asked for a restart."""
 BEGUN = "begun"  # kept since the first start
 WEB_VIEW = "app.ui.blockly.view"
 SOON = (
@@ -276,7 +278,7 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
 
 
 def run(options: Options) -> int:
-    """Show the window until it is closed; the exit code is 0 when that was in order, 2 when none can open."""
+    """Show the window until it is closed; 0 when that was in order, 2 when none can open, or `RESTART`."""
     bring_here()
     meeting_place = single_instance.place(home())
     turn = FileLock(home() / "starting")
@@ -311,6 +313,7 @@ def _show(
     window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
+    window.can_restart = not options.alone  # another window has no tabs of its own at the next start
     close_when_asked(window, this_run)
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.take(session.console.add))
@@ -342,4 +345,4 @@ def _show(
     speaker.close()
     if driver is not None and not driver.well:
         return 1
-    return code
+    return RESTART if window.wants_restart else code

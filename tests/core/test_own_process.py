@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
-from app.core.own_process import OwnProgram
+from app.core.own_process import OwnProgram, fresh_environ, studio_command
 from app.core.session import Session
 from app.core.storage.settings import Settings
 
@@ -81,3 +82,9 @@ def test_what_became_of_a_behaviour_is_still_told_after_the_look_at_studios_own_
         ]
     finally:
         session.close()
+
+
+def test_studio_starts_again_in_the_language_of_the_settings() -> None:
+    environ = {"NEP_LANG": "en", "LANGUAGE": "es", "NEP_MASTER": "127.0.0.1:7781"}
+    assert fresh_environ(environ) == {"NEP_MASTER": "127.0.0.1:7781"}
+    assert studio_command("dark") == [sys.executable, "-m", "app", "--theme", "dark"]

@@ -96,6 +96,7 @@ class MainWindow(QMainWindow):
         self.state = WindowState(session.settings, self.complain)
         self.saved_layouts = SavedLayouts(self.state, self.complain)
         self.on_shut: Callable[[], object] = lambda: None
+        self.can_restart = self.wants_restart = False
         self._showing = self._left = ""
         self.benches: dict[str, Workbench] = {}
         self._ahead: dict[str, Workbench] = {}  # with panels, for layouts that nobody has gone to yet
@@ -528,6 +529,14 @@ class MainWindow(QMainWindow):
         self.gc_freeze.start()
         self.bench_made.connect(self.gc_freeze.start)
 
+    def restart(self) -> str:
+        """Close the window and start Studio again; why that can't be done now, "" when it is done."""
+        if self._may_move():
+            return _("Press Stop first: Studio can restart when no program runs and no robot moves")
+        self.wants_restart = True
+        self.close()
+        return ""
+
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
             if self._moves():
@@ -536,6 +545,7 @@ class MainWindow(QMainWindow):
                 event.ignore()
                 return
             if not self._may_lose_work():
+                self.wants_restart = False
                 self._flush_before_close.stay()
                 event.ignore()
                 return

@@ -17,7 +17,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox
-from tests.ui.shell_parts import Answers
+from tests.ui.shell_parts import Answers, robots_in
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -150,6 +150,7 @@ def test_the_language_is_kept_for_the_next_start(
     assert not sheet.from_next_start.isVisible()
     press(sheet.language, "es")
     assert sheet.from_next_start.isVisible()
+    assert not sheet.restart.isVisible(), "a window of its own keeps no tabs"
     assert Settings(home).get("language", "") == "es"
     press(sheet.language, "en")
     assert not sheet.from_next_start.isVisible()
@@ -189,3 +190,27 @@ def test_it_says_whether_robots_are_heard(
     window.session.voices.speaker = Silent()
     commands.run("settings.open")
     assert sheet.voice.text().startswith("This computer has no voice for French. ")
+
+
+def test_another_language_offers_a_restart_that_waits_until_nothing_moves(
+    qtbot, window: MainWindow, commands: Commands
+) -> None:
+    window.can_restart = True
+    window.show()
+    commands.run("settings.open")
+    sheet = window.findChild(SettingsSheet)
+    assert sheet is not None
+    assert not sheet.restart.isVisible()
+    press(sheet.language, "es")
+    assert sheet.restart.isVisible()
+    assert not sheet.from_next_start.isVisible()
+    robots = window.session.fleet._links
+    robots["Robot 1"] = robots_in("busy").fleet.links[0]
+    sheet.restart.click()
+    assert window.isVisible()
+    assert not window.wants_restart
+    robots.clear()
+    sheet.restart.click()
+    assert window.wants_restart
+    assert not window.isVisible()
+    assert Settings(window.session.settings.path.parent).get("language", "") == "es"

@@ -82,3 +82,10 @@ class Shell(Protocol):
 
     def close(self) -> bool:
         """Close the window; whether it did."""
+
+    @property
+    def can_restart(self) -> bool:
+        """Whether Studio can start again by itself, with everything that is open."""
+
+    def restart(self) -> str:
+        """Close the window and start Studio again; why that can't be done now, "" when it is done."""

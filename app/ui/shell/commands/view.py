@@ -234,9 +234,15 @@ class ViewCommands:
                 self._session.settings,
                 self._files.asks,
                 self._voice_words,
+                restart=self._restart if shell.can_restart else None,
             )
             self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
         self._settings_sheet.open()
+
+    def _restart(self) -> None:
+        why_not = self._shell.restart()
+        if why_not:
+            self._shell.say(why_not)
 
     def _voice_words(self) -> str:
         """Also what was found when a robot spoke: an engine may be there, and have no voice."""

@@ -45,12 +45,21 @@ class SettingsSheet(Overlay):
         settings: Settings,
         files: FileDialogs,
         voice: Callable[[], str],
+        *,
+        restart: Callable[[], object] | None = None,
     ) -> None:
-        """``voice`` says whether robots are heard, and if not, why; it is asked at each opening."""
+        """``voice`` says whether robots are heard, and if not, why; it is asked at each opening.
+
+        ``restart`` starts Studio again, with everything that is open; None where that can't be done.
+        """
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
         self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
+        self.restart = Button(theme, _("Restart now"), "rotate-ccw", size="form")
+        self._can_restart = restart is not None
+        if restart is not None:
+            self.restart.clicked.connect(restart)
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
         look = pgettext("colours of the window", "Look")
         self.mode = Segments(theme, modes, check=True, size="form", name=look)
@@ -116,6 +125,7 @@ class SettingsSheet(Overlay):
         spoken = QHBoxLayout()
         spoken.addWidget(self.language)
         spoken.addWidget(self.from_next_start)
+        spoken.addWidget(self.restart)
         spoken.addStretch(1)
         heard = QHBoxLayout()
         heard.addWidget(self.voice, 1)
@@ -159,7 +169,9 @@ class SettingsSheet(Overlay):
         theme = self.theme
         chosen = self._chosen_language()
         self.language.set_value(chosen)
-        self.from_next_start.setVisible(chosen != i18n.language())
+        is_new = chosen != i18n.language()
+        self.from_next_start.setVisible(is_new and not self._can_restart)
+        self.restart.setVisible(is_new and self._can_restart)
         self.mode.set_value(theme.mode)
         self.text.set_value(str(theme.text_percent))
         self.contrast.set_value(theme.contrast)
