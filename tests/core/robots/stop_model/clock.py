@@ -1,0 +1,185 @@
+"""Virtual time for the threads of the code under test."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+SETTLE_LIMIT_S = 30.0
+"""Real seconds after which a history is given up as deadlocked."""
+_END = float("inf")
+_SHORTEST_S = 1e-6
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(eq=False)
+class _Waiter:
+    thread: threading.Thread
+    deadline: float
+    is_ready: Callable[[], bool]
+    wake: Callable[[], None]
+    is_frozen: Callable[[], bool]
+
+
+@dataclass(order=True)
+class _Timer:
+    due: float
+    number: int
+    call: Callable[[], None] = field(compare=False)
+
+
+class SimulatedClock:
+    """Time that passes in `advance` only, and only while every simulated thread waits.
+
+    A thread is simulated when its name begins with one of the prefixes given to `follow`.
+    """
+
+    def __init__(self) -> None:
+        self._now = 1000.0
+        self._lock = threading.Lock()
+        self._waiters: dict[int, _Waiter] = {}
+        self._timers: list[_Timer] = []
+        self._numbers = itertools.count()
+        self._prefixes: list[str] = []
+        self._has_ended = False
+
+    def now(self) -> float:
+        return self._now
+
+    def follow(self, prefix: str) -> None:
+        self._prefixes.append(prefix)
+
+    def call_at(self, due: float, call: Callable[[], None]) -> None:
+        """Call something in the thread of `advance` once it is `due`."""
+        heapq.heappush(self._timers, _Timer(due, next(self._numbers), call))
+
+    def end(self) -> None:
+        """End the history: from now on every wait returns at once, and every time limit is over."""
+        self._has_ended = True
+        self._now += 1e6
+        self.wake_all()
+
+    # -- waiting, in the threads of the code under test
+
+    def wait(
+        self, event: threading.Event, timeout_s: float | None, is_frozen: Callable[[], bool] = _never
+    ) -> bool:
+        """Wait until the event is set (True) or the time is over (False), as `app.robots.driver.call.Clock`.
+
+        While `is_frozen`, neither ends the wait: the process is halted.
+        """
+        condition = event._cond  # type: ignore[attr-defined]  # the only way to wake one wait without setting it
+
+        def wake() -> None:
+            with condition:
+                condition.notify_all()
+
+        return self._wait(event.is_set, condition, timeout_s, wake, is_frozen)
+
+    def condition(self) -> SimulatedCondition:
+        return SimulatedCondition(self)
+
+    def _wait(
+        self,
+        is_ready: Callable[[], bool],
+        condition: threading.Condition,
+        timeout_s: float | None,
+        wake: Callable[[], None],
+        is_frozen: Callable[[], bool] = _never,
+        *,
+        is_held: bool = False,
+    ) -> bool:
+        # Rounded up: a rest of a span that is too small to add would never pass.
+        deadline = _END if timeout_s is None else self._now + max(_SHORTEST_S, timeout_s)
+        me = threading.current_thread()
+        waiter = _Waiter(me, deadline, is_ready, wake, is_frozen)
+        if not is_held:
+            condition.acquire()
+        try:
+            while not self._has_ended and (is_frozen() or not (is_ready() or self._now >= deadline)):
+                with self._lock:
+                    self._waiters[id(waiter)] = waiter
+                condition.wait()
+                with self._lock:
+                    self._waiters.pop(id(waiter), None)
+            return is_ready()
+        finally:
+            with self._lock:
+                self._waiters.pop(id(waiter), None)
+            if not is_held:
+                condition.release()
+
+    # -- time, in the thread of the test
+
+    def wake_all(self) -> None:
+        """Let every thread look again: a process goes on."""
+        with self._lock:
+            waiters = list(self._waiters.values())
+        for waiter in waiters:
+            waiter.wake()
+
+    def settle(self) -> None:
+        """Return once every simulated thread waits for something that has not happened."""
+        limit = time.monotonic() + SETTLE_LIMIT_S
+        while not self._is_settled():
+            if time.monotonic() > limit:
+                raise AssertionError(f"threads do not come to rest: {self._where()}")
+            time.sleep(0)
+
+    def _where(self) -> str:
+        frames = sys._current_frames()
+        stacks = [(each.name, frames.get(each.ident or 0)) for each in self._simulated()]
+        return "\n".join(f"{name}:\n{''.join(traceback.format_stack(frame))}" for name, frame in stacks)
+
+    def _simulated(self) -> list[threading.Thread]:
+        prefixes = tuple(self._prefixes)
+        return [thread for thread in threading.enumerate() if thread.name.startswith(prefixes)]
+
+    def _is_settled(self) -> bool:
+        with self._lock:
+            waiters = list(self._waiters.values())
+        awake = [each for each in waiters if not each.is_frozen()]
+        if any(each.deadline <= self._now or each.is_ready() for each in awake):
+            return False
+        resting = {each.thread for each in waiters}
+        return all(thread in resting for thread in self._simulated())
+
+    def next_due(self) -> float:
+        """When the next thread or timer is due."""
+        with self._lock:
+            due = [each.deadline for each in self._waiters.values() if not each.is_frozen()]
+        return min([*due, *(timer.due for timer in self._timers[:1])], default=_END)
+
+    def move_to(self, now: float) -> None:
+        """Let it be this time; wake the threads and call the timers that are due."""
+        self._now = max(self._now, now)
+        with self._lock:
+            due = [each for each in self._waiters.values() if each.deadline <= self._now]
+        for waiter in due:
+            waiter.wake()
+        while self._timers and self._timers[0].due <= self._now:
+            heapq.heappop(self._timers).call()
+
+
+class SimulatedCondition(threading.Condition):
+    """A condition whose waits take virtual time."""
+
+    def __init__(self, clock: SimulatedClock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def wait_for(self, predicate: Callable[[], object], timeout: float | None = None) -> bool:
+        def wake() -> None:
+            with self:
+                self.notify_all()
+
+        return self._clock._wait(lambda: bool(predicate()), self, timeout, wake, is_held=True)

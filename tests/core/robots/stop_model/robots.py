@@ -1,0 +1,147 @@
+"""Simulated robots: the real driver kit on a simulated body, clock and network; and strangers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, cast
+
+import orjson
+
+from app.robots.kit import Call, Driver, Failed, Kind, Link, Range, action, safe_stop
+from tests.core.robots.stop_model.clock import SimulatedClock
+from tests.core.robots.stop_model.network import SimulatedNetwork, SimulatedNode
+
+TURN_S = 1.0
+WITHIN_S = 0.3
+WATCHDOG_S = 1.0
+
+
+class Rover:
+    """A body that can drive on (until it is stopped) and turn (for a second)."""
+
+    def __init__(self, link: Link) -> None:
+        self.link = link
+        self.is_driving = self.is_turning = False
+        self.brake_fails = False
+        self.stops = 0
+
+    @property
+    def is_moving(self) -> bool:
+        return self.is_driving or self.is_turning
+
+    @action("drive %speed m/s", category="Movement", icon="move", uses=("base",), on_busy="replace",
+            risk="locomotes", cancellable=False, repeat_s=0.2)  # fmt: skip
+    def drive(self, call: Call, speed: Annotated[float, Range(-1, 1, 0.1, "m/s")] = 0.2) -> None:  # noqa: ARG002
+        """Keep driving until the next drive or stop."""
+        self.is_driving = speed != 0
+
+    @action("turn %angle degrees", category="Movement", icon="move", uses=("base",), on_busy="queue",
+            risk="locomotes", timeout_s=5)  # fmt: skip
+    def turn(self, call: Call, angle: Annotated[float, Range(-90, 90, 5, "deg")] = 45) -> None:  # noqa: ARG002
+        """Turn for a second."""
+        self.is_turning = True
+        try:
+            call.wait(TURN_S)
+        finally:
+            self.is_turning = False
+
+    @safe_stop(watchdog_s=WATCHDOG_S, within_s=WITHIN_S)
+    def stop(self) -> None:
+        """Stand still."""
+        if self.brake_fails:
+            raise Failed("the brake is stuck")
+        self.stops += 1
+        self.is_driving = False
+
+
+ROVER = Kind(model="rover", title="Rover", body=Rover)
+
+
+class RobotClock:
+    """The clock of one robot's process, which stands still for a frozen or dead one."""
+
+    def __init__(self, clock: SimulatedClock, node: SimulatedNode) -> None:
+        self._clock, self._node = clock, node
+
+    def now(self) -> float:
+        return self._clock.now()
+
+    def wait(self, event: Any, timeout_s: float | None) -> bool:
+        return self._clock.wait(event, timeout_s, lambda: not self._node.is_running)
+
+    def wait_for(self, *given: Any) -> bool:
+        raise NotImplementedError(given)
+
+
+class SimulatedRobot:
+    """One process that is a robot; another of the same name is another one."""
+
+    def __init__(self, network: SimulatedNetwork, clock: SimulatedClock, name: str, *, connects_late: bool) -> None:
+        self.name, self.clock = name, clock
+        self.node = network.node(f"{name} driver")
+        self.node.is_connecting = connects_late
+        self.driver = Driver(ROVER, name, cast("Any", self.node), clock=cast("Any", RobotClock(clock, self.node)))
+        self.driver.start()
+
+    @property
+    def body(self) -> Rover:
+        body = self.driver.body
+        assert isinstance(body, Rover)
+        return body
+
+    @property
+    def id(self) -> str:
+        return self.node.id
+
+    @property
+    def is_deciding(self) -> bool:
+        """Whether the thread that decides what the robot does is alive."""
+        tasks = self.driver._tasks
+        return tasks is not None and tasks._thread.is_alive()
+
+    def thaw(self) -> None:
+        self.node.is_frozen = False
+        self.clock.wake_all()
+
+    def __repr__(self) -> str:
+        state = "dead" if self.node.is_dead else "frozen" if self.node.is_frozen else "running"
+        return f"<{self.name} {self.id[-3:]} {state}{' moving' if self.body and self.body.is_moving else ''}>"
+
+
+class Stranger:
+    """A hostile program: it forges answers, sends deep values and describes robots that are not there."""
+
+    def __init__(self, network: SimulatedNetwork) -> None:
+        self.network = network
+        self.node = network.node("stranger")
+        self._made: dict[str, Any] = {}
+
+    def _publisher(self, topic: str, msg_type: str) -> Any:
+        if topic not in self._made:
+            self._made[topic] = self.node.new_pub(topic, msg_type, latched=msg_type == "robot/description")
+        self.network.connect()
+        return self._made[topic]
+
+    def answer(self, name: str, ids: list[str], *, times: int) -> None:
+        """Answer every stop in the name of a robot, many times."""
+        publisher = self._publisher(f"/{name}/answer", "robot/answer")
+        for _each in range(times):
+            for id in ids or ["stop-none"]:
+                publisher.publish({"id": id, "op": "stop", "state": "succeeded"})
+
+    def send_deep(self, topic: str, depth: int) -> None:
+        """Send a value that is nested deeply where a command or an answer is expected."""
+        value = b"[" * depth + b"]" * depth
+        message = b'{"op":"invoke","id":"z","from":"e","state":"succeeded","action":' + value + b"}"
+        self._publisher(topic, "robot/command" if topic.endswith("command") else "json").send(message)
+
+    def send_many_keys(self, topic: str, count: int) -> None:
+        value = {"op": "invoke", "id": "z", "from": "e", "action": "drive", "input": {f"k{n}": n for n in range(count)}}
+        self._publisher(topic, "robot/command").send(orjson.dumps(value))
+
+    def describe(self, names: list[str], like: SimulatedRobot) -> None:
+        """Announce robots that are not there."""
+        for name in names:
+            description = dict(like.driver.description)
+            text = orjson.dumps(description).replace(f"/{like.name}/".encode(), f"/{name}/".encode())
+            described = orjson.loads(text.replace(f'"{like.name}"'.encode(), f'"{name}"'.encode()))
+            self._publisher(f"/{name}/description", "robot/description").publish(described)

@@ -1,0 +1,153 @@
+"""Studio's session on a simulated network, with a person who moves robots and presses Stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from app.blocks.model.program import Program
+from app.core.network.source import GraphSeen, MasterFound
+from app.core.robots.stop import RobotStopper
+from app.core.run.runner import RunnerEvent
+from app.core.run.wanted import Wanted
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from app.robots.identity import program_of
+from tests.core.robots.stop_model.clock import SimulatedClock
+from tests.core.robots.stop_model.network import SimulatedNetwork, SimulatedNode, SimulatedSource
+
+GRAPH_POLL_S = 0.4
+ALIVE_S = 0.2
+
+
+class SimulatedHeartbeat:
+    """`app.robots.heartbeat.Heartbeat` in virtual time, without a thread."""
+
+    def __init__(self, clock: SimulatedClock, sender: str) -> None:
+        self._clock, self._sender = clock, sender
+        self._robots: dict[str, Callable[[Mapping[str, object]], object]] = {}
+        self._is_due = False
+
+    def beat(self, robot: str, publish: Callable[[Mapping[str, object]], object]) -> None:
+        self._robots[robot] = publish
+        if not self._is_due:
+            self._is_due = True
+            self._clock.call_at(self._clock.now() + ALIVE_S, self._tell)
+
+    def rest(self, robot: str) -> None:
+        self._robots.pop(robot, None)
+
+    def close(self) -> None:
+        self._robots.clear()
+
+    def _tell(self) -> None:
+        self._is_due = bool(self._robots)
+        for publish in list(self._robots.values()):
+            publish({"id": "alive", "op": "alive", "from": self._sender, "action": "", "input": {}})
+        if self._robots:
+            self._clock.call_at(self._clock.now() + ALIVE_S, self._tell)
+
+
+class SimulatedRunner:
+    """A program that tells robots to drive, in a process of its own."""
+
+    _runs = 0
+
+    def __init__(self, clock: SimulatedClock, network: SimulatedNetwork, post: Callable[[RunnerEvent], object]) -> None:
+        SimulatedRunner._runs += 1
+        self.run, self.pid = SimulatedRunner._runs, 4242
+        self.program_key = f"key {self.run}"
+        self.program_id = program_of(self.program_key)
+        self._clock, self._network, self._post = clock, network, post
+        self.node: SimulatedNode | None = None
+        self._alive = SimulatedHeartbeat(clock, self.program_id)
+
+    def start(self, program: Program, *_given: object, **_options: object) -> None:
+        self.node = self._network.node("program")
+        self.publishers = {name: self.node.new_pub(f"/{name}/command", "robot/command") for name in program.robots}
+        self._network.connect()
+        for name, publisher in self.publishers.items():
+            self.move(name, "drive")
+            self._alive.beat(name, publisher.publish)
+
+    def move(self, name: str, action: str) -> None:
+        publisher = self.publishers[name]
+        command = {"id": f"p{self.run}", "op": "invoke", "from": self.program_id, "action": action, "input": {}}
+        publisher.publish(command)
+
+    def stop(self) -> None:
+        if self.node is not None:
+            self._alive.close()
+            self.node.close()
+            self._post(RunnerEvent("ended", self.run))
+
+    def set_robots(self, *_given: object) -> None:
+        pass
+
+    def set_breakpoints(self, *_given: object) -> None:
+        pass
+
+    def set_pace(self, *_given: object) -> None:
+        pass
+
+
+class _Driving(Wanted):
+    """A behaviour that drives robots."""
+
+    __slots__ = ("robots",)
+
+    def program(self) -> Program:
+        robots: tuple[str, ...] = self.robots  # type: ignore[attr-defined]
+        return Program("driving", "", "", {}, robots=robots, actions={name: ("drive",) for name in robots}, starts=1)
+
+    def problems(self, program: Program) -> dict[str, str]:  # noqa: ARG002
+        return {}
+
+
+class SimulatedStudio:
+    """Studio without its window, its master and its processes; everything else is the real code."""
+
+    def __init__(self, network: SimulatedNetwork, clock: SimulatedClock, folder: Path) -> None:
+        self.network, self.clock = network, clock
+        self.node = network.node("studio")
+        self.session = Session(
+            Settings(folder),
+            address="127.0.0.1:9",
+            source=cast("Any", SimulatedSource),
+            journal_folder=folder,
+            start_processes=False,
+            clock=clock.now,
+        )
+        source = self.session.source
+        assert isinstance(source, SimulatedSource)
+        source.node, self._source = self.node, source
+        fleet, runs = self.session.fleet, self.session.runs
+        fleet._alive = cast("Any", SimulatedHeartbeat(clock, "studio"))
+        fleet._tries._rest = fleet._alive.rest
+        runs._make_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
+        self.session.stopper = stopper = RobotStopper(cast("Any", self.node), clock.now)
+        stopper._changed = clock.condition()
+        source.post(MasterFound("127.0.0.1:9"))
+
+    def see(self) -> None:
+        self._source.post(GraphSeen(self.network.view(), 0.0))
+
+    def tick(self) -> None:
+        self.session.tick()
+
+    # -- what a person does
+
+    def allow(self) -> None:
+        """Answer the question whether robots may move with yes."""
+        if self.session.fleet.permission.question is not None:
+            self.session.fleet.permission.answer(let=True)
+
+    def run(self, robots: Sequence[str]) -> None:
+        wanted = _Driving(self.session.documents.current)
+        object.__setattr__(wanted, "robots", tuple(robots))
+        self.session.runs._want(wanted)
+        self.allow()
+
+    def close(self) -> None:
+        self.session.close()

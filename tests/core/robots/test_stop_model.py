@@ -1,0 +1,332 @@
+"""A model of Stop: whatever happens to robots, links and strangers, a proven stop is true.
+
+Studio's session, its stopper and the robots' driver kit are the real code; time, network, bodies and people
+are simulated (`tests.core.robots.stop_model`). ``NEP_STOP_HISTORIES=100000`` searches that many random
+histories instead of the fixed ones.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+
+from app.core.faults import ALERT
+from app.errors import AppError
+from nep.messages.message import Message
+from tests.core.robots.stop_model.clock import SimulatedClock
+from tests.core.robots.stop_model.network import SimulatedNetwork
+from tests.core.robots.stop_model.robots import SimulatedRobot, Stranger
+from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedStudio
+
+HISTORIES = int(os.environ.get("NEP_STOP_HISTORIES", "0"))
+FIXED_HISTORIES = 2000
+STEPS = 10
+NAMES = ("Arm", "Base")
+REACT_S = 0.5
+"""A robot that is reached stands still this long after Stop was pressed."""
+FINAL = {"succeeded", "failed", "canceled"}
+
+names = st.sampled_from(NAMES)
+picks = st.integers(0, 3)
+waits = st.sampled_from([0.0, 0.05, 0.6, 1.7])
+
+
+class StopModel(RuleBasedStateMachine):
+    """One history. What the test knows for itself (`told`, `answered`) is read off the network."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clock = SimulatedClock()
+        for prefix in ("studio-stop", *(f"{name} " for name in NAMES)):
+            self.clock.follow(prefix)
+        self.network = SimulatedNetwork(self.clock.now)
+        self.folder = tempfile.TemporaryDirectory(prefix="nep-stop-")
+        self.studio = SimulatedStudio(self.network, self.clock, Path(self.folder.name))
+        self.stranger = Stranger(self.network)
+        self.robots: list[SimulatedRobot] = []
+        self.told: dict[SimulatedRobot, dict[str, int]] = {}  # ids of commands that moved it -> when it was sent
+        self.press = 0
+        self.stops: dict[str, tuple[int, int]] = {}  # id of a stop -> the press that it belongs to, when it was sent
+        self.answered: dict[int, set[str]] = defaultdict(set)  # press -> robots whose answer reached Studio
+        self.pressed_s = 0.0
+        self.undisturbed: set[str] = set()  # robots that were reachable ever since Stop was pressed
+        self._read_sent = self._read_delivered = 0
+        self._seen_report: object = None
+        self._poll()
+        self._settle()
+
+    # -- time
+
+    def _poll(self) -> None:
+        self.studio.see()
+        self.clock.call_at(self.clock.now() + GRAPH_POLL_S, self._poll)
+
+    def _settle(self) -> None:
+        while True:
+            self.clock.settle()
+            self.network.connect()
+            self._follow_network()
+            busy = self.network.deliver()
+            self.clock.settle()
+            before = len(self.network.sent), self.network.revision
+            self.studio.tick()
+            self.clock.settle()
+            self._follow_network()
+            if not busy and before == (len(self.network.sent), self.network.revision):
+                return
+
+    def _advance(self, seconds: float) -> None:
+        until = self.clock.now() + seconds
+        while self.clock.now() < until:
+            self.clock.move_to(min(until, self.clock.next_due()))
+            self._settle()
+            self._check()
+
+    def _follow_network(self) -> None:
+        """Read off the network who was told to move, who was asked to stop and whose answers arrived."""
+        network = self.network
+        for place, (publisher, message, reached) in enumerate(network.sent[self._read_sent :], self._read_sent):
+            value = self._value(publisher.node.id, message, "command")
+            if value.get("op") == "stop":
+                self.stops.setdefault(str(value["id"]), (self.press, place))
+            elif value.get("op") == "invoke":
+                robots = [each for each in self.robots if each.id in reached]
+                for robot in robots:
+                    self.told.setdefault(robot, {})[str(value["id"])] = place
+                self.undisturbed -= {each.id for each in robots}
+        self._read_sent = len(network.sent)
+        for publisher, subscriber, message in network.delivered[self._read_delivered :]:
+            value = self._value(publisher.node.id, message, "answer")
+            robot = next((each for each in self.robots if each.id == publisher.node.id), None)
+            if robot is not None and subscriber.node is self.studio.node and value:
+                self._hear(robot, value)
+        self._read_delivered = len(network.delivered)
+
+    def _value(self, node_id: str, message: Message, leaf: str) -> dict[str, object]:
+        is_hostile = node_id == self.stranger.node.id
+        value = message.payload if message.topic.endswith(f"/{leaf}") and not is_hostile else None
+        return value if isinstance(value, dict) else {}
+
+    def _hear(self, robot: SimulatedRobot, answer: dict[str, object]) -> None:
+        """An answer of a robot reached Studio."""
+        told, id, state = self.told.get(robot, {}), str(answer["id"]), answer["state"]
+        if answer["op"] == "stop" and state == "succeeded" and id in self.stops:
+            press, asked = self.stops[id]
+            self.answered[press].add(robot.id)
+            for command in [each for each, place in told.items() if place < asked]:
+                del told[command]
+        elif answer["op"] == "invoke" and answer["action"] == "turn" and state in FINAL:
+            if not robot.body.is_turning:
+                told.pop(id, None)
+
+    # -- robots come, freeze, die and come back
+
+    @initialize(both=st.booleans())
+    def start(self, both: bool) -> None:
+        for name in NAMES[: 1 + both]:
+            self.robots.append(SimulatedRobot(self.network, self.clock, name, connects_late=False))
+        self._settle()
+        self._advance(GRAPH_POLL_S)
+
+    @rule(name=names, late=st.booleans())
+    def start_robot(self, name: str, late: bool) -> None:
+        if len([each for each in self.robots if each.name == name]) < 3:
+            self.robots.append(SimulatedRobot(self.network, self.clock, name, connects_late=late))
+            self._settle()
+
+    def _pick(self, pick: int, robots: Sequence[SimulatedRobot]) -> SimulatedRobot:
+        return robots[pick % len(robots)]
+
+    @precondition(lambda self: any(each.node.is_connecting for each in self.robots))
+    @rule()
+    def connect(self) -> None:
+        for robot in self.robots:
+            robot.node.is_connecting = False
+        self._settle()
+
+    @precondition(lambda self: any(each.node.is_running for each in self.robots))
+    @rule(pick=picks, is_killed=st.booleans(), wait_s=waits)
+    def halt(self, pick: int, is_killed: bool, wait_s: float) -> None:
+        """Freeze a robot's process, or kill it."""
+        robot = self._pick(pick, [each for each in self.robots if each.node.is_running])
+        robot.node.halt(is_dead=is_killed)
+        self.undisturbed.discard(robot.id)
+        self._advance(wait_s)
+
+    @precondition(lambda self: any(each.node.is_frozen for each in self.robots))
+    @rule(pick=picks)
+    def thaw(self, pick: int) -> None:
+        self._pick(pick, [each for each in self.robots if each.node.is_frozen]).thaw()
+        self._settle()
+
+    @precondition(lambda self: self.robots)
+    @rule(pick=picks, how=st.sampled_from(["up", "held", "lost"]))
+    def change_link(self, pick: int, how: str) -> None:
+        robot = self._pick(pick, self.robots)
+        robot.node.is_held, robot.node.is_isolated = how == "held", how == "lost"
+        if how != "up":
+            self.undisturbed.discard(robot.id)
+        self._settle()
+
+    @precondition(lambda self: self.robots)
+    @rule(pick=picks, fails=st.booleans())
+    def break_brake(self, pick: int, fails: bool) -> None:
+        robot = self._pick(pick, self.robots)
+        robot.body.brake_fails = fails
+        if fails:
+            self.undisturbed.discard(robot.id)
+
+    # -- people and programs move them
+
+    @rule(name=names, action=st.sampled_from(["drive", "turn"]), wait_s=waits)
+    def move_by_form(self, name: str, action: str, wait_s: float) -> None:
+        try:
+            self.studio.session.fleet.invoke(name, action, {})
+        except AppError:
+            self.studio.allow()
+        self._settle()
+        self._advance(wait_s)
+
+    @rule(robots=st.sets(names, min_size=1), wait_s=waits)
+    def move_by_behaviour(self, robots: set[str], wait_s: float) -> None:
+        there = {link.name for link in self.studio.session.fleet.connected}
+        self.studio.run(sorted(robots & there))
+        self._settle()
+        self._advance(wait_s)
+
+    # -- strangers
+
+    @rule(name=names, times=st.sampled_from([1, 40]))
+    def forge_answers(self, name: str, times: int) -> None:
+        self.stranger.answer(name, list(self.stops)[-4:], times=times)
+        self._settle()
+
+    @rule(name=names, leaf=st.sampled_from(["command", "answer", "description"]), depth=st.sampled_from([60, 1000]))
+    def send_deep_value(self, name: str, leaf: str, depth: int) -> None:
+        self.stranger.send_deep(f"/{name}/{leaf}", depth)
+        self._settle()
+
+    @rule(name=names)
+    def send_many_keys(self, name: str) -> None:
+        self.stranger.send_many_keys(f"/{name}/command", 300)
+        self._settle()
+
+    # -- Stop
+
+    @rule(wait_s=waits)
+    def press_stop(self, wait_s: float) -> None:
+        self.press += 1
+        self.pressed_s = self.clock.now()
+        self._undisturbed_now()
+        self.studio.session.runs.stop()
+        self._settle()
+        self._advance(wait_s)
+
+    @rule(name=names, wait_s=waits)
+    def stop_one_robot(self, name: str, wait_s: float) -> None:
+        self.press += 1
+        self.studio.session.runs.stop_robot(name)
+        self._settle()
+        self._advance(wait_s)
+
+    def _undisturbed_now(self) -> None:
+        links = {link.identity.node_id for link in self.studio.session.fleet.connected if link.identity is not None}
+        self.undisturbed = {
+            each.id
+            for each in self.robots
+            if each.node.is_running
+            and not (each.node.is_held or each.node.is_isolated or each.node.is_connecting)
+            and not each.body.brake_fails
+            and each.id in links
+        }
+
+    @precondition(lambda self: self.studio.session.runs.state.state == "unanswered")
+    @rule()
+    def confirm_standing_still(self) -> None:
+        report = self.studio.session.runs.state.report
+        assert report is not None
+        for robot in [each for each in self.told if each.name in report.silent]:
+            del self.told[robot]
+        self.studio.session.runs.confirm_still()
+        self._settle()
+
+    @rule(seconds=waits)
+    def let_time_pass(self, seconds: float) -> None:
+        self._advance(seconds)
+
+    # -- what must hold
+
+    @invariant()
+    def check(self) -> None:
+        self._check()
+
+    def _check(self) -> None:
+        self._check_report()
+        self._check_reaction()
+        self._check_alive()
+
+    def _check_report(self) -> None:
+        run = self.studio.session.runs.state
+        if run.report is self._seen_report or run.report is None:
+            return
+        self._seen_report = report = run.report
+        if run.state == "proven":
+            assert report.robots, "an empty report proves nothing"
+        for robot, commands in self.told.items():
+            if commands and robot.id not in self.answered[self.press]:
+                assert not report.proven, f"{robot} is called stopped and did not answer"
+                assert robot.name in report.silent, f"{robot} was told to move, did not answer and is not named"
+
+    def _check_reaction(self) -> None:
+        if not self.press or self.clock.now() < self.pressed_s + REACT_S:
+            return
+        if self.studio.session.runs.active:
+            self.undisturbed.clear()
+        for robot in self.robots:
+            if robot.id in self.undisturbed and robot.body.is_moving:
+                raise AssertionError(f"{robot} was reached by Stop and goes on")
+        self.undisturbed.clear()
+
+    def _check_alive(self) -> None:
+        ended = [each for each in self.robots if each.node.is_running and not each.is_deciding]
+        assert not ended, f"{ended} decides nothing any more"
+        wrong = [each for each in self.studio.session.alerts.active if each.id == ALERT]
+        assert not wrong, wrong
+
+    def teardown(self) -> None:
+        self.clock.end()
+        for robot in self.robots:
+            robot.node.is_frozen = robot.node.is_dead = False
+            robot.driver.close()
+        self.studio.close()
+        self.folder.cleanup()
+
+
+def test_a_proven_stop_is_true_in_every_history() -> None:
+    count = HISTORIES or FIXED_HISTORIES
+    run_state_machine_as_test(
+        StopModel,
+        settings=settings(
+            max_examples=count,
+            stateful_step_count=STEPS,
+            deadline=None,
+            derandomize=not HISTORIES,
+            database=None,
+            phases=[Phase.generate, Phase.shrink],
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
