@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -76,18 +77,19 @@ class StopModel(RuleBasedStateMachine):
         self.clock.call_at(self.clock.now() + GRAPH_POLL_S, self._poll)
 
     def _settle(self) -> None:
+        """Let everything happen that happens at this moment; Studio looks once the network is quiet."""
+        before = None
         while True:
             self.clock.settle()
             self.network.connect()
             self._follow_network()
-            busy = self.network.deliver()
-            self.clock.settle()
-            before = len(self.network.sent), self.network.revision
-            self.studio.tick()
-            self.clock.settle()
-            self._follow_network()
-            if not busy and before == (len(self.network.sent), self.network.revision):
+            if self.network.deliver():
+                continue
+            now = len(self.network.sent), self.network.revision
+            if now == before:
                 return
+            before = now
+            self.studio.tick()
 
     def _advance(self, seconds: float) -> None:
         until = self.clock.now() + seconds
@@ -313,9 +315,11 @@ class StopModel(RuleBasedStateMachine):
             robot.node.is_frozen = robot.node.is_dead = False
             robot.driver.close()
         self.studio.close()
+        self.clock.join()
         self.folder.cleanup()
 
 
+@pytest.mark.timeout(600 + HISTORIES)
 def test_a_proven_stop_is_true_in_every_history() -> None:
     count = HISTORIES or FIXED_HISTORIES
     run_state_machine_as_test(

@@ -68,6 +68,12 @@ class SimulatedClock:
         self._now += 1e6
         self.wake_all()
 
+    def join(self) -> None:
+        """Wait for the end of every simulated thread after `end`."""
+        for thread in self._simulated():
+            thread.join(SETTLE_LIMIT_S)
+            assert not thread.is_alive(), self._where()
+
     # -- waiting, in the threads of the code under test
 
     def wait(

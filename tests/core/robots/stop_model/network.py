@@ -42,6 +42,7 @@ class SimulatedNetwork:
         self.sent: list[Sent] = []
         self.delivered: list[Delivery] = []
         self._ids = itertools.count(1)
+        self._wiring: object = None
         self.revision = 0
 
     def node(self, name: str, *, host: str = "lab", pid: int | None = None) -> SimulatedNode:
@@ -85,6 +86,10 @@ class SimulatedNetwork:
 
     def connect(self) -> None:
         """Let every subscriber of a running node connect to every publisher that it was told of."""
+        wiring = self.revision, [(node.is_running, node.is_isolated, node.is_connecting) for node in self.nodes.values()]
+        if wiring == self._wiring:
+            return
+        self._wiring = wiring
         for subscriber in [each for node in self.nodes.values() for each in node.subscribers]:
             for publisher in [each for node in self.nodes.values() for each in node.publishers]:
                 self.join(publisher, subscriber)

@@ -104,7 +104,9 @@ class SimulatedRobot:
 
     def __repr__(self) -> str:
         state = "dead" if self.node.is_dead else "frozen" if self.node.is_frozen else "running"
-        return f"<{self.name} {self.id[-3:]} {state}{' moving' if self.body and self.body.is_moving else ''}>"
+        body = self.driver.body
+        is_moving = isinstance(body, Rover) and body.is_moving
+        return f"<{self.name} {self.id[-3:]} {state}{' moving' if is_moving else ''}>"
 
 
 class Stranger:
