@@ -16,6 +16,7 @@ from app.core.network.source import Source
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion_permission import Question
+from app.core.robots.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
@@ -95,7 +96,7 @@ class SessionAlarms:
         self._clock, self._clock_s = clock, clock_s
         self._commands = AlarmCommands(session.fleet.gate.refusal_now)
         self._asked: _AskedSend | None = None
-        self.on_moved: Callable[[Sequence[str], str], object] = _nobody_moved
+        self.on_moved: OnMoved = ignore_moved
         """Told the robots that a message moves, and "alarm", before it is sent."""
         self.keep: Carrier | None = None
         self.run_behaviour: Callable[[str], str] | None = None
@@ -395,10 +396,6 @@ class SessionAlarms:
 
 
 def _nobody(_event: AlarmEvent) -> None:
-    """Nobody wants to know."""
-
-
-def _nobody_moved(_robots: Sequence[str], _by: str) -> None:
     """Nobody wants to know."""
 
 

@@ -162,7 +162,6 @@ class Session:
             post_event=self._mailbox.post_event,
             clock=clock,
         )
-        self.runs.coming = lambda: self.coming
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
         self.alarms, self.acting, self.recordings = (
             SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
@@ -171,11 +170,7 @@ class Session:
                 self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
             ),
         )
-        self.alarms.keep, self.alarms.on_event, self.runs.also_stops = (
-            self.recordings.carry,
-            self.recordings.events.take_alarm,
-            self.acting.disarm,
-        )
+        self._connect_parts()
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
@@ -184,6 +179,11 @@ class Session:
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
         self._learning = MasterChange()
+
+    def _connect_parts(self) -> None:
+        self.runs.coming, self.runs.also_stops = (lambda: self.coming), self.acting.disarm
+        self.alarms.keep, self.alarms.on_event = self.recordings.carry, self.recordings.events.take_alarm
+        self.alarms.on_moved = self.acting.on_moved = self.fleet.moved.note
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live

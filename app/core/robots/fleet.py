@@ -574,19 +574,27 @@ class Fleet:
             answer = rize.from_answer(answer)
         if answer is not None:
             self._tries.answer(link, answer)
-            self._take_life(link, answer)
-            self._take_end(link, answer)
+            if answer.get("op") == "alive":
+                self._take_life(link, answer)
+            else:
+                self._take_end(link, answer)
 
     def _take_end(self, link: RobotLink, answer: Payload) -> None:
         """Take a final answer: it ends a motion, unless the robot says that it may still move."""
-        id, state, error = answer.get("id"), answer.get("state"), answer.get("error")
-        is_final = isinstance(state, str) and state in FINAL_STATES and answer.get("op") in (None, "invoke")
-        if is_final and isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
+        state = answer.get("state")
+        if (
+            not isinstance(state, str)
+            or state not in FINAL_STATES
+            or answer.get("op") not in (None, "invoke")
+        ):
+            return
+        id, error = answer.get("id"), answer.get("error")
+        if isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
             self.moved.ended(link.name, id)
 
     def _take_life(self, link: RobotLink, answer: Payload) -> None:
         """Take a robot's sign of life, which names the actions that it could not end."""
-        if answer.get("op") != "alive" or "not_ended" not in answer:
+        if "not_ended" not in answer:
             return
         before, link.goes_on = link.goes_on, ""
         if answer["not_ended"]:

@@ -9,19 +9,21 @@ dying, leaving the graph and coming back as another program do not remove it (do
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from app.core.robots.stop_report import StopReport
 from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
 MovedBy = Literal[
-    "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", "program", "action", "stop"
+    "form", "behaviour", "shelf", "click", "key", "alarm", "replay", "bridge", "program", "action", "stop"
 ]
 """What moved a robot. ``action``: it says itself that an action could not be ended; ``stop``: nobody knows,
 but a Stop was not proven."""
+OnMoved: TypeAlias = Callable[[Sequence[str], MovedBy], object]
+"""Called with the robots that a message moves, and what sends it, before it is sent."""
 MAX_MOTIONS = 64
 """Motions of one robot that are told apart by their ids; further ones end only with a Stop."""
 
@@ -29,6 +31,7 @@ _SENTENCES: dict[MovedBy, str] = {
     "form": lazy("{robot} got a command from a form and has not answered since"),
     "behaviour": lazy("{robot} got a command from a behaviour and has not answered since"),
     "shelf": lazy("{robot} got a command from a message of the publish shelf and has not answered since"),
+    "click": lazy("{robot} got a command from a click in a picture and has not answered since"),
     "key": lazy("{robot} got a command from a key and has not answered since"),
     "alarm": lazy("{robot} got a command from an alarm and has not answered since"),
     "replay": lazy("{robot} got a command from a replayed recording and has not answered since"),
@@ -37,6 +40,10 @@ _SENTENCES: dict[MovedBy, str] = {
     "action": lazy("{robot} could not end an action and has not answered since"),
     "stop": lazy("{robot} has not answered Stop"),
 }
+
+
+def ignore_moved(_names: Sequence[str], _by: MovedBy) -> None:
+    """Default `OnMoved`: nothing keeps the motion."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,9 +59,13 @@ class StopModel(RuleBasedStateMachine):
         self.studio = SimulatedStudio(self.network, self.clock, Path(self.folder.name))
         self.stranger = Stranger(self.network)
         self.robots: list[SimulatedRobot] = []
-        self.told: dict[SimulatedRobot, dict[str, int]] = {}  # ids of commands that moved it -> when it was sent
+        self.told: dict[
+            SimulatedRobot, dict[str, int]
+        ] = {}  # ids of commands that moved it -> when it was sent
         self.press = 0
-        self.stops: dict[str, tuple[int, int]] = {}  # id of a stop -> the press that it belongs to, when it was sent
+        self.stops: dict[
+            str, tuple[int, int]
+        ] = {}  # id of a stop -> the press that it belongs to, when it was sent
         self.answered: dict[int, set[str]] = defaultdict(set)  # press -> robots whose answer reached Studio
         self.pressed_s = 0.0
         self.undisturbed: set[str] = set()  # robots that were reachable ever since Stop was pressed
@@ -101,7 +105,9 @@ class StopModel(RuleBasedStateMachine):
     def _follow_network(self) -> None:
         """Read off the network who was told to move, who was asked to stop and whose answers arrived."""
         network = self.network
-        for place, (publisher, message, reached) in enumerate(network.sent[self._read_sent :], self._read_sent):
+        for place, (publisher, message, reached) in enumerate(
+            network.sent[self._read_sent :], self._read_sent
+        ):
             value = self._value(publisher.node.id, message, "command")
             if value.get("op") == "stop":
                 self.stops.setdefault(str(value["id"]), (self.press, place))
@@ -217,7 +223,11 @@ class StopModel(RuleBasedStateMachine):
         self.stranger.answer(name, list(self.stops)[-4:], times=times)
         self._settle()
 
-    @rule(name=names, leaf=st.sampled_from(["command", "answer", "description"]), depth=st.sampled_from([60, 1000]))
+    @rule(
+        name=names,
+        leaf=st.sampled_from(["command", "answer", "description"]),
+        depth=st.sampled_from([60, 1000]),
+    )
     def send_deep_value(self, name: str, leaf: str, depth: int) -> None:
         self.stranger.send_deep(f"/{name}/{leaf}", depth)
         self._settle()
@@ -246,7 +256,9 @@ class StopModel(RuleBasedStateMachine):
         self._advance(wait_s)
 
     def _undisturbed_now(self) -> None:
-        links = {link.identity.node_id for link in self.studio.session.fleet.connected if link.identity is not None}
+        links = {
+            link.identity.node_id for link in self.studio.session.fleet.connected if link.identity is not None
+        }
         self.undisturbed = {
             each.id
             for each in self.robots
@@ -291,7 +303,9 @@ class StopModel(RuleBasedStateMachine):
         for robot, commands in self.told.items():
             if commands and robot.id not in self.answered[self.press]:
                 assert not report.proven, f"{robot} is called stopped and did not answer"
-                assert robot.name in report.silent, f"{robot} was told to move, did not answer and is not named"
+                assert robot.name in report.silent, (
+                    f"{robot} was told to move, did not answer and is not named"
+                )
 
     def _check_reaction(self) -> None:
         if not self.press or self.clock.now() < self.pressed_s + REACT_S:

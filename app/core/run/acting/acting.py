@@ -7,7 +7,7 @@ plays can be sent then (`app.core.recording.replay.sending`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
 from app.core.robots.fleet import Fleet
+from app.core.robots.moved_robots import MovedBy, OnMoved, ignore_moved
 from app.core.run.acting.arming import ARMED_S, Arming, Target
 from app.core.run.acting.calling import CallRecord, ServiceCalls
 from app.core.run.acting.json_text import read_json
@@ -40,7 +41,12 @@ from nep.errors import NepError
 from nep.i18n import _, listed, ngettext
 
 FILE = "messages.json"
-_MOVED_BY: Mapping[str, str] = {"publish": "shelf", "image": "click"}
+_MOVED_BY: Mapping[Asker, MovedBy] = {
+    "publish": "shelf",
+    "image": "click",
+    "replay": "replay",
+    "switch": "key",
+}
 
 
 class ActingSession(Protocol):
@@ -92,7 +98,7 @@ class SessionActing:
         self.submit = session.source.submit
         """Gives Studio's node on the live network to a job."""
         self.gate = session.fleet.gate
-        self.on_moved: Callable[[Sequence[str], str], object] = _nobody_moved
+        self.on_moved: OnMoved = ignore_moved
         """Told the robots that something moves, and by what: "shelf", "click" or "replay"."""
         self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
@@ -206,7 +212,7 @@ class SessionActing:
         """Something is about to be sent there: tell `on_moved` the robots that it moves."""
         moved = self._moved(target)
         if moved:
-            self.on_moved(moved, _MOVED_BY.get(asker, asker))
+            self.on_moved(moved, _MOVED_BY.get(asker, "program"))
 
     # ---- messages
 
@@ -439,10 +445,6 @@ class SessionActing:
             title = _("Kept messages could not be read.")
             self._session.alerts.put("messages:file", "warn", title, kept.problem)
         return kept.value if kept.value is not None else Shelf()
-
-
-def _nobody_moved(_robots: Sequence[str], _by: str) -> None:
-    """Nobody wants to know."""
 
 
 def _nothing() -> None:

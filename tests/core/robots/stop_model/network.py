@@ -86,7 +86,10 @@ class SimulatedNetwork:
 
     def connect(self) -> None:
         """Let every subscriber of a running node connect to every publisher that it was told of."""
-        wiring = self.revision, [(node.is_running, node.is_isolated, node.is_connecting) for node in self.nodes.values()]
+        wiring = (
+            self.revision,
+            [(node.is_running, node.is_isolated, node.is_connecting) for node in self.nodes.values()],
+        )
         if wiring == self._wiring:
             return
         self._wiring = wiring
@@ -238,7 +241,10 @@ class SimulatedSource:
     """`app.core.network.source.Source` on a simulated network: jobs are done at once."""
 
     def __init__(
-        self, address: str, sinks: Sequence[Callable[[str, Sequence[Message]], None]], post: Callable[[object], None]
+        self,
+        address: str,
+        sinks: Sequence[Callable[[str, Sequence[Message]], None]],
+        post: Callable[[object], None],
     ) -> None:
         self.address, self.sinks, self.post = address, tuple(sinks), post
         self.node: SimulatedNode | None = None

@@ -75,11 +75,15 @@ class RobotClock:
 class SimulatedRobot:
     """One process that is a robot; another of the same name is another one."""
 
-    def __init__(self, network: SimulatedNetwork, clock: SimulatedClock, name: str, *, connects_late: bool) -> None:
+    def __init__(
+        self, network: SimulatedNetwork, clock: SimulatedClock, name: str, *, connects_late: bool
+    ) -> None:
         self.name, self.clock = name, clock
         self.node = network.node(f"{name} driver")
         self.node.is_connecting = connects_late
-        self.driver = Driver(ROVER, name, cast("Any", self.node), clock=cast("Any", RobotClock(clock, self.node)))
+        self.driver = Driver(
+            ROVER, name, cast("Any", self.node), clock=cast("Any", RobotClock(clock, self.node))
+        )
         self.driver.start()
 
     @property
@@ -137,7 +141,13 @@ class Stranger:
         self._publisher(topic, "robot/command" if topic.endswith("command") else "json").send(message)
 
     def send_many_keys(self, topic: str, count: int) -> None:
-        value = {"op": "invoke", "id": "z", "from": "e", "action": "drive", "input": {f"k{n}": n for n in range(count)}}
+        value = {
+            "op": "invoke",
+            "id": "z",
+            "from": "e",
+            "action": "drive",
+            "input": {f"k{n}": n for n in range(count)},
+        }
         self._publisher(topic, "robot/command").send(orjson.dumps(value))
 
     def describe(self, names: list[str], like: SimulatedRobot) -> None:

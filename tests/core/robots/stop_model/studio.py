@@ -54,7 +54,9 @@ class SimulatedRunner:
 
     _runs = 0
 
-    def __init__(self, clock: SimulatedClock, network: SimulatedNetwork, post: Callable[[RunnerEvent], object]) -> None:
+    def __init__(
+        self, clock: SimulatedClock, network: SimulatedNetwork, post: Callable[[RunnerEvent], object]
+    ) -> None:
         SimulatedRunner._runs += 1
         self.run, self.pid = SimulatedRunner._runs, 4242
         self.program_key = f"key {self.run}"
@@ -65,7 +67,9 @@ class SimulatedRunner:
 
     def start(self, program: Program, *_given: object, **_options: object) -> None:
         self.node = self._network.node("program")
-        self.publishers = {name: self.node.new_pub(f"/{name}/command", "robot/command") for name in program.robots}
+        self.publishers = {
+            name: self.node.new_pub(f"/{name}/command", "robot/command") for name in program.robots
+        }
         self._network.connect()
         for name, publisher in self.publishers.items():
             self.move(name, "drive")
@@ -73,7 +77,13 @@ class SimulatedRunner:
 
     def move(self, name: str, action: str) -> None:
         publisher = self.publishers[name]
-        command = {"id": f"p{self.run}", "op": "invoke", "from": self.program_id, "action": action, "input": {}}
+        command = {
+            "id": f"p{self.run}",
+            "op": "invoke",
+            "from": self.program_id,
+            "action": action,
+            "input": {},
+        }
         publisher.publish(command)
 
     def stop(self) -> None:
@@ -99,7 +109,9 @@ class _Driving(Wanted):
 
     def program(self) -> Program:
         robots: tuple[str, ...] = self.robots  # type: ignore[attr-defined]
-        return Program("driving", "", "", {}, robots=robots, actions={name: ("drive",) for name in robots}, starts=1)
+        return Program(
+            "driving", "", "", {}, robots=robots, actions={name: ("drive",) for name in robots}, starts=1
+        )
 
     def problems(self, program: Program) -> dict[str, str]:  # noqa: ARG002
         return {}
