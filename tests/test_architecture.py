@@ -42,7 +42,6 @@ EARNED = {
     "app.core.robots.awaited": "pure, and tested alone",
     "nep.programs.alarms.losses": "pure, and tested alone",
     "nep.programs.blackboard.ages": "pure, and tested alone",
-    "nep.programs.blackboard.perception": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.programs.doctor.look": "joins collecting and judging, which know nothing of each other",
     "app.ui.panels.inspector.pace": "pure, and tested alone",
@@ -53,6 +52,7 @@ EARNED = {
     "app.core.run.trial": "pure, and tested alone",
     "app.ui.shell.stop_keys": "hears keys before all else, and is tested alone",
     "app.ui.blockly.held_keys": "is tested without a page",
+    "app.ui.blockly.page_json": "is tested without a page",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
     "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
 }

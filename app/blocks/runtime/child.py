@@ -322,7 +322,7 @@ def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
     for line in stream:
         try:
             order = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
         if isinstance(order, Mapping):
             yield order

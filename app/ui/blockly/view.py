@@ -6,8 +6,6 @@ shown) or die (its process can be killed): it is given everything again and the 
 
 from __future__ import annotations
 
-import json
-from base64 import b64decode
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from PySide6.QtCore import QByteArray, QMarginsF, QPoint, Signal
@@ -17,6 +15,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.bridge import Json
 from app.ui.blockly.host import BlocklyHost
+from app.ui.blockly.page_json import data_url, pairs, texts
 from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
 from nep import i18n
@@ -73,7 +72,7 @@ class BlocklyView(BlocklyHost):
         self._bridge.answered.connect(self._answered)
         self._bridge.drawn.connect(self._drawn)
         self._bridge.command_wanted.connect(self.command_wanted)
-        self._bridge.values_watched.connect(lambda text: self.values_watched.emit(_texts(text)))
+        self._bridge.values_watched.connect(lambda text: self.values_watched.emit(texts(text)))
         self._bridge.wanted.connect(self.wanted)
         self._bridge.try_asked.connect(self.try_asked)
         self._bridge.pinned.connect(self._toolbox_pinned)
@@ -81,11 +80,11 @@ class BlocklyView(BlocklyHost):
         self._bridge.carried_out.connect(
             lambda x, y, out, home: self.block_carried.emit(self._on_screen(x, y) if out else None, home)
         )
-        self._bridge.carried_seen.connect(lambda data, ratio: self.carried_seen.emit(_png(data), ratio))
+        self._bridge.carried_seen.connect(lambda data, ratio: self.carried_seen.emit(data_url(data), ratio))
         self._bridge.let_go_outside.connect(lambda x, y: self.block_dropped.emit(self._on_screen(x, y)))
         self._bridge.carried_over.connect(self.blocks_brought)
         self._bridge.backpack_asked.connect(self.backpack_asked)
-        self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(_pairs(text)))
+        self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(pairs(text)))
 
     # -- the program ------------------------------------------------------------------------------
 
@@ -423,7 +422,7 @@ class BlocklyView(BlocklyHost):
     def _drawn(self, token: int, data: str) -> None:
         done = self._pictures.pop(token, None)
         if done is not None:
-            done(b64decode(data.partition(",")[2]) if data.startswith("data:") else data.encode())
+            done(data_url(data) if data.startswith("data:") else data.encode())
 
     def _answered(self, token: int, workspace: str) -> None:
         done = self._waiting.pop(token, None)
@@ -435,18 +434,3 @@ def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:
     """What the printer leaves empty, in inches."""
     margins = layout.margins(QPageLayout.Unit.Inch)
     return margins.left(), margins.top(), margins.right(), margins.bottom()
-
-
-def _texts(text: str) -> tuple[str, ...]:
-    return tuple(map(str, json.loads(text)))
-
-
-def _png(data: str) -> bytes:
-    """The picture of a ``data:`` URL."""
-    return b64decode(data.partition(",")[2])
-
-
-def _pairs(text: str) -> tuple[tuple[str, str], ...]:
-    """The page's robots and their sensors."""
-    made = json.loads(text)
-    return tuple((str(robot), str(sensor)) for robot, sensor in made)

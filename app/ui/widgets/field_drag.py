@@ -30,7 +30,7 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
         return None
     try:
         found = json.loads(bytes(data.data(MIME).data()))
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     if isinstance(found, list) and len(found) == 2 and all(isinstance(each, str) for each in found):
         return found[0], found[1]

@@ -7,6 +7,7 @@ from nep.messages.message import Message
 from nep.programs.gateway.attachment import NativeNetwork
 from nep.programs.gateway.graph_registrar import GraphRegistrar
 from nep.programs.gateway.inbox import NativeInbox
+from tests import hostile
 from tests.nep.bad_pictures import BOMBS
 
 LONG_S = 30
@@ -136,3 +137,24 @@ def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
     assert scene.alerts is told
     scene.native.resolve("port:7000")
     assert scene.alerts == ()
+
+
+def test_hostile_messages_pass_both_ways_and_the_next_one_arrives(scene):
+    payloads = tuple(hostile.payloads({"pose": {"x": 1.0}}))
+    with nep.node("stranger") as node, node.new_sub("t") as sub:
+        for payload in payloads:
+            scene.native.publish("t", "json", payload)
+        scene.native.publish("t", "json", b'{"honest": true}')
+        came = [bytes(sub.receive(LONG_S).data) for _each in range(len(payloads) + 1)]
+        assert came == [*payloads, b'{"honest": true}']
+        assert scene.native.subscribe("u", "json")
+        pub = node.new_pub("u")
+        for payload in payloads:
+            pub.publish_bytes(payload)
+            pub.publish_bytes(b'{"a": 1}', {"shape": payload.decode("latin-1"), "encoding": [1]})
+        pub.publish({"honest": True})
+        handed: list[bytes] = []
+        while b'{"honest":true}' not in handed:
+            messages = scene.inbox.take() or [sub.receive(0.02)]
+            handed += [bytes(scene.native.data_of(each)) for each in messages if each is not None]
+        assert len(handed) > len(payloads)

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nep.programs.gateway.requests import Member, RequestError, broadcast, grant, read_request, refuse
+from tests import hostile
 
 ASKED = {
     "node": "n1",
@@ -116,3 +117,22 @@ def test_the_broadcast_has_the_prefix_and_the_shape_of_the_originals():
     }
     assert "mode" not in topics["s"]
     assert broadcast([]) == b"master {}"
+
+
+def test_hostile_requests_are_granted_or_refused_with_a_sentence():
+    told = {
+        "node": "n",
+        "topic": "t",
+        "socket": "publisher",
+        "mode": "many2many",
+        "msg_type": "json",
+        "pid": 7,
+    }
+    answers = []
+    for data in hostile.payloads(told):
+        try:
+            answers.append(grant(read_request(data, 7000), 9000))
+        except RequestError as error:
+            answers.append(refuse(error))
+    assert {json.loads(answer)["state"] for answer in answers} == {"success", "failure"}
+    assert max(map(len, answers)) < 30_000

@@ -12,6 +12,7 @@ from app.core.storage import deep_json
 from app.errors import BackpackError
 from app.ui.panels.base import PanelContext
 from nep.i18n import _, ngettext
+from nep.text import bounded_str
 
 LOOK_EVERY = 30  # refreshes of 30 a second: what another Studio has put in shows within a second
 
@@ -57,7 +58,10 @@ class BackpackKeeper:
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
 
     def _asked(self, what: str) -> None:
-        asked = deep_json.loads(what)
+        try:
+            asked = deep_json.loads(what)
+        except (ValueError, RecursionError):
+            return
         if not isinstance(asked, Mapping):
             return
         if asked.get("do") == "look":
@@ -67,7 +71,7 @@ class BackpackKeeper:
             if isinstance(blocks, list) and isinstance(count, int):
                 self._put(blocks, count, left=bool(asked.get("notes")))
         elif asked.get("do") == "remove":
-            self._take_out(lambda: self._backpack.remove([str(asked.get("id"))]), emptied=False)
+            self._take_out(lambda: self._backpack.remove([bounded_str(asked.get("id"))]), emptied=False)
         elif asked.get("do") == "empty":
             self._take_out(self._backpack.empty, emptied=True)
 

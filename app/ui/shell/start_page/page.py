@@ -80,7 +80,7 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
         try:
             data = json.loads(read_whole(path))
             workspace = data["workspace"]
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             continue
         if isinstance(workspace, dict):
             name = translate(NAME, str(data.get("name", path.stem)))

@@ -1,0 +1,36 @@
+"""Values in the JSON that the page of the block editor sends. What is malformed gives an empty value."""
+
+from __future__ import annotations
+
+import binascii
+import json
+from base64 import b64decode
+
+from nep.text import bounded_str
+
+
+def texts(text: str) -> tuple[str, ...]:
+    """Return the texts of a list."""
+    return tuple(map(bounded_str, _list(text)))
+
+
+def pairs(text: str) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of texts, such as robot and sensor, of a list of lists."""
+    found = (each for each in _list(text) if isinstance(each, list) and len(each) == 2)
+    return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
+
+
+def data_url(text: str) -> bytes:
+    """Return the bytes of a ``data:`` URL in base64."""
+    try:
+        return b64decode(text.partition(",")[2].encode("ascii", "replace"))
+    except binascii.Error:
+        return b""
+
+
+def _list(text: str) -> list[object]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return []
+    return found if isinstance(found, list) else []

@@ -1,0 +1,68 @@
+"""Whatever the page of the block editor, the clipboard or a dragged field holds is read or refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QMimeData
+
+from app.blocks.compiler.stack import Stack
+from app.core.documents.file_format import parse_file
+from app.errors import DocumentError
+from app.ui.blockly.page_json import data_url, pairs, texts
+from app.ui.shell.commands.behaviours import read_stack
+from app.ui.widgets.field_drag import MIME, dropped_field
+from tests import hostile
+
+STACK: hostile.Message = {
+    "block": {
+        "type": "robot_say",
+        "id": "a",
+        "fields": {"TEXT": "hi"},
+        "inputs": {"X": {"block": {"type": "t"}}},
+    },
+    "variables": [{"name": "n", "id": "v"}],
+}
+BEHAVIOUR: hostile.Message = {
+    "format": "nep-behaviour", "version": 1, "name": "x", "workspace": {"blocks": {"blocks": []}},
+    "robots": {},
+}  # fmt: skip
+LISTS = tuple(hostile.payloads([["Pepper", "battery"], ["a", "b"]]))
+
+
+def text_of(payload: bytes) -> str:
+    return payload.decode("utf-8", "replace")
+
+
+def test_values_of_the_page_are_read_or_empty() -> None:
+    for text in map(text_of, LISTS):
+        assert all(isinstance(each, str) for each in texts(text))
+        assert all(len(each) == 2 for each in pairs(text))
+        assert isinstance(data_url(f"data:image/png;base64,{text}"), bytes)
+    assert pairs('[["Pepper", "battery"]]') == (("Pepper", "battery"),)
+    assert texts('["a", "b"]') == ("a", "b")
+    assert data_url("data:image/png;base64,aGk=") == b"hi"
+
+
+def test_stacks_and_behaviours_are_read_or_refused() -> None:
+    read = set()
+    for payload in hostile.payloads(STACK):
+        try:
+            read.add(type(read_stack(text_of(payload))))
+        except (ValueError, RecursionError):
+            read.add(ValueError)
+    for payload in hostile.payloads(BEHAVIOUR):
+        try:
+            read.add(type(parse_file(payload, Path("a.nepb"))))
+        except DocumentError as error:
+            read.add(DocumentError)
+            assert len(str(error)) < 20_000  # noqa: PT017 - of each
+    assert {Stack, ValueError, DocumentError} < read
+
+
+def test_dragged_field_is_read_or_nothing() -> None:
+    for payload in LISTS:
+        data = QMimeData()
+        data.setData(MIME, payload)
+        found = dropped_field(data)
+        assert found is None or len(found) == 2
