@@ -6,10 +6,9 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 
 from nep.errors import NepError
-from nep.system.log_rarely import is_logged
+from nep.system.log_rarely import SurvivedErrors
 
 ALIVE_S = 0.2
 _log = logging.getLogger(__name__)
@@ -28,7 +27,7 @@ class Heartbeat:
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
-        self._failures = 0
+        self._errors = SurvivedErrors(_log, thread)
 
     def beat(self, robot: str, publish: Publish) -> None:
         """Keep this robot going until `rest`; ``publish`` sends on its command topic."""
@@ -59,7 +58,8 @@ class Heartbeat:
             with self._lock:
                 robots = list(self._robots.values())
             for publish in robots:
-                self._tell(publish)
+                with self._errors:  # the other robots are told all the same
+                    self._tell(publish)
             self._changed.wait(ALIVE_S if robots else None)
 
     def _tell(self, publish: Publish) -> None:
@@ -68,8 +68,3 @@ class Heartbeat:
             publish(alive)
         except NepError:
             return  # it has gone, or this node has; the robot's watchdog does the rest
-        except BaseException:  # noqa: BLE001 - the other robots must be told all the same
-            self._failures += 1
-            if is_logged(self._failures):
-                with suppress(Exception):
-                    _log.exception("a sign of life can't be sent (%d so far)", self._failures)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 import uuid
@@ -21,6 +22,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
+from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
 LOOK_S = 0.2
@@ -28,6 +30,7 @@ LOOK_S = 0.2
 MOST_UNKNOWN = 256
 
 Told = Callable[[object], None]
+_log = logging.getLogger(__name__)
 
 
 class ProgramPublisher(Protocol):
@@ -124,6 +127,7 @@ class Network:
         self._stopped_outside: Callable[[str], None] = _ignore
         self._arrived = threading.Condition()
         self._closed = threading.Event()
+        self._errors = SurvivedErrors(_log, "a message or answer of a robot")
         self._ending = False
         self._motions = Motions(self._rest, self._stand, self.invoke)
         self._alive = Heartbeat(program, "program alive")
@@ -341,7 +345,7 @@ class Network:
         """Look for unknown publishers whenever one has answered, until the end."""
         while self._asks.wait() and not self._closed.is_set():
             self._asks.clear()
-            with suppress(NepError):
+            with self._errors, suppress(NepError):
                 self._look()
             self._closed.wait(LOOK_S)
 
@@ -361,19 +365,24 @@ class Network:
 
     def _messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
-            if not self._is_robots(message):
-                continue
-            self._newest[message.topic] = message
-            for told in self._told.get(message.topic, ()):
-                payload = payload_of(message)
-                if payload is not None:
-                    told(payload)
+            with self._errors:
+                self._take(message)
         self._poke()
+
+    def _take(self, message: Message) -> None:
+        if not self._is_robots(message):
+            return
+        self._newest[message.topic] = message
+        for told in self._told.get(message.topic, ()):
+            payload = payload_of(message)
+            if payload is not None:
+                told(payload)
 
     def _answers(self, messages: Sequence[Message]) -> None:
         with self._judging:
             for message in messages:
-                self._judge(message)
+                with self._errors:
+                    self._judge(message)
         self._poke()
 
     def _judge(self, message: Message) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from app.robots.driver.call import Clock
-from nep.system.log_rarely import is_logged
+from nep.system.log_rarely import SurvivedErrors
 
 _MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting
 _RESTART_PAUSE_S = 0.05
@@ -47,8 +47,8 @@ class Dispatcher:
             next_due_s: Returns the seconds until `tick` is needed, or None.
             on_restart: Called in the thread after the loop ended and before it runs again.
         """
-        self.failures = 0
-        """Number of exceptions that callbacks, ticks or the loop raised."""
+        self.errors = SurvivedErrors(_log, name)
+        """Exceptions that callbacks, ticks or the loop raised."""
         self._name, self._clock = name, clock
         self._tick, self._next_due_s, self._on_restart = tick, next_due_s, on_restart
         self._urgent: deque[Callable[[], object]] = deque()
@@ -88,17 +88,8 @@ class Dispatcher:
 
     def call(self, function: Callable[[], object]) -> None:
         """Call a function now; an exception is counted and logged instead of raised."""
-        try:
+        with self.errors:
             function()
-        except BaseException as error:  # noqa: BLE001 - also SystemExit of a driver's code: nothing ends this thread
-            self.report(error)
-
-    def report(self, error: BaseException) -> None:
-        """Count an exception and log it: the first, the tenth, the hundredth, ..."""
-        self.failures += 1
-        if is_logged(self.failures):
-            with suppress(Exception):  # also without memory or stack for a record
-                _log.error("%s: error %d", self._name, self.failures, exc_info=error)
 
     def close(self) -> None:
         """End the thread and wait for it, 2 s at most; what has not run is dropped."""
@@ -116,7 +107,7 @@ class Dispatcher:
                 try:
                     self._loop()
                 except BaseException as error:  # noqa: BLE001 - whatever ended the loop: it runs again
-                    self.report(error)
+                    self.errors.add(error)
                     self.call(self._on_restart)
                     self._closing.wait(_RESTART_PAUSE_S)
         finally:

@@ -156,7 +156,7 @@ class Tasks:
     @property
     def failures(self) -> int:
         """Number of exceptions that the deciding thread survived."""
-        return self._dispatcher.failures
+        return self._dispatcher.errors.count
 
     @property
     def epoch(self) -> int:

@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 import nep
 from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.network import Network
+from tests import hostile
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import RizeRobot, WireRobot
 
@@ -184,3 +187,35 @@ def test_robots_are_found_by_their_type(master, node, pepper):
         assert ([robot.name for robot in wanted.robots], wanted.claims) == (["Pepper", "Turtle 2"], ())
     finally:
         turtle.close()
+
+
+def test_program_survives_every_hostile_answer_and_value(network, pepper, node):
+    heard: list[object] = []
+
+    def told(payload: object) -> None:
+        heard.append(payload)
+        raise SystemExit(3)
+
+    network.on_message("/in", told)
+    network.on_sensor("Pepper", "battery", heard.append)
+    threads = {each for each in threading.enumerate() if each.is_alive()}
+    pepper.slow = {"turn"}
+    turning = network.invoke("Pepper", "turn", {})
+    until(lambda: turning.state == "accepted")
+    answer: hostile.Message = {
+        "id": turning.id, "op": "invoke", "state": "running", "output": {"a": 1}, "feedback": {"b": 2},
+        "error": "x", "waits_for": ["a"],
+    }  # fmt: skip
+    stop: hostile.Message = {"id": "1", "op": "stop", "state": "failed", "error": "x"}
+    strange = node.new_pub("/in")
+    for payload in hostile.payloads({"value": 5}):
+        strange.publish_bytes(payload)
+        pepper._sensors["battery"].publish_bytes(payload)
+    for payload in hostile.payloads(answer, stop):
+        pepper._answer.publish_bytes(payload)
+    until(lambda: len(heard) > 50)
+    assert isinstance(network.sensor("Pepper", "battery"), object)
+    call = network.invoke("Pepper", "say", {"text": "Hi"})
+    until(lambda: call.done)
+    assert call.state == "succeeded"
+    assert [each.name for each in threads if not each.is_alive()] == []

@@ -198,7 +198,7 @@ def test_deciding_thread_that_is_killed_stops_the_robot_and_runs_again(turtle, c
     assert not body.moving
     ears.invoke("2", "dig")
     assert ears.final("2")["state"] == "succeeded"
-    assert "error 1" in caplog.text
+    assert "Turtle commands failed (1 so far)" in caplog.text
 
 
 @pytest.mark.parametrize("error", [ValueError(), RecursionError(), MemoryError(), SystemExit(3)], ids=repr)
