@@ -12,6 +12,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 from app.robots.driver.call import Clock
 from nep.system.log_rarely import SurvivedErrors
@@ -87,9 +88,16 @@ class Dispatcher:
         return threading.current_thread() is self._thread
 
     def call(self, function: Callable[[], object]) -> None:
-        """Call a function now; an exception is counted and logged instead of raised."""
-        with self.errors:
+        """Call a function now, in the thread; an exception is counted and logged instead of raised.
+
+        MemoryError, and SystemExit and its like, end the loop, which is restarted.
+        """
+        try:
             function()
+        except MemoryError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever one callback does, the next one has its turn
+            self.errors.add(error)
 
     def close(self) -> None:
         """End the thread and wait for it, 2 s at most; what has not run is dropped."""
@@ -98,23 +106,25 @@ class Dispatcher:
         if self._thread.ident is not None and not self.is_current:
             self._thread.join(_JOIN_S)
 
-    def _new_thread(self) -> threading.Thread:
-        return threading.Thread(target=self._supervise, name=self._name, daemon=True)
+    def _new_thread(self, *, is_restart: bool = False) -> threading.Thread:
+        supervise = partial(self._supervise, is_restart=is_restart)
+        return threading.Thread(target=supervise, name=self._name, daemon=True)
 
-    def _supervise(self) -> None:
+    def _supervise(self, *, is_restart: bool = False) -> None:
         try:
             while not self._closing.is_set():
                 try:
+                    if is_restart:
+                        self._on_restart()
+                        self._closing.wait(_RESTART_PAUSE_S)
+                    is_restart = True
                     self._loop()
                 except BaseException as error:  # noqa: BLE001 - whatever ended the loop: it runs again
                     self.errors.add(error)
-                    self.call(self._on_restart)
-                    self._closing.wait(_RESTART_PAUSE_S)
         finally:
             if not self._closing.is_set():  # an exception hit the handler above
-                self._thread = self._new_thread()
+                self._thread = self._new_thread(is_restart=True)
                 self._thread.start()
-                self.post_urgent(self._on_restart)
 
     def _loop(self) -> None:
         while not self._closing.is_set():

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from app.robots.driver.call import Failed
 from app.robots.identity import ERROR_MOST, MAY_MOVE
 from nep.i18n import _
+from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
 _JOIN_S = 0.5
@@ -32,6 +33,7 @@ class StopThread:
             ended: Called in this thread with the number of a run and the sentence of its failure, or None.
         """
         self._name, self._stop, self._ended = name, stop, ended
+        self._errors = SurvivedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._is_closing = False
@@ -71,14 +73,14 @@ class StopThread:
     def _supervise(self) -> None:
         try:
             while not self._is_closing:
-                self._wake.wait()
-                self._wake.clear()
-                if self._requested > self._finished:
-                    self._run(self._requested)
+                with self._errors:
+                    if self._requested == self._finished:
+                        self._wake.wait()
+                    self._wake.clear()
+                    if self._requested > self._finished:
+                        self._run(self._requested)
         finally:
-            if (
-                not self._is_closing
-            ):  # something raised an exception in this thread: a stop must still be possible
+            if not self._is_closing:  # an exception was raised in this thread outside of the lines above
                 self._thread = self._new_thread()
                 self._wake.set()
                 self._thread.start()

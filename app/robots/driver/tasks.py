@@ -174,7 +174,8 @@ class Tasks:
             self._epoch += 1
             calls = [task.call for task in self._running if task.call is not None]
         for call in calls:
-            self._dispatcher.call(call.cancel)
+            with self._dispatcher.errors:
+                call.cancel()
         run = self._stop_thread.reserve()
         try:
             if self._dispatcher.is_current:
