@@ -323,6 +323,9 @@ class SubSocket:
         self._socket.setsockopt(zmq.SUBSCRIBE, said)
         self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
 
+    def _has_more(self) -> bool:
+        return bool(self._socket.getsockopt(_RCVMORE))
+
     def _disconnect(self, endpoint: str) -> None:
         try:
             self._socket.disconnect(endpoint)
@@ -477,7 +480,7 @@ class SubSocket:
 
     def _read_batch_carefully(self, first: bytes, into: Into) -> tuple[int, int]:
         """The messages of any batch."""
-        if self._socket.getsockopt(_RCVMORE):
+        if self._has_more():
             self._carefully(first)
             return 0, 0
         try:
@@ -560,7 +563,7 @@ class SubSocket:
                 _("a message has 3 or 4 parts, this one has {count}").format(count=len(rest) + 1)
             )
             return following, None
-        more = bool(self._socket.getsockopt(_RCVMORE))
+        more = self._has_more()
         while more:
             frame = self._recv(_DONTWAIT, False)
             rest.append(frame.buffer)

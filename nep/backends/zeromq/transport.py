@@ -28,6 +28,7 @@ from nep.backends.services import (
     ServerTransport,
     SurveyTransport,
 )
+from nep.backends.zeromq.checked_sub_socket import CHECKED_TYPES, CheckedSubSocket
 from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
@@ -277,7 +278,8 @@ class ZeromqTransport:
         return subscriber
 
     def _mastered_readable(self, spec: SubscriberSpec) -> NativeReadable:
-        return SubSocket(self._sub(spec), spec)
+        kind = CheckedSubSocket if spec.msg_type in CHECKED_TYPES else SubSocket
+        return kind(self._sub(spec), spec)
 
     def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)

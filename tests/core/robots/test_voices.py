@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from app.core.robots.stop_report import StopReport
 from app.core.robots.voices import LONGEST_S, MOST_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, td_for
@@ -144,7 +145,8 @@ def test_stop_silences_all_at_once_also_those_who_wait(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.tell("Ginger", "Me, too", 0.95)
     case.session.fleet.told_to_stop(["Pepper", "Ginger"])
-    case.session.fleet.stopped({"Pepper": ("answered", "ok"), "Ginger": ("answered", "ok")}, {})
+    words = {"Pepper": ("answered", "ok"), "Ginger": ("answered", "ok")}
+    case.session.fleet.stopped(words, StopReport((), 0.0))
     case.tell("Pepper", "A long story", 0.3)  # it says so for one more moment
     assert case.speaker.did[-1] == "stop"
     case.speaker.busy = False
