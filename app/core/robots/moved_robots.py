@@ -11,23 +11,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from app.core.robots.stop_report import StopReport
 from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
-MovedBy = Literal[
-    "form", "behaviour", "shelf", "click", "key", "alarm", "replay", "bridge", "program", "action", "stop"
-]
-"""What moved a robot. ``action``: it says itself that an action could not be ended; ``stop``: nobody knows,
-but a Stop was not proven."""
-OnMoved: TypeAlias = Callable[[Sequence[str], MovedBy], object]
+OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
 """Called with the robots that a message moves, and what sends it, before it is sent."""
+UNKNOWN: tuple[str, str] = ("action", "stop")
+"""Not what moved a robot: it says itself that it could not end an action, or it did not prove a Stop."""
 MAX_MOTIONS = 64
 """Motions of one robot that are told apart by their ids; further ones end only with a Stop."""
 
-_SENTENCES: dict[MovedBy, str] = {
+_SENTENCES = {
     "form": lazy("{robot} got a command from a form and has not answered since"),
     "behaviour": lazy("{robot} got a command from a behaviour and has not answered since"),
     "shelf": lazy("{robot} got a command from a message of the publish shelf and has not answered since"),
@@ -36,13 +33,16 @@ _SENTENCES: dict[MovedBy, str] = {
     "alarm": lazy("{robot} got a command from an alarm and has not answered since"),
     "replay": lazy("{robot} got a command from a replayed recording and has not answered since"),
     "bridge": lazy("{robot} got a command from a bridge and has not answered since"),
+    "image": lazy("{robot} got a command from a click on a picture and has not answered since"),
     "program": lazy("{robot} got a command from a Python program and has not answered since"),
     "action": lazy("{robot} could not end an action and has not answered since"),
     "stop": lazy("{robot} has not answered Stop"),
 }
+"""By what moved it; anything else is `_OTHER`."""
+_OTHER = lazy("{robot} got a command and has not answered since")
 
 
-def ignore_moved(_names: Sequence[str], _by: MovedBy) -> None:
+def ignore_moved(_names: Sequence[str], _by: str) -> None:
     """Default `OnMoved`: nothing keeps the motion."""
 
 
@@ -56,7 +56,7 @@ class Motion:
 
     number: int
     robot: str
-    by: MovedBy
+    by: str
     since_s: float
     program: Identity | None
     id: str = ""
@@ -64,12 +64,12 @@ class Motion:
     @property
     def is_known(self) -> bool:
         """Whether it is known what moved the robot."""
-        return self.by not in ("action", "stop")
+        return self.by not in UNKNOWN
 
     @property
     def sentence(self) -> str:
         """Why nobody knows that the robot stands still, without a full stop."""
-        return _(_SENTENCES[self.by]).format(robot=self.robot)
+        return _(_SENTENCES.get(self.by, _OTHER)).format(robot=self.robot)
 
 
 class MovedRobots:
@@ -125,14 +125,12 @@ class MovedRobots:
         }
         return tuple(others.values())
 
-    def note(
-        self, names: Iterable[str], by: MovedBy, *, id: str = "", program: Identity | None = None
-    ) -> None:
+    def note(self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None) -> None:
         """Enter robots that are told to move; call this before the message is sent.
 
         Args:
             names: The robots.
-            by: What moves them.
+            by: What moves them: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
             id: Of the invocation, when the robot's final answer to it ends the motion.
             program: The robot's program, when it is not the one that it is now.
         """

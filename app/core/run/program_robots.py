@@ -71,6 +71,8 @@ class ProgramRobots:
         if self._runner is None:
             return
         owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
+        anew = [name for name, id in owners.items() if name in self._asked and self._told.get(name) != id]
+        self._fleet.moved.note(anew, "behaviour")  # under the program that the robot is now
         self._told = {**self._told, **owners}
         self._topics = self._fleet.moving.topics
         self._runner.set_robots(owners, self._topics)

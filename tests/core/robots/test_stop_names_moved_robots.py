@@ -10,7 +10,6 @@ import pytest
 
 from app.core.robots.announcements import MOST_ROBOTS
 from app.core.robots.fleet import Fleet
-from app.core.robots.moved_robots import MovedBy
 from app.core.robots.robot_link import RobotLink
 from nep.messages.message import Message
 from tests.core.robots.simulated_network import FakeRobot, SimulatedStudio, publisher_of
@@ -98,8 +97,8 @@ def test_a_motion_whose_end_was_seen_is_named_no_more(studio: SimulatedStudio) -
     assert link.state == "away"
 
 
-@pytest.mark.parametrize("by", ["shelf", "key", "alarm", "replay", "bridge", "behaviour"])
-def test_whatever_moved_it_is_said(studio: SimulatedStudio, by: MovedBy) -> None:
+@pytest.mark.parametrize("by", ["shelf", "key", "alarm", "replay", "bridge", "behaviour", "anything"])
+def test_whatever_moved_it_is_said(studio: SimulatedStudio, by: str) -> None:
     pepper = studio.network.add("Pepper")
     the_link(studio)
     studio.session.fleet.moved.note(["Pepper"], by)

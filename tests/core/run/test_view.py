@@ -178,3 +178,29 @@ def test_stop_words() -> None:
     assert stop_words(PEPPER, "8:40") == "answered in 38 ms, at 8:40"
     assert stop_words(SILENT, "8:40") == "not answered, at 8:40"
     assert stop_words(RIZE, "8:40") == "sent at 8:40; this robot cannot confirm"
+
+
+@pytest.mark.parametrize(
+    ("robots", "status"),
+    [
+        ((), "off"),
+        ((PEPPER, TURTLE), "ok"),
+        ((PEPPER, SILENT), "error"),
+        ((RobotStop("Rosie", False, None, can_confirm=False),), "off"),
+        ((PEPPER, RobotStop("Rosie", False, None, can_confirm=False)), "off"),
+        ((PEPPER, RobotStop("Pepper", False, None, can_confirm=False, program="motor box")), "ok"),
+    ],
+)
+def test_only_a_complete_proof_is_green(robots: tuple[RobotStop, ...], status: str) -> None:
+    assert StopReport(robots, 41.0).status == status
+
+
+def test_a_program_without_robots_says_how_it_ended_and_proves_nothing() -> None:
+    run = RunState("ready", "Greeting", elapsed_s=3.0, finished=True, report=StopReport((), 0.0))
+    view = view_of(run, [], 0)
+    assert (view.state, view.title, view.result, view.result_status) == (
+        "ready",
+        "Finished after 3 s",
+        None,
+        "off",
+    )

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
+from app.core.robots.stop_report import StopStatus
 from app.core.run.view import RunView
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.command import Command
@@ -25,6 +26,7 @@ VIEWS = {
         "running", "Running, 14 s", "Pepper says “Touch my head.”", "Greeting runs, 14 s",
         can_pause=True, can_step=True, can_restart=True, run_word="Restart",
         last_stop="all 2 robots stopped (41 ms)",
+        last_stop_status="ok",
     ),
     "paused": RunView(
         "paused", "Paused at “wait 2 s”", "Robots hold still; the clock stands", "Greeting is paused",
@@ -86,6 +88,12 @@ def test_each_state_is_as_in_the_picture(bar: RunBar, state, run, pause, step, s
     assert bar.confirm.isVisible() == (state == "unanswered")
     assert bar.sentence.accessibleName() == f"{VIEWS[state].title}. {VIEWS[state].detail}"
     assert (bar.sentence.colour_role == "text") == (state != "unanswered")  # else red
+
+
+@pytest.mark.parametrize("status", ["ok", "off", "error"])
+def test_the_last_stop_has_the_icon_of_its_own_result(bar: RunBar, status: StopStatus) -> None:
+    bar.show_view(replace(VIEWS["running"], last_stop="1 of 2 robots stopped", last_stop_status=status))
+    assert (bar.result.look, bar.result.status) == ("reminder", status)
 
 
 def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
