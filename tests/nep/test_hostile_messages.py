@@ -130,6 +130,7 @@ def test_bridge_carries_the_message_after_hostile_ones():
 
 
 def test_recorder_and_exports_keep_the_message_after_hostile_ones(tmp_path):
+    payloads = [each for each in hostile.payloads(POSE, share=5) if len(each) < 1_000_000]
     with (
         nep.node("recorder", "memory", master="hostile") as node,
         nep.node("evil", "memory", master="hostile") as evil,
@@ -138,10 +139,10 @@ def test_recorder_and_exports_keep_the_message_after_hostile_ones(tmp_path):
     ):
         for publisher in (evil.new_pub("/pose"), evil.new_pub(LOG_TOPIC, LOG_TYPE)):
             eventually(lambda publisher=publisher: publisher.subscribers > 0)
-            for payload in SMALL:
+            for payload in payloads:
                 publisher.publish_bytes(payload)
             publisher.publish({"honest": True})
-        eventually(lambda: writer.flush() and writer.status.message_count >= 2 * (len(SMALL) + 1))
+        eventually(lambda: writer.flush() and writer.status.message_count >= 2 * (len(payloads) + 1))
     with Recording(tmp_path / "a.mcap") as recording:
         (written, _log) = export(recording, "csv", tmp_path / "csv")
     assert "honest" in written.path.read_text(encoding="utf-8")
