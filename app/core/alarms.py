@@ -330,7 +330,7 @@ class SessionAlarms:
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
             done(False, _("not sent: the question whether a robot may move is not answered yet"))
             return
-        reason = _("An alarm sends a message on {topic}: {what}.").format(
+        reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=what_words(event.rule.condition, event.seen)
         )
         go_on = partial(self._send_asked, event, action, done)

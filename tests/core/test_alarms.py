@@ -86,7 +86,7 @@ def test_an_alarm_moves_a_real_robot_only_after_a_yes(session: Session, master) 
         assert come_on() == []
         tick_until(session, lambda: permission.question is not None)
         assert permission.question.title == "Let Rover move?"
-        assert f"An alarm sends a message on {TOPIC}" in permission.question.sentence
+        assert f"An alarm wants to send a message on {TOPIC}" in permission.question.sentence
         permission.answer(let=False)
         tick_until(session, lambda: session.alarms.history.records[0].deeds)
         assert session.alarms.history.records[0].deeds[0].words == "not sent: Rover may not move"

@@ -127,12 +127,13 @@ class MotionGate:
         now = self._robots.moving, self._permission.revision
         if now == self._seen:
             return
+        known = {robot.name: robot for robot in self._robots.movable}
         allowed = {
-            robot.name
-            for robot in self._robots.movable
+            name
+            for name, robot in known.items()
             if self._permission.allowed(robot) or not risky(robot, _actions(robot))
         }
-        strangers = self._permission.strangers
+        strangers = self._permission.strangers - known.keys()  # a yes counts until the robot is known
         self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described)
         self._seen = now
 

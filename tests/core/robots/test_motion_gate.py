@@ -87,7 +87,7 @@ def test_a_message_that_moves_a_real_robot_waits_for_a_yes(rover) -> None:
     assert not gate.is_permitted(TOPIC)
 
 
-def test_robots_without_a_readable_description_are_asked_about_too() -> None:
+def test_robots_without_a_readable_description_are_asked_about_too(rover) -> None:
     robots, permission = Robots(), MotionPermission()
     robots.come(others=(RobotControls("Rover", frozenset({TOPIC})),))
     gate = MotionGate(permission, robots)
@@ -96,6 +96,9 @@ def test_robots_without_a_readable_description_are_asked_about_too() -> None:
     assert permission.question.title == "Let Rover move?"
     permission.answer(let=True)
     assert gate.is_permitted(TOPIC)
+    robots.come(rover)  # its description was read: the yes was for whoever had this name
+    assert not gate.is_permitted(TOPIC)
+    robots.come()
     assert not gate.permits("/Fido/go", lambda: None, "robot/command")
     assert permission.question is not None
     assert permission.question.names == ("the robot on /Fido/go",)

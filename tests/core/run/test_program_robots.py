@@ -1,0 +1,45 @@
+"""A program that runs is told which topics move robots, also robots whose descriptions can't be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+
+from app.core.run.program_robots import ProgramRobots
+from nep.programs.robots import MovingTopics, RobotControls
+
+ROVER = RobotControls("Rover", frozenset({"/Rover/command"}))
+
+
+class Program:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[Mapping[str, Sequence[str]]] = []
+
+    def set_robots(self, _owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
+        self.told.append(guarded)
+
+
+def test_program_is_told_of_robots_that_cannot_be_read_and_of_nothing_twice() -> None:
+    fleet = SimpleNamespace(
+        connected=(),
+        moving=MovingTopics(),
+        revision=1,
+        link=lambda _name: None,
+        permission=SimpleNamespace(permits=lambda *_words: True),
+    )
+    program = Program()
+    robots = ProgramRobots(fleet)  # type: ignore[arg-type]
+    robots.begin(program, (), {})  # type: ignore[arg-type]
+    robots.follow()
+    assert program.told == []
+    fleet.moving = MovingTopics([ROVER])
+    robots.follow()
+    robots.follow()
+    fleet.moving = MovingTopics([ROVER])  # another graph, the same robots
+    robots.follow()
+    assert program.told == [{"/Rover/command": ("Rover",), "robot_action": ("Rover",)}]
+    robots.begin(program, (), {})  # type: ignore[arg-type]
+    robots.follow()
+    assert len(program.told) == 2  # it was started with the connected robots only
