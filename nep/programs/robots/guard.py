@@ -34,6 +34,7 @@ __all__ = ["MotionGuard", "refusal_words"]
 MAX_DESCRIPTIONS = 200
 MAX_DESCRIPTION_BYTES = 1_000_000
 _MAX_CLAIMANTS = 8
+_MAX_WAITING_BYTES = 16 * 2**20
 _MAX_CACHED = 10_000
 _MAX_NAME_SHOWN, _MAX_NAMES_SHOWN = 100, 5
 _POLL_S = 0.05
@@ -63,8 +64,10 @@ class MotionGuard:
         self._lock = threading.RLock()
         self._received_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
         self._subscribers: dict[str, Subscriber] = {}
-        self._received: dict[str, dict[int | None, Message]] = {}
-        self._controls: dict[str, dict[int | None, tuple[Message, RobotControls | None]]] = {}
+        self._received: dict[tuple[str, int | None], Message] = {}
+        """Descriptions that wait to be read, the newest of each publisher."""
+        self._controls: dict[str, dict[int | None, RobotControls]] = {}
+        """By description topic what each publisher described last in a readable form."""
         self._moving = MovingTopics()
         self._view: GraphView | None = None
         self._is_dirty = False
@@ -89,8 +92,7 @@ class MotionGuard:
                 if not self._is_dirty:
                     return
             else:
-                self._view = view
-                self._subscribe(view)
+                self._view = view if self._subscribe(view) else None  # else it is tried again
             self._rebuild(view)
 
     def look(self) -> None:
@@ -131,51 +133,49 @@ class MotionGuard:
 
     # ---- descriptions
 
-    def _subscribe(self, view: GraphView) -> None:
-        """Subscribe to descriptions. One that has gone stays known: its program may only have slept."""
+    def _subscribe(self, view: GraphView) -> bool:
+        """Subscribe to descriptions; whether all are subscribed.
+
+        One that has gone stays known: its program may only have slept.
+        """
         for topic in sorted(description_topics(view) - self._subscribers.keys()):
             if len(self._subscribers) >= MAX_DESCRIPTIONS:
                 gone = next((each for each in self._subscribers if each not in view.topics), None)
                 if gone is None:
-                    return  # it counts as not read
+                    return True  # those that are left out count as not read
                 self._subscribers.pop(gone).close()
                 self._controls.pop(gone, None)
-                with self._received_lock:
-                    self._received.pop(gone, None)
             try:
                 made = self._node.new_sub(topic, DESCRIPTION_TYPE, sink=self._receive, wildcards=False)
             except NepError:
-                continue  # with the next graph it is tried again
+                return False
             self._subscribers[topic] = made
+        return True
 
     def _receive(self, messages: Sequence[Message]) -> None:
         with self._received_lock:
             for message in messages:
-                newest = self._received.setdefault(message.topic, {})
-                newest.pop(message.publisher, None)
-                newest[message.publisher] = message
-                while len(newest) > _MAX_CLAIMANTS:
-                    del newest[next(iter(newest))]
+                key = message.topic, message.publisher
+                self._received.pop(key, None)
+                if len(message.data) <= MAX_DESCRIPTION_BYTES:
+                    self._received[key] = message
+            while sum(len(each.data) for each in self._received.values()) > _MAX_WAITING_BYTES:
+                del self._received[next(iter(self._received))]  # its robot counts as not read
             self._is_dirty = True
 
     def _rebuild(self, view: GraphView) -> None:
         with self._received_lock:
             self._is_dirty = False
-            received = {topic: dict(newest) for topic, newest in self._received.items()}
-        for topic, newest in received.items():
-            before = self._controls.get(topic, {})
-            self._controls[topic] = {
-                publisher: known
-                if (known := before.get(publisher)) is not None and known[0] is message
-                else (message, _read(message, topic) or (None if known is None else known[1]))
-                for publisher, message in newest.items()
-            }
-        robots = [
-            controls
-            for claims in self._controls.values()
-            for _message, controls in claims.values()
-            if controls is not None
-        ]
+            received, self._received = self._received, {}
+        for (topic, publisher), message in received.items():
+            controls = _read(message, topic)
+            if controls is not None:
+                claims = self._controls.setdefault(topic, {})
+                claims.pop(publisher, None)
+                claims[publisher] = controls
+                while len(claims) > _MAX_CLAIMANTS:
+                    del claims[next(iter(claims))]
+        robots = [controls for claims in self._controls.values() for controls in claims.values()]
         robots += original_robots(view)
         self._moving = moving_topics(view, robots, self._unread(view), self._own_nodes)
         self._cache = {}
@@ -184,21 +184,14 @@ class MotionGuard:
         """The description topics with a publisher whose description could not be read so far."""
 
         def is_unread(topic: str) -> bool:
-            read = {
-                publisher
-                for publisher, (_message, controls) in self._controls.get(topic, {}).items()
-                if controls is not None
-            }
-            publishers = view.topics[topic].publishers
-            return None not in read and any(each.id not in read for each in publishers)
+            read = self._controls.get(topic, {}).keys()
+            return None not in read and any(each.id not in read for each in view.topics[topic].publishers)
 
         return frozenset(filter(is_unread, description_topics(view)))
 
 
 def _read(message: Message, topic: str) -> RobotControls | None:
     """The robot that a message describes; everybody's word counts here, because it only protects."""
-    if len(message.data) > MAX_DESCRIPTION_BYTES:
-        return None
     try:
         return controls_in(message.payload, described_name(topic))
     except Exception:  # noqa: BLE001 - a stranger wrote it; what its program hears is protected
