@@ -189,9 +189,14 @@ def moving_topics(
         own_nodes: Ids of nodes of the asking program; what they subscribe to does not count.
     """
     known = [*robots, *_unread_robots(view, unread, own_nodes)]
-    typed = (name for name, info in view.topics.items() if info.msg_type == COMMAND_TYPE and info.subscribers)
-    typed_patterns = (name for name, info in view.patterns.items() if info.msg_type == COMMAND_TYPE)
-    return MovingTopics(known, unidentified=(*typed, *typed_patterns))
+    typed = [(info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE]
+    typed += [
+        (info.name, info.subscribers) for info in view.patterns.values() if info.msg_type == COMMAND_TYPE
+    ]
+    heard = (
+        name for name, subscribers in typed if any(each.node_id not in own_nodes for each in subscribers)
+    )
+    return MovingTopics(known, unidentified=heard)
 
 
 def _unread_robots(

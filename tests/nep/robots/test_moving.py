@@ -94,11 +94,13 @@ def test_driver_that_is_about_to_announce_itself_is_protected() -> None:
 
 def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
     view = graph(
-        topic("/Fido/go", "robot/command", subscriber="n"), patterns=(PatternInfo("/x/*", "robot/command"),)
+        topic("/Fido/go", "robot/command", subscriber="n"),
+        patterns=(PatternInfo("/x/*", "robot/command", (SubscriberInfo(3, "n", 0, 0),)),),
     )
     moving = moving_topics(view, [ROVER])
     assert moving.moved_by("/Fido/go", "json") == ("/Fido/go",)
     assert moving.moved_by("/x/y") == ("/x/y",)
+    assert moving_topics(view, [], own_nodes=["n"]).moved_by("/x/y") == ()
 
 
 def test_robots_of_the_original_nep_have_the_names_of_their_nodes() -> None:
