@@ -1,1 +1,1 @@
-"""What is made of nodes, and runs as a command, too: bridges and blackboards."""
+"""Programs made of nodes that also run as commands: bridges, blackboards, alarms; and what they share."""
