@@ -36,6 +36,7 @@ PROCESSES = (
     "app.ui.speaker",
     "nep",
     "nep.recordings.child",
+    "nep.recordings.reader_process",
 )
 
 GRACE_S = 5.0

@@ -167,7 +167,12 @@ class Session:
             SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
             SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
             SessionRecordings(
-                self.settings, self.alerts, self.address, self._mailbox.post_event, clock=clock
+                self.settings,
+                self.alerts,
+                self.address,
+                self._mailbox.post_event,
+                clock=clock,
+                reads_apart=start_processes,
             ),
         )
         self._connect_parts()
@@ -217,11 +222,18 @@ class Session:
         return self.replay.console if self.replay is not None else self.console
 
     def open_recording(self, path: Path) -> replay_module.Replay:
-        """Show a recording in place of the live network, which goes on; it is read in a thread."""
+        """Show a recording in place of the live network, which goes on; a process of its own reads it."""
         live = self.live
         self._end_replay()
         self._live = live
-        opened = replay_module.Replay(path, self.settings, self.alerts, clock=self._clock, acting=self.acting)
+        opened = replay_module.Replay(
+            path,
+            self.settings,
+            self.alerts,
+            clock=self._clock,
+            acting=self.acting,
+            reading=self.recordings.new_reading(),
+        )
         self.replay = opened
         self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
         self.images, self.series, self.graph = opened.images, opened.series, None

@@ -5,10 +5,11 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
+from app.core.recording.reading import LocalReading, Reading
 from nep.errors import NepError
 from nep.i18n import _, ngettext
+from nep.recordings.damage import damage_words
 from nep.recordings.export import ALL_OF_IT, Exported, Part, export
-from nep.recordings.reader import Recording
 
 
 class _CancelledError(Exception):
@@ -18,8 +19,21 @@ class _CancelledError(Exception):
 class RecordingExport:
     """One export, in a thread of its own. All that is here may be asked from any thread."""
 
-    def __init__(self, recording: Path, kind: str, folder: Path, part: Part = ALL_OF_IT) -> None:
-        """Begin; ``kind`` is one of `nep.recordings.export.FORMATS`, the folder is made."""
+    def __init__(
+        self,
+        recording: Path,
+        kind: str,
+        folder: Path,
+        part: Part = ALL_OF_IT,
+        reading: Reading | None = None,
+    ) -> None:
+        """Begin; ``kind`` is one of `nep.recordings.export.FORMATS`, the folder is made.
+
+        ``reading`` is closed at the end.
+        """
+        self._reading: Reading = LocalReading() if reading is None else reading
+        self.damage = ""
+        """What of the recording could not be read, in words; "" for nothing."""
         self._part = part
         self.folder = folder
         self.files: tuple[Exported, ...] = ()
@@ -66,18 +80,21 @@ class RecordingExport:
         if self.problem:
             return _("It was not exported: {reason}").format(reason=self.problem)
         count = len(self.files)
-        return ngettext("Exported {count} file", "Exported {count} files", count).format(count=count)
+        said = ngettext("Exported {count} file", "Exported {count} files", count).format(count=count)
+        return said if not self.damage else f"{said}; {self.damage}"
 
     def _run(self) -> None:
         try:
-            with Recording(self._recording) as recording:
+            with self._reading.open(self._recording) as recording:
                 made = export(recording, self._kind, self.folder, self._part, progress=self._tell)
+                self.damage = damage_words(recording.damage, recording.start_ns)
             self.files = tuple(made)
         except _CancelledError:
             pass
         except (NepError, OSError, MemoryError) as error:
             self.problem = str(error) or type(error).__name__
         finally:
+            self._reading.close()
             self._is_over.set()
 
     def _tell(self, done: int, total: int) -> None:

@@ -8,11 +8,14 @@ from pathlib import Path
 
 from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.folder import CACHE_BYTES
+from app.core.recording.reading import Reading
 from nep.errors import NepError
 from nep.recordings.export import Part
 from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
+_BUDGET = (1_000_000_000, 20.0)
+"""Bytes and seconds of work for one recording."""
 SAMPLES = 4
 """So many messages of a topic are looked at where nobody has counted its bytes."""
 MOST_SAMPLED = 200
@@ -72,10 +75,10 @@ class FilmStripLook:
         return sum(part * count for part, count in zip(inside, counts, strict=True)) / whole
 
 
-def film_strip(path: Path, pictures: int, bars: int, fit: Size) -> FilmStripLook | None:
+def film_strip(path: Path, pictures: int, bars: int, fit: Size, reading: Reading) -> FilmStripLook | None:
     """Look at a recording: so many pictures, each for a view of that size; None when it can't be read."""
     try:
-        with Recording(path, cache_bytes=CACHE_BYTES) as recording:
+        with reading.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
             if not recording.message_count:
                 return None
             start_ns, end_ns = recording.start_ns, recording.end_ns

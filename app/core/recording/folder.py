@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -12,9 +12,9 @@ import platformdirs
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture, Size, decode
-from nep.errors import NepError
+from app.core.recording.reading import LocalReading, Reading
+from nep.errors import NepError, RecordingTooLargeError
 from nep.i18n import _
-from nep.recordings.reader import Recording
 
 SUFFIX = ".mcap"
 MOST_FILES = 2_000
@@ -23,6 +23,8 @@ AT_ONCE = 50
 MOST_TOPICS = 200
 CACHE_BYTES = 8_000_000
 """Of one recording that is open for a moment only."""
+SCAN_BUDGET = (256_000_000, 3.0)
+"""Bytes and seconds of work that a look into one file may take."""
 _OWNER = "recordings"
 
 
@@ -30,8 +32,9 @@ _OWNER = "recordings"
 class RecordingFacts:
     """A file of the folder.
 
-    ``problem`` says why it cannot be read; "" when it can. ``is_complete``: it was ended; else it can be
-    read as far as it is whole, and repaired. ``is_kept``: made by a flight recorder. ``is_read``: whether
+    ``problem`` says why it cannot be read; "" when it can. ``not_scanned``: why it was not looked into; it
+    may be opened all the same. ``is_complete``: it was closed; else it is read as far as it is whole.
+    ``is_kept``: made by a flight recorder. ``is_read``: whether
     more than name, size and time is known yet. ``topics``: the first 200 names. ``lost``: messages that did
     not come or could not be written, None where nobody counted.
     """
@@ -49,6 +52,7 @@ class RecordingFacts:
     is_repaired: bool = False
     is_kept: bool = False
     problem: str = ""
+    not_scanned: str = ""
     lost: int | None = None
 
 
@@ -84,9 +88,10 @@ def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
 class RecordingFolder:
     """Looks at a folder again and again, and opens only what is new. One thread uses it (the window's)."""
 
-    def __init__(self, folder: Path) -> None:
-        """Nothing is looked at before `look`."""
+    def __init__(self, folder: Path, reading: Reading | None = None) -> None:
+        """Nothing is looked at before `look`. ``reading`` is closed with it."""
         self.folder = folder
+        self._reading: Reading = LocalReading() if reading is None else reading
         self._worker: BackgroundWorker[FolderLook] = BackgroundWorker("recordings-folder")
         self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
         """By the thread of the worker alone."""
@@ -101,6 +106,7 @@ class RecordingFolder:
 
     def close(self) -> None:
         """Look no more."""
+        self._reading.close()
         self._worker.close()
 
     def _look(self, being_written: Path | None) -> FolderLook:
@@ -126,17 +132,17 @@ class RecordingFolder:
             plain = RecordingFacts(path, about.st_size, about.st_mtime)
             if path != being_written and opened < AT_ONCE:
                 opened += 1
-                plain = read_facts(plain)
+                plain = read_facts(plain, self._reading)
                 self._known[path] = (mark, plain)
             files.append(plain)
         is_whole = all(each.is_read or each.path == being_written for each in files)
         return FolderLook(tuple(files), "", left_out, is_whole)
 
 
-def read_facts(plain: RecordingFacts) -> RecordingFacts:
-    """The same with what the file says of itself, or why it cannot be read."""
+def read_facts(plain: RecordingFacts, reading: Reading) -> RecordingFacts:
+    """The same with what the file says of itself, or why it cannot be read or was not scanned."""
     try:
-        with Recording(plain.path) as recording:
+        with reading.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words, figures = recording.words, recording.figures()
             return RecordingFacts(
                 plain.path,
@@ -153,14 +159,17 @@ def read_facts(plain: RecordingFacts) -> RecordingFacts:
                 is_kept=words.get("kept") == "1",
                 lost=sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None,
             )
+    except RecordingTooLargeError as error:
+        why = _("Not scanned: {reason}.").format(reason=error.reason)
+        return replace(plain, is_read=True, is_complete=True, not_scanned=why)
     except (NepError, OSError) as error:
-        return RecordingFacts(plain.path, plain.size_bytes, plain.changed_s, is_read=True, problem=str(error))
+        return replace(plain, is_read=True, problem=str(error))
 
 
-def picture_in(path: Path, fit: Size) -> Picture | None:
+def picture_in(path: Path, fit: Size, reading: Reading) -> Picture | None:
     """A picture of its fullest topic of pictures, for a view of that size; None where it has none."""
     try:
-        with Recording(path, cache_bytes=CACHE_BYTES) as recording:
+        with reading.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             topics = [each for each in recording.topics.values() if each.codec == "image"]
             if not topics:
                 return None

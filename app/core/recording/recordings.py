@@ -40,8 +40,10 @@ from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from app.core.recording import folder as folders
-else:
-    folders = lazy_module("app.core.recording.folder")  # which reads recordings: no start waits for it
+    from app.core.recording import reading as readings
+else:  # they read recordings: no start waits for that
+    folders = lazy_module("app.core.recording.folder")
+    readings = lazy_module("app.core.recording.reading")
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
@@ -71,8 +73,13 @@ class SessionRecordings:
         start: StartRecorder = RecorderProcess,
         clock: Callable[[], float] = time.monotonic,
         now: Callable[[], datetime] = datetime.now,
+        reads_apart: bool = True,
     ) -> None:
-        """Read what was chosen; nothing is started before `start`, or before something is recorded."""
+        """Read what was chosen; nothing is started before `start`, or before something is recorded.
+
+        ``reads_apart``: recordings are read in processes of their own.
+        """
+        self._reads_apart = reads_apart
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
         self.events = RecordedEvents(self.client.say)
@@ -124,6 +131,10 @@ class SessionRecordings:
             action=CHOOSE_FOLDER,
         )
         return None
+
+    def new_reading(self) -> readings.Reading:
+        """Return what opens recordings; who has it closes it."""
+        return readings.process_reading() if self._reads_apart else readings.LocalReading()
 
     # ---- recording
 

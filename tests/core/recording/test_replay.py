@@ -236,7 +236,7 @@ def test_what_was_cut_off_is_told(tmp_path, path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-3000])
     made = Shown(cut)
-    assert [alert.id for alert in made.alerts.active] == ["recording:repaired"]
+    assert [alert.id for alert in made.alerts.active] == ["recording:not-closed"]
     made.replay.close()
 
 

@@ -271,20 +271,17 @@ def test_figures_are_those_of_the_playhead(replay, whole):
     assert handed.figures["/rare"].rate_hz == 0.0
 
 
-def test_a_recording_without_an_end_is_repaired_to_a_copy_which_is_used_again(tmp_path, path, whole):
+def test_a_recording_without_an_end_is_played_as_it_is_and_nothing_is_written(tmp_path, path, whole):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-400])
     before = cut.read_bytes()
-    for again in (False, True):
-        played = Replayed(cut, "/a")
-        opened = played.source.opened
-        assert opened.is_copy
-        assert (opened.repaired is None) is again
-        assert opened.recording.is_complete
-        assert opened.recording.message_count == COUNT
-        played.source.close()
+    played = Replayed(cut, "/a")
+    opened = played.source.opened
+    assert not opened.recording.is_complete
+    assert opened.recording.message_count == COUNT
+    played.source.close()
     assert cut.read_bytes() == before
-    assert len(list(tmp_path.glob("*.mcap"))) == 2
+    assert list(tmp_path.iterdir()) == [cut]
 
 
 @pytest.mark.parametrize("content", [b"", b"no recording", bytes(5000)])

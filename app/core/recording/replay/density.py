@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
+from nep.errors import NepError
 from nep.recordings.figures import TopicFigures
 from nep.recordings.reader import Recording
 
@@ -53,6 +54,7 @@ class Densities:
         self._recording = recording
         self._worker: BackgroundWorker[_Made] = BackgroundWorker("studio-density")
         self.newest: Density | None = None
+        self.problem = ""
         self.losses: Mapping[str, tuple[LossMark, ...]] = {}
         self.spans = RecordedSpans()
         self._wanted: tuple[int, int, int] | None = None
@@ -68,9 +70,8 @@ class Densities:
         self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
 
     def take(self) -> bool:
-        """Take over what is ready; whether something is new. Raises what the reading raised."""
-        density, losses = self._worker.take("density"), self._worker.take("losses")
-        spans = self._worker.take("spans")
+        """Take over what is ready; whether something is new. `problem` says why reading failed, if it did."""
+        density, losses, spans = (self._take(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
         if losses is not None:
@@ -78,6 +79,13 @@ class Densities:
         if spans is not None:
             self.spans = spans.spans or RecordedSpans()
         return density is not None or losses is not None or spans is not None
+
+    def _take(self, owner: str) -> _Made | None:
+        try:
+            return self._worker.take(owner)
+        except NepError as error:
+            self.problem = str(error)
+            return None
 
     def close(self) -> None:
         """End."""

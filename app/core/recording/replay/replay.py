@@ -14,6 +14,7 @@ from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
 from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import Networks
+from app.core.recording.reading import Reading
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.recording.replay.sending import ReplaySending
@@ -21,16 +22,17 @@ from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
 from app.core.run.acting.acting import SessionActing
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
-from nep.i18n import _, ngettext
+from nep.i18n import _, ngettext, number
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.recordings.bookmarks import Bookmark
+from nep.recordings.damage import damage_words
 from nep.recordings.figures import TopicFigures
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 
-FAILED, REPAIRED, DAMAGED = "recording:failed", "recording:repaired", "recording:damaged"
+FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
 """The ids of what it tells in alerts."""
 SHOW_FILE = "recording.folder"
 """The window's command, with the file's path, that shows where it is."""
@@ -54,8 +56,12 @@ class Replay:
         *,
         clock: Callable[[], float] = time.monotonic,
         acting: SessionActing | None = None,
+        reading: Reading | None = None,
     ) -> None:
-        """Nothing is read before `start`. Without ``acting`` nothing of it can be sent."""
+        """Nothing is read before `start`. Without ``acting`` nothing of it can be sent.
+
+        ``reading`` opens the file, by default in this process; it is closed with the replay.
+        """
         self.path = path
         self.opened: OpenedRecording | None = None
         self._watches = Watches(self._begin_watch, self._end_watch)
@@ -63,7 +69,7 @@ class Replay:
         self.networks = Networks(settings, (), lambda _event: None, alerts)
         self.images = Images(self.watch, clock)
         self.images.now_ns = self._position_ns
-        self.source = ReplaySource(path, self.images, clock=clock)
+        self.source = ReplaySource(path, self.images, clock=clock, reading=reading)
         self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_deep)
         self.console = Console(lambda: self._position_ns() / 1e9)
         self.graph: GraphView | None = None
@@ -74,7 +80,7 @@ class Replay:
             self.sending.on_change = self._forward
         self._logs: list[Watch] = []
         self._alerts, self._has_failed, self._damaged = alerts, False, 0
-        for id in (FAILED, REPAIRED, DAMAGED):
+        for id in (FAILED, NOT_CLOSED, DAMAGED):
             alerts.resolve(id)
 
     def start(self) -> None:
@@ -317,43 +323,44 @@ class Replay:
                 self.source.set_deep(topic, CAPACITY)
                 self._logs.append(self.watch(topic))
 
-        self._tell_repaired(opened)
+        self._tell_not_closed(opened)
 
     def _tell_problems(self) -> None:
         status = self.status
-        if status.stage == "failed" and not self._has_failed:
+        reason = status.sentence if status.stage == "failed" else ""
+        if not reason and self.densities is not None:
+            reason = self.densities.problem
+        if reason and not self._has_failed:
             self._has_failed = True
             title = _("{name} can't be played.").format(name=self.name)
-            sentence = f"{status.sentence[:1].upper()}{status.sentence[1:]}."
+            sentence = f"{reason[:1].upper()}{reason[1:]}."
             action = f"{SHOW_FILE}:{self.path}"
             self._alerts.put(FAILED, "error", title, sentence, button=_("Show the file"), action=action)
-        if status.damaged > self._damaged:
-            self._damaged = status.damaged
-            words = ngettext(
-                "{count} piece of {name} is damaged, and was passed over.",
-                "{count} pieces of {name} are damaged, and were passed over.",
-                status.damaged,
+        if len(status.damage) > self._damaged:
+            self._damaged = count = len(status.damage)
+            title = ngettext(
+                "{count} piece of {name} is damaged and is skipped.",
+                "{count} pieces of {name} are damaged and are skipped.",
+                count,
             )
-            self._alerts.put(DAMAGED, "warn", words.format(count=status.damaged, name=self.name))
+            detail = damage_words(status.damage, self.start_ns)
+            self._alerts.put(
+                DAMAGED,
+                "warn",
+                title.format(count=count, name=self.name),
+                f"{detail[:1].upper()}{detail[1:]}.",
+            )
 
-    def _tell_repaired(self, opened: OpenedRecording) -> None:
-        """Say what became of a file that was not ended, or was cut off."""
-        report, name = opened.repaired, self.name
-        if opened.why_not_repaired:
-            title = _("{name} was not ended, and is played as far as it goes.").format(name=name)
-            self._alerts.put(REPAIRED, "warn", title, f"{opened.why_not_repaired}.")
-        elif report is not None and report.is_whole:
-            title = _("{name} was not ended. All of it is there, in {copy}.")
-            self._alerts.put(REPAIRED, "info", title.format(name=name, copy=report.path.name))
-        elif report is not None:
-            title = _("{name} was cut off, or damaged.").format(name=name)
-            detail = _("{recovered} s recovered, {lost} s lost; it is in {copy}.").format(
-                recovered=f"{report.duration_s:.1f}", lost=f"{report.lost_s:.1f}", copy=report.path.name
-            )
-            self._alerts.put(REPAIRED, "warn", title, detail)
-        elif opened.is_copy:
-            title = _("{name} was not ended; its repaired copy is played.").format(name=name)
-            self._alerts.put(REPAIRED, "info", title)
+    def _tell_not_closed(self, opened: OpenedRecording) -> None:
+        """Say how much there is of a file that was cut off, or whose program was killed."""
+        recording = opened.recording
+        if recording.is_complete:
+            return
+        title = _("{name} was cut off or not closed. Everything up to {seconds} s is there.").format(
+            name=self.name, seconds=number(recording.duration_s, ".1f")
+        )
+        detail = _("To make a copy that is closed: nep recording repair {file}").format(file=self.path)
+        self._alerts.put(NOT_CLOSED, "info", title, detail)
 
     def _take_jump(self, messages: Sequence[Message], now: float) -> None:
         self.topics.rewind()

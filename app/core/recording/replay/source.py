@@ -17,9 +17,11 @@ from typing import Literal, Protocol
 
 from app.core.faults import error_words
 from app.core.network.mailbox import Drained, Mailbox
-from app.core.recording.replay.opening import OpenedRecording, Stage, open_recording
+from app.core.recording.reading import LocalReading, Reading
+from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError
 from nep.messages.message import Message, new_message
+from nep.recordings.index import Damage
 from nep.recordings.player import Due, Playback, PlayerStatus
 from nep.recordings.reader import Recording
 
@@ -36,7 +38,7 @@ MOST_HISTORY = 8192
 OWN_BYTES = 65_536
 """A smaller message is copied: else it would keep the whole megabyte of the file that it was read with."""
 
-ReplayStage = Literal["reading", "repairing", "there", "failed"]
+ReplayStage = Literal["reading", "there", "failed"]
 Order = Callable[[Playback], object]
 Forward = Callable[[Sequence[Message], Sequence[float]], object]
 """Given what is played just now, and by each how many seconds too late; in the replay's thread."""
@@ -63,7 +65,7 @@ class ReplayStatus:
     progress: float = 0.0
     sentence: str = ""
     player: PlayerStatus | None = None
-    damaged: int = 0
+    damage: Sequence[Damage] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +97,19 @@ class ReplaySource:
     """One recording. `start` and `close` begin and end its thread; everything else returns at once."""
 
     def __init__(
-        self, path: Path, pictures: PictureSink, *, clock: Callable[[], float] = time.monotonic
+        self,
+        path: Path,
+        pictures: PictureSink,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        reading: Reading | None = None,
     ) -> None:
-        """Nothing is read before `start`, or `open` and `turn`, which are what the thread does."""
+        """Nothing is read before `start`, or `open` and `turn`, which are what the thread does.
+
+        ``reading`` is closed at the end.
+        """
         self.path = path
+        self._reading: Reading = LocalReading() if reading is None else reading
         self.opened: OpenedRecording | None = None
         self._pictures, self._clock = pictures, clock
         self._changed = threading.Condition()
@@ -183,6 +194,7 @@ class ReplaySource:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
+        self._reading.close()
 
     @property
     def has_ended(self) -> bool:
@@ -212,6 +224,8 @@ class ReplaySource:
         except _ClosingError:
             return
         except NepError as error:
+            if self._closing:
+                return
             self._status = ReplayStatus("failed", sentence=str(error))
         except Exception as error:  # noqa: BLE001  a file may do anything; the window says so and lives on
             self._status = ReplayStatus("failed", sentence=error_words(error))
@@ -221,15 +235,15 @@ class ReplaySource:
 
     def open(self) -> None:
         """Read the index; the playhead is at the first message then. Raises `RecordingError`."""
-        self.opened = opened = open_recording(self.path, self._tell_progress)
+        self.opened = opened = open_recording(self.path, self._tell_progress, self._reading)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
         self._tell(playback)
 
-    def _tell_progress(self, stage: Stage, progress: float) -> None:
+    def _tell_progress(self, progress: float) -> None:
         if self._closing:
             raise _ClosingError
-        self._status = ReplayStatus(stage, progress)
+        self._status = ReplayStatus("reading", progress)
 
     def turn(self) -> float | None:
         """Do what was ordered and what is due; in how many seconds there is more, None when nothing is."""
@@ -263,8 +277,8 @@ class ReplaySource:
         return 0.0 if self._figures else due.wait_s
 
     def _tell(self, playback: Playback) -> None:
-        damaged = self.opened.recording.damaged_chunks if self.opened is not None else 0
-        self._status = ReplayStatus("there", 1.0, player=playback.status(), damaged=damaged)
+        damage = self.opened.recording.damage if self.opened is not None else ()
+        self._status = ReplayStatus("there", 1.0, player=playback.status(), damage=damage)
 
     def _choose(self, playback: Playback) -> None:
         with self._changed:

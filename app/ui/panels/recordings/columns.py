@@ -124,7 +124,7 @@ def cropped(image: QImage) -> QImage:
 
 def note_of(facts: RecordingFacts) -> str:
     """The line below the name: why it can't be read, the note, else its first topics."""
-    return facts.problem or facts.note or ", ".join(facts.topics[:3])
+    return facts.problem or facts.not_scanned or facts.note or ", ".join(facts.topics[:3])
 
 
 def columns(

@@ -154,6 +154,7 @@ class RecordingDetails(QWidget):
         topics, count = len(facts.topics), facts.message_count
         self.counts.setText(
             facts.problem
+            or facts.not_scanned
             or _("{topics}, {messages}").format(
                 topics=ngettext("{count} topic", "{count} topics", topics).format(count=grouped(topics)),
                 messages=ngettext("{count} message", "{count} messages", count).format(count=grouped(count)),

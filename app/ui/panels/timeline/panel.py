@@ -114,11 +114,7 @@ class TimelinePanel(PanelWidget):
             words = (_("{name} can't be played.").format(name=replay.name), f"{status.sentence}.", True)
         else:
             percent = round(100 * status.progress)
-            said = (
-                _("Reading the index, {percent} %")
-                if status.stage != "repairing"
-                else _("Repairing it, {percent} %")
-            )
+            said = _("Reading the index, {percent} %")
             words = (replay.name, said.format(percent=percent), False)
         if words == self._state and self.pages.currentIndex() == 0:
             return

@@ -1,0 +1,64 @@
+"""Where recordings are read: in a process of their own, so that no file can take Studio with it.
+
+Tests, and programs without a window, may read them in their own process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from app.core.own_process import module_command
+from nep.recordings.file_reader import CACHE_BYTES, FileReader
+from nep.recordings.limits import ReadBudget
+from nep.recordings.reader import Recording
+from nep.recordings.remote import ReaderProcess
+
+__all__ = ["LocalReading", "Reading", "StartReading", "process_reading"]
+
+
+class Reading(Protocol):
+    """Opens recordings. See `nep.recordings.remote.ReaderProcess`."""
+
+    def open(
+        self,
+        path: Path,
+        *,
+        cache_bytes: int = CACHE_BYTES,
+        progress: Callable[[int, int], object] | None = None,
+        budget: tuple[int, float | None] | None = None,
+    ) -> Recording:
+        """Open a recording. Raises `RecordingError`."""
+
+    def close(self) -> None:
+        """End at once, also while a recording is read. May be called twice."""
+
+
+StartReading = Callable[[], Reading]
+
+
+def process_reading() -> Reading:
+    """Return what reads recordings in a process of its own, which is started with the first one."""
+    return ReaderProcess(module_command("nep.recordings.reader_process"))
+
+
+class LocalReading:
+    """Reads recordings in this process."""
+
+    def open(
+        self,
+        path: Path,
+        *,
+        cache_bytes: int = CACHE_BYTES,
+        progress: Callable[[int, int], object] | None = None,
+        budget: tuple[int, float | None] | None = None,
+    ) -> Recording:
+        """See `Reading`."""
+        limit = None if budget is None else ReadBudget(path, *budget)
+        return Recording(
+            path, file=FileReader(path, cache_bytes=cache_bytes, progress=progress, budget=limit)
+        )
+
+    def close(self) -> None:
+        """See `Reading`."""

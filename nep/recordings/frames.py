@@ -1,0 +1,113 @@
+"""Frames between a program and the process that reads recordings for it: msgpack maps with their length."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import IO
+
+from nep.messages.packing import pack, unpack
+from nep.recordings.channels import ChannelDefinition
+from nep.recordings.file_reader import FileFacts
+from nep.recordings.index import Attachment, Damage
+from nep.recordings.records import RawMessage, message_head
+
+__all__ = [
+    "damage_of",
+    "facts_of",
+    "packed_messages",
+    "plain_damage",
+    "plain_facts",
+    "read_frame",
+    "write_frame",
+]
+
+_LENGTH = struct.Struct("<I")
+_MAX_FRAME_BYTES = 2**31 - 1
+
+
+def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
+    """Write a frame, and flush. Raises `OSError`, and `ValueError` for a stream that is closed."""
+    packed = pack(content)
+    stream.write(_LENGTH.pack(len(packed)))
+    stream.write(packed)
+    stream.flush()
+
+
+def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
+    """Read a frame; None at the end of the stream, or where it is no frame. Raises `OSError`."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    packed = stream.read(length) if length <= _MAX_FRAME_BYTES else b""
+    if len(packed) < length:
+        return None
+    try:
+        content = unpack(packed)
+    except ValueError:
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def packed_messages(messages: Iterable[RawMessage]) -> bytes:
+    """Messages as records of MCAP, one behind the other; `nep.recordings.records.messages_in` reads them."""
+    pieces: list[bytes | memoryview] = []
+    for raw in messages:
+        size = raw.data.nbytes
+        pieces += (message_head(raw.channel, raw.sequence, raw.log_ns, raw.publish_ns, size), raw.data)
+    return b"".join(pieces)
+
+
+def plain_damage(damage: Iterable[Damage]) -> list[dict[str, object]]:
+    """Damage as a frame has it."""
+    return [asdict(each) for each in damage]
+
+
+def damage_of(plain: object) -> tuple[Damage, ...]:
+    """The damage in a frame. Raises `TypeError` for what is none."""
+    return tuple(Damage(**each) for each in plain) if isinstance(plain, list) else ()
+
+
+def plain_facts(facts: FileFacts) -> dict[str, object]:
+    """What is known of a file, as a frame has it."""
+    return {
+        **{name: getattr(facts, name) for name in _SCALARS},
+        "channels": {
+            number: (
+                each.topic,
+                each.message_encoding,
+                each.schema_name,
+                each.schema_encoding,
+                each.schema_data,
+                each.metadata,
+            )
+            for number, each in facts.channels.items()
+        },
+        "counts": dict(facts.counts),
+        "metadata": [(name, dict(values)) for name, values in facts.metadata],
+        "attachments": [asdict(each) for each in facts.attachments],
+        "compressions": dict(facts.compressions),
+    }
+
+
+_SCALARS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "library")
+
+
+def facts_of(plain: object) -> FileFacts:
+    """The facts in a frame. Raises `TypeError`, `KeyError` for what are none."""
+    if not isinstance(plain, dict):
+        raise TypeError("facts")
+    definitions = {
+        number: ChannelDefinition(topic, encoding, name, kind, data, tuple(map(tuple, metadata)))
+        for number, (topic, encoding, name, kind, data, metadata) in plain["channels"].items()
+    }
+    return FileFacts(
+        channels=definitions,
+        counts=plain["counts"],
+        metadata=tuple((name, values) for name, values in plain["metadata"]),
+        attachments=tuple(Attachment(**each) for each in plain["attachments"]),
+        compressions=plain["compressions"],
+        **{name: plain[name] for name in _SCALARS},
+    )

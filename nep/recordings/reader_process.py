@@ -1,0 +1,169 @@
+"""Reads recordings for another program: `python -m nep.recordings.reader_process`.
+
+A recording may come from anywhere, so a program with a window reads it in this process, whose memory is
+limited, and which may be ended at any moment. Requests come as frames (`nep.recordings.frames`) on the
+standard input, one at a time; each is answered by one frame, after any number of progress frames.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from itertools import count, islice
+from pathlib import Path
+from typing import IO, Any
+
+from nep.errors import NepError, RecordingError, RecordingTooLargeError
+from nep.i18n import _, begin
+from nep.recordings.file_reader import FileReader
+from nep.recordings.frames import packed_messages, plain_damage, plain_facts, read_frame, write_frame
+from nep.recordings.limits import ReadBudget
+from nep.recordings.records import RawMessage
+
+__all__ = ["RecordingService", "main"]
+
+_MAX_CURSORS = 32
+_BATCH_BYTES = 1_000_000
+_MAX_BATCH = 4_096
+Answer = Mapping[str, object]
+
+
+class RecordingService:
+    """Carries out requests; `tell` is given progress."""
+
+    def __init__(self, tell: Callable[[Answer], object]) -> None:
+        self._tell = tell
+        self._files: dict[int, FileReader] = {}
+        self._numbers = count(1)
+        self._cursors: OrderedDict[int, Iterator[RawMessage]] = OrderedDict()
+        self._operations: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
+            "open": self._open,
+            "raw": self._raw,
+            "next": self._next,
+            "newest": self._newest,
+            "newest_times": self._newest_times,
+            "densities": self._densities,
+            "pieces_of": self._pieces_of,
+            "close": self._close,
+        }
+
+    def answer(self, request: Mapping[str, Any]) -> Answer:
+        """Carry out a request. What goes wrong is in the answer; nothing is raised."""
+        path = str(request.get("path", ""))
+        try:
+            answer = dict(self._operations[request["op"]](request))
+        except RecordingError as error:
+            return {
+                "error": error.reason,
+                "path": error.path,
+                "is_too_large": isinstance(error, RecordingTooLargeError),
+            }
+        except MemoryError:
+            return {"error": _("reading it takes too much memory"), "path": path, "is_too_large": True}
+        except NepError as error:
+            return {"error": str(error), "path": path}
+        except (TypeError, ValueError, KeyError, OSError) as error:
+            return {"error": str(error) or type(error).__name__, "path": path}
+        file = self._files.get(request.get("file", answer.get("file", 0)))
+        if file is not None:
+            answer["damage"] = plain_damage(file.damage)
+        return answer
+
+    def _open(self, request: Mapping[str, Any]) -> Answer:
+        path = Path(request["path"])
+        budget = None if request["budget"] is None else ReadBudget(path, *request["budget"])
+
+        def progress(done: int, whole: int) -> None:
+            self._tell({"progress": (done, whole)})
+
+        file = FileReader(path, cache_bytes=request["cache_bytes"], progress=progress, budget=budget)
+        number = next(self._numbers)
+        self._files[number] = file
+        return {"file": number, "facts": plain_facts(file.facts)}
+
+    def _raw(self, request: Mapping[str, Any]) -> Answer:
+        pieces = None if request["pieces"] is None else set(request["pieces"])
+        file = self._files[request["file"]]
+        number = next(self._numbers)
+        self._cursors[number] = file.raw(
+            request["start_ns"], request["end_ns"], set(request["channels"]), pieces
+        )
+        while len(self._cursors) > _MAX_CURSORS:
+            self._cursors.popitem(last=False)
+        return self._next({"cursor": number, "most": request["most"]})
+
+    def _next(self, request: Mapping[str, Any]) -> Answer:
+        """Messages that follow; a cursor of 0 when there are no more."""
+        number = request["cursor"]
+        if number not in self._cursors:
+            raise ValueError(_("it was not read for too long"))
+        self._cursors.move_to_end(number)
+        cursor, batch, size = self._cursors[number], list[RawMessage](), 0
+        for raw in islice(cursor, min(request["most"], _MAX_BATCH)):
+            batch.append(raw)
+            size += raw.data.nbytes
+            if size >= _BATCH_BYTES:
+                break
+        if not batch:
+            del self._cursors[number]
+            number = 0
+        return {"cursor": number, "messages": packed_messages(batch)}
+
+    def _newest(self, request: Mapping[str, Any]) -> Answer:
+        found = self._files[request["file"]].newest(request["at_ns"], request["groups"])
+        return {
+            "are_there": [each is not None for each in found],
+            "messages": packed_messages(each for each in found if each is not None),
+        }
+
+    def _newest_times(self, request: Mapping[str, Any]) -> Answer:
+        return {"times": self._files[request["file"]].newest_times(request["at_ns"], request["channels"])}
+
+    def _densities(self, request: Mapping[str, Any]) -> Answer:
+        file, channels = self._files[request["file"]], set(request["channels"])
+        return {
+            "counts": file.densities(request["start_ns"], request["end_ns"], request["buckets"], channels)
+        }
+
+    def _pieces_of(self, request: Mapping[str, Any]) -> Answer:
+        return {"pieces": self._files[request["file"]].pieces_of(request["channels"])}
+
+    def _close(self, request: Mapping[str, Any]) -> Answer:
+        file = self._files.pop(request["file"], None)
+        if file is not None:
+            file.close()
+        return {}
+
+
+def _limit_memory(limit_mb: int) -> None:
+    """Where the system has such a limit; elsewhere the reader's own limits are all."""
+    try:
+        import resource  # noqa: PLC0415 - not on Windows
+    except ImportError:
+        return
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_AS, (limit_mb * 2**20, limit_mb * 2**20))
+
+
+def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
+    """Answer requests until there are no more."""
+    service = RecordingService(lambda content: write_frame(answers, content))
+    while (request := read_frame(requests)) is not None:
+        write_frame(answers, service.answer(request))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Answer what comes on the standard input until it ends."""
+    parser = argparse.ArgumentParser(prog="nep.recordings.reader_process")
+    parser.add_argument("--memory-mb", type=int, default=1024)
+    _limit_memory(parser.parse_args(arguments).memory_mb)
+    begin()
+    with suppress(OSError, KeyboardInterrupt):  # nobody listens any more
+        serve(sys.stdin.buffer, sys.stdout.buffer)
+
+
+if __name__ == "__main__":
+    main()

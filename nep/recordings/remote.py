@@ -1,0 +1,292 @@
+"""Recordings that are read in another process (`nep.recordings.reader_process`).
+
+A process that takes too long, needs too much memory or dies costs its files, and nobody else: reading them
+raises `RecordingError` with a sentence. The next file that is opened starts a new process.
+"""
+
+from __future__ import annotations
+
+import queue
+import subprocess
+import threading
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from nep.errors import ClosedError, RecordingError, RecordingTooLargeError
+from nep.i18n import _
+from nep.masters.process import NO_CONSOLE
+from nep.recordings.file_reader import CACHE_BYTES, FileFacts
+from nep.recordings.frames import damage_of, facts_of, read_frame, write_frame
+from nep.recordings.index import Damage
+from nep.recordings.reader import Recording
+from nep.recordings.records import RawMessage, messages_in
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+__all__ = ["ReaderProcess"]
+
+_TIMEOUT_S = 60.0
+_CLOSE_S = 5.0
+_FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
+
+
+class ReaderProcess:
+    """A process that reads recordings. Thread-safe; usable as a context manager.
+
+    Requests are carried out one after the other; a reader that iterates asks for a megabyte at a time, so
+    others need not wait long.
+    """
+
+    def __init__(self, command: Sequence[str], *, timeout_s: float = _TIMEOUT_S) -> None:
+        """Nothing is started before a recording is opened.
+
+        Args:
+            command: Starts `nep.recordings.reader_process`.
+            timeout_s: A request that is not answered for so long ends the process. Opening a file may take
+                longer, as long as it makes progress.
+        """
+        self._command, self._timeout_s = command, timeout_s
+        self._lock = threading.Lock()
+        self._is_closed = False
+        self._pipe: _Pipe | None = None
+
+    def open(
+        self,
+        path: Path,
+        *,
+        cache_bytes: int = CACHE_BYTES,
+        progress: Callable[[int, int], object] | None = None,
+        budget: tuple[int, float | None] | None = None,
+    ) -> Recording:
+        """Open a recording.
+
+        Args:
+            path: The file.
+            cache_bytes: How much of decompressed chunks the process keeps.
+            progress: See `Recording`; what it raises ends the process, and comes out.
+            budget: Bytes and seconds of work that may be spent on the file, opening included.
+
+        Raises:
+            RecordingError: It can't be opened, or the process can't be started.
+            RecordingTooLargeError: It is more work than is allowed.
+            ClosedError: `close` was called.
+        """
+        with self._lock:
+            if self._is_closed:
+                raise ClosedError(f"recording '{path.name}'")
+            if self._pipe is None or self._pipe.has_ended:
+                self._pipe = _Pipe(self._command, path)
+            pipe = self._pipe
+        request = {"op": "open", "path": str(path), "cache_bytes": cache_bytes, "budget": budget}
+        answer = pipe.ask(path, request, self._timeout_s, progress)
+        return Recording(path, file=_RemoteFile(pipe, path, answer, self._timeout_s))
+
+    def close(self) -> None:
+        """End the process at once; whoever reads gets `ClosedError`. May be called twice."""
+        with self._lock:
+            self._is_closed = True
+            pipe, self._pipe = self._pipe, None
+        if pipe is not None:
+            pipe.end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
+
+
+class _Pipe:
+    """One process and its pipes. A thread reads the answers, so that waiting for them can end."""
+
+    def __init__(self, command: Sequence[str], path: Path) -> None:
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                creationflags=NO_CONSOLE,
+                start_new_session=True,  # Ctrl+C in a terminal is the program's that reads
+            )
+        except OSError as error:
+            reason = _("the process that reads it can't be started: {error}")
+            raise RecordingError(str(path), reason.format(error=error)) from error
+        self._lock = threading.Lock()
+        self._was_ended = False
+        self._answers: queue.Queue[dict[str, object] | None] = queue.Queue(2)
+        self._thread = threading.Thread(target=self._read, name="recording-answers", daemon=True)
+        self._thread.start()
+
+    @property
+    def has_ended(self) -> bool:
+        return self._was_ended or self._process.poll() is not None
+
+    def _read(self) -> None:
+        out = self._process.stdout
+        frame: dict[str, object] | None = {}
+        while frame is not None:
+            frame = None
+            if out is not None:
+                with suppress(OSError, ValueError):  # it has ended
+                    frame = read_frame(out)
+            self._answers.put(frame)
+
+    def ask(
+        self,
+        path: Path,
+        request: Mapping[str, object],
+        timeout_s: float,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> dict[str, Any]:
+        """The answer to a request. Raises `RecordingError`, `ClosedError`."""
+        with self._lock:
+            self._check(path)
+            stdin: IO[bytes] | None = self._process.stdin
+            with suppress(OSError, ValueError):  # then there is no answer, either
+                if stdin is not None:
+                    write_frame(stdin, request)
+            while True:
+                try:
+                    answer = self._answers.get(timeout=timeout_s)
+                except queue.Empty:
+                    self._kill()
+                    raise RecordingTooLargeError(str(path), _("reading it takes too long")) from None
+                if answer is None:
+                    self._answers.put(None)
+                    self._check(path)
+                    self._kill()
+                    reason = _("the process that reads it has ended; the file may be damaged")
+                    raise RecordingError(str(path), reason)
+                if "progress" not in answer:
+                    break
+                done = answer["progress"]
+                try:
+                    if progress is not None and isinstance(done, list):
+                        progress(*done)
+                except BaseException:
+                    self._kill()
+                    raise
+        if "error" in answer:
+            kind = RecordingTooLargeError if answer.get("is_too_large") else RecordingError
+            raise kind(str(answer.get("path") or path), str(answer["error"]))
+        return answer
+
+    def _check(self, path: Path) -> None:
+        if self._was_ended:
+            raise ClosedError(f"recording '{path.name}'")
+
+    def end(self) -> None:
+        """End it, also while somebody waits for an answer."""
+        self._was_ended = True
+        self._kill()
+
+    def _kill(self) -> None:
+        with suppress(OSError):
+            self._process.kill()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_CLOSE_S)
+        while self._thread.is_alive():  # it may wait for room
+            with suppress(queue.Empty):
+                self._answers.get_nowait()
+            self._thread.join(0.01)
+        for stream in (self._process.stdin, self._process.stdout):
+            with suppress(OSError, ValueError):
+                if stream is not None:
+                    stream.close()
+        with suppress(queue.Full):
+            self._answers.put_nowait(None)
+
+
+class _RemoteFile:
+    """A file that is open in the process. See `nep.recordings.file_reader.RawFile`."""
+
+    def __init__(self, pipe: _Pipe, path: Path, opened: Mapping[str, Any], timeout_s: float) -> None:
+        self._pipe, self._path, self._timeout_s = pipe, path, timeout_s
+        self._number = opened["file"]
+        self._is_closed = False
+        self._damage = damage_of(opened.get("damage"))
+        self.facts: FileFacts = facts_of(opened["facts"])
+
+    @property
+    def damage(self) -> Sequence[Damage]:
+        """See `RawFile`."""
+        return self._damage
+
+    def _ask(self, op: str, **request: object) -> dict[str, Any]:
+        if self._is_closed:
+            raise ClosedError(f"recording '{self._path.name}'")
+        asked = {"op": op, "file": self._number, **request}
+        answer = self._pipe.ask(self._path, asked, self._timeout_s)
+        self._damage = damage_of(answer.get("damage"))
+        return answer
+
+    def raw(
+        self,
+        start_ns: int | None,
+        end_ns: int | None,
+        channels: Collection[int],
+        pieces: Collection[int] | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `RawFile`."""
+        if not channels:
+            return
+        most = _FIRST_BATCH
+        answer = self._ask(
+            "raw",
+            start_ns=_bounded(start_ns),
+            end_ns=_bounded(end_ns),
+            channels=list(channels),
+            pieces=None if pieces is None else list(pieces),
+            most=most,
+        )
+        while answer["cursor"]:
+            for record in messages_in(answer["messages"]):
+                if isinstance(record, RawMessage):
+                    yield record
+            most = min(_GROWTH * most, _MAX_BATCH)
+            answer = self._ask("next", cursor=answer["cursor"], most=most)
+
+    def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
+        """See `RawFile`."""
+        if not groups:
+            return []
+        answer = self._ask("newest", at_ns=_bounded(at_ns), groups=[list(each) for each in groups])
+        messages = (each for each in messages_in(answer["messages"]) if isinstance(each, RawMessage))
+        return [next(messages, None) if is_there else None for is_there in answer["are_there"]]
+
+    def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
+        """See `RawFile`."""
+        times: dict[int, int] = self._ask("newest_times", at_ns=_bounded(at_ns), channels=list(channels))[
+            "times"
+        ]
+        return times
+
+    def densities(
+        self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
+    ) -> dict[int, Sequence[int]]:
+        """See `RawFile`."""
+        span = {"start_ns": _bounded(start_ns), "end_ns": _bounded(end_ns)}
+        answer = self._ask("densities", **span, buckets=buckets, channels=list(channels))
+        counts: dict[int, Sequence[int]] = answer["counts"]
+        return counts
+
+    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
+        """See `RawFile`."""
+        pieces: list[int] = self._ask("pieces_of", channels=list(channels))["pieces"]
+        return pieces
+
+    def close(self) -> None:
+        """See `RawFile`."""
+        if not self._is_closed:
+            with suppress(RecordingError, ClosedError):
+                self._ask("close")
+            self._is_closed = True
+
+
+def _bounded(at_ns: int | None) -> int | None:
+    """A time that msgpack has a form for."""
+    return None if at_ns is None else max(-(2**63), min(at_ns, 2**64 - 1))

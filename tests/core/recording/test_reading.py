@@ -1,0 +1,108 @@
+"""Recordings are read outside of Studio's process; one that takes too much, or kills it, is a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.core.alerts import Alerts
+from app.core.recording.folder import RecordingFacts, read_facts
+from app.core.recording.reading import LocalReading, process_reading
+from app.core.recording.replay.replay import FAILED, Replay
+from app.core.session import Session
+from app.core.storage.settings import Settings
+from nep.errors import RecordingError, RecordingTooLargeError
+from nep.recordings.reader import Recording
+from nep.recordings.remote import ReaderProcess
+from tests.nep.programs import eventually
+from tests.nep.recordings.messages import json_message, record
+
+
+class Failing(LocalReading):
+    """Opens nothing, or dies while its files are read."""
+
+    def __init__(self, error: RecordingError, opened: int = 0) -> None:
+        self._error, self._opened = error, opened
+        self.is_closed = False
+
+    def open(self, path: Path, **options: object) -> Recording:
+        if not self._opened:
+            raise self._error
+        return Dying(path, self._error)
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+class Dying(Recording):
+    """Its process is gone after opening."""
+
+    def __init__(self, path: Path, error: RecordingError) -> None:
+        super().__init__(path)
+        self._error = error
+
+    def newest(self, *_given: object, **_named: object) -> dict[str, object]:  # type: ignore[override]
+        raise self._error
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "a.mcap"
+    record(path, [[json_message(seq, topic="/odom") for seq in range(5)]])
+    return path
+
+
+def test_a_file_that_takes_too_much_is_listed_as_not_scanned(path: Path) -> None:
+    plain = RecordingFacts(path, path.stat().st_size, 1.0)
+    made = read_facts(plain, Failing(RecordingTooLargeError(str(path), "reading it takes too long")))
+    assert (made.path, made.is_read, made.problem) == (path, True, "")
+    assert "reading it takes too long" in made.not_scanned
+    made = read_facts(plain, Failing(RecordingError(str(path), "the process has ended")))
+    assert "the process has ended" in made.problem
+
+
+@pytest.mark.parametrize("opened", [0, 1])
+def test_a_reader_that_dies_is_an_alert_and_the_window_goes_on(
+    tmp_path: Path, path: Path, opened: int
+) -> None:
+    alerts, reading = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
+    replay = Replay(path, Settings(tmp_path / "home"), alerts, reading=reading)
+    replay.start()
+    eventually(lambda: replay.has_ended)
+    replay.tick(1.0)
+    (alert,) = (each for each in alerts.active if each.id == FAILED)
+    assert "the process has ended" in alert.detail
+    replay.close()
+    assert reading.is_closed
+
+
+def test_a_recording_is_played_by_a_process_of_its_own(tmp_path: Path, path: Path) -> None:
+    replay = Replay(path, Settings(tmp_path / "home"), Alerts(), reading=process_reading())
+    replay.start()
+    watch = replay.watch("/odom")
+
+    def seen(condition: Callable[[], bool]) -> Callable[[], bool]:
+        def look() -> bool:
+            replay.tick(1.0)
+            return condition()
+
+        return look
+
+    eventually(seen(lambda: replay.player is not None and replay.opened is not None), 60.0)
+    replay.seek(replay.end_ns)
+    eventually(seen(lambda: replay.topics["/odom"].newest is not None), 60.0)
+    watch.close()
+    replay.close()
+    assert replay.has_ended
+
+
+def test_studio_reads_in_processes_of_their_own(tmp_path: Path) -> None:
+    session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=True)
+    try:
+        reading = session.recordings.new_reading()
+        assert isinstance(reading, ReaderProcess)
+        reading.close()
+    finally:
+        session.close()
