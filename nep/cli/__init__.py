@@ -37,6 +37,7 @@ def _run() -> int:
         from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are heavy
 
         interrupts.ask_first()
+        interrupts.leave_when_told(interrupts.TERMINATED)
         return run()
     finally:
         interrupts.end_at_once()

@@ -16,7 +16,10 @@ from types import FrameType
 
 from nep.cli import INTERRUPTED
 
-__all__ = ["ask_first", "call_first", "end_at_once", "leave_when_told"]
+__all__ = ["TERMINATED", "ask_first", "call_first", "end_at_once", "leave_when_told"]
+
+TERMINATED = 143
+"""The exit code of a program that SIGTERM ended."""
 
 AGAIN_S = 0.02
 GRACE_S = 3.0
@@ -37,29 +40,46 @@ def ask_first() -> None:
 
 
 def call_first(action: Callable[[], object]) -> None:
-    """From now on Ctrl+C calls `action`, which lets the command come to its end; once more ends it at once.
+    """From now on Ctrl+C, SIGTERM and SIGHUP call `action`, which lets the command come to its end.
 
-    For what takes its time to end well: a recording writes what it has. `action` only sets something.
+    Once more ends it at once. For commands that must end well: a recording writes what it has. `action` only
+    sets something.
     """
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
         end_at_once()
+        _end_requests_with(signal.SIG_DFL)
         action()
 
     _callers.add(handle)
     _handle_with(handle)
+    _end_requests_with(handle)
 
 
 _callers: set[signal._HANDLER] = set()
 
 
-def leave_when_told() -> None:
-    """From now on SIGTERM, a polite request to end, leaves with 0, through what closes nodes."""
-    signal.signal(signal.SIGTERM, _leave)
+def leave_when_told(code: int = 0) -> None:
+    """From now on SIGTERM and SIGHUP leave with `code`, through what closes nodes; once more ends at once.
+
+    `docker stop`, systemd, `kill` and `timeout` send SIGTERM, a terminal that is closed sends SIGHUP.
+    """
+
+    def leave(_signal: int, _frame: FrameType | None) -> None:
+        _end_requests_with(signal.SIG_DFL)
+        sys.exit(code)
+
+    _callers.add(leave)
+    _end_requests_with(leave)
 
 
-def _leave(_signal: int, _frame: FrameType | None) -> None:
-    sys.exit(0)
+def _end_requests_with(handler: signal._HANDLER) -> None:
+    """Handle SIGTERM and SIGHUP, unless whoever started this wants it to go on (`nohup`)."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) in {signal.SIG_DFL, *_callers}:
+            with suppress(ValueError):  # only the main thread may
+                signal.signal(number, handler)
 
 
 def _end(_signal: int, _frame: FrameType | None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nep.cli import interrupts
 from nep.cli.network import node_for
 from nep.cli.options import AllowMovingOption, MasterOption
 from nep.cli.recording_files import (
@@ -266,6 +267,7 @@ class _Sender:
 def _play(recording: reader.Recording, playback: player.Playback, sender: _Sender) -> None:
     ended = threading.Event()
     out = console(stderr=True)
+    interrupts.leave_when_told()
 
     def wait() -> bool:
         sender.look()

@@ -30,6 +30,7 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import signal
 import sys
 import threading
 import time
@@ -345,6 +346,14 @@ def _lines(stream: IO[bytes]) -> Iterator[bytes]:
         is_inside = not is_end
 
 
+def _end_well_when_told() -> None:
+    """Let SIGTERM and SIGHUP end the process as Ctrl+C does, which finishes what is being recorded."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Carry out what comes on the standard input until it ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.child")
@@ -362,6 +371,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     node = Node(f"nep-recorder-{os.getpid()}", given.transport, master=given.master, wait_s=None)
     service = RecorderService(node, tell)
+    _end_well_when_told()
     service.tell("ready")
     try:
         for line in _lines(sys.stdin.buffer):

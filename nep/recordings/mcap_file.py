@@ -104,6 +104,11 @@ class ChannelTable:
         ), channel
 
 
+def _open_private(path: str, flags: int) -> int:
+    """Make a file that only its owner may read: a recording has what cameras and microphones gave."""
+    return os.open(path, flags, 0o600)
+
+
 class _Chunk:
     """A chunk that is being filled."""
 
@@ -148,7 +153,9 @@ class FileWriter:
         self.counts: dict[int, int] = {}
         """Messages of each channel, in chunks that are written."""
         self._compression = compression
-        self._file: BinaryIO = open(path, "xb" if is_new else "wb", buffering=0)  # noqa: SIM115, PTH123
+        self._file: BinaryIO = open(  # noqa: SIM115
+            path, "xb" if is_new else "wb", buffering=0, opener=_open_private
+        )
         self._at = 0
         self._chunk = _Chunk()
         self._written_channels: set[int] = set()

@@ -28,7 +28,6 @@ _SENTENCES = {
     "form": lazy("{robot} got a command from a form and has not answered since"),
     "behaviour": lazy("{robot} got a command from a behaviour and has not answered since"),
     "shelf": lazy("{robot} got a command from a message of the publish shelf and has not answered since"),
-    "click": lazy("{robot} got a command from a click in a picture and has not answered since"),
     "key": lazy("{robot} got a command from a key and has not answered since"),
     "alarm": lazy("{robot} got a command from an alarm and has not answered since"),
     "replay": lazy("{robot} got a command from a replayed recording and has not answered since"),

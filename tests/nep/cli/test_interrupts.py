@@ -115,6 +115,26 @@ def test_who_started_it_decides(kept):
     assert done.returncode == 0, done.stderr
 
 
+def test_every_request_to_end_is_carried_out_once_and_nohup_is_respected():
+    done = python(
+        "import os, signal\n"
+        "from nep.cli.interrupts import call_first, leave_when_told\n"
+        "for name in ('SIGINT', 'SIGTERM', 'SIGHUP'):\n"
+        "    seen = []\n"
+        "    leave_when_told(7)\n"
+        "    call_first(lambda: seen.append(name))\n"
+        "    os.kill(os.getpid(), getattr(signal, name))\n"
+        "    assert seen == [name]\n"
+        "    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "leave_when_told(7)\n"
+        "assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN\n"
+        "try: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "finally: print('bye', flush=True)\n"
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (7, b"bye\n", b"")
+
+
 # ---- the package, which is imported before anything can be said of Ctrl+C
 
 

@@ -43,7 +43,8 @@ def path(tmp_path_factory):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl+C of another program needs POSIX")
-def test_recording_ends_cleanly_with_ctrl_c(master, tmp_path):
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_recording_ends_whole_and_private_when_it_is_asked_to_end(master, tmp_path, name):
     path = tmp_path / "a.mcap"
     command = [
         "-m",
@@ -67,10 +68,11 @@ def test_recording_ends_cleanly_with_ctrl_c(master, tmp_path):
         for n in range(50):
             publisher.publish({"n": n})
         eventually(lambda: path.exists() and path.stat().st_size > 500)
-        child.send_signal(signal.SIGINT)
+        child.send_signal(getattr(signal, name))
         _out, err = child.communicate(timeout=60)
     assert (child.returncode, "50 messages of 1 topic in" in err) == (0, True), err
     assert McapDoctor(path).problems == []
+    assert path.stat().st_mode & 0o777 == 0o600
     with Recording(path) as recording:
         assert [each.message.payload["n"] for each in recording.read()] == list(range(50))
         assert recording.words["note"] == "first"
@@ -123,7 +125,7 @@ def test_a_ring_keeps_the_last_seconds_by_a_command_and_by_a_signal(master, tmp_
             run(*words, "--seconds", "-1")
         with pytest.raises(NepError, match="a map such as"), nep.node("any", master=master.address) as node:
             node.new_client("flight_recorder/keep", timeout_s=60.0).call({"seconds": "x"})
-        child.send_signal(signal.SIGINT)
+        child.send_signal(signal.SIGTERM)
         child.communicate(timeout=60)
         eventually(lambda: not has_ring(robot.graph()))
         with pytest.raises(NepError, match="no 'nep recording ring' is on"):

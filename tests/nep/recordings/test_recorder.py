@@ -6,6 +6,7 @@ import io
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -290,7 +291,10 @@ def test_a_line_that_is_too_long_is_no_order(monkeypatch):
     assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']
 
 
-def test_a_process_of_its_own_finishes_when_its_input_ends(master, tmp_path):
+@pytest.mark.parametrize(
+    "is_told", [False, pytest.param(True, marks=pytest.mark.skipif(os.name == "nt", reason="needs POSIX"))]
+)
+def test_a_process_of_its_own_finishes_when_its_input_ends_or_it_is_told_to(master, tmp_path, is_told):
     path = tmp_path / "a.mcap"
     child = subprocess.Popen(
         [sys.executable, "-m", "nep.recordings.child", "--master", master.address],
@@ -312,7 +316,11 @@ def test_a_process_of_its_own_finishes_when_its_input_ends(master, tmp_path):
                 and event["recording"]["topics"].get("/a", {}).get("received") == 100
             ):
                 break
-        out, _err = child.communicate()
+        if is_told:
+            child.send_signal(signal.SIGTERM)
+            out = child.stdout.read()
+        else:
+            out, _err = child.communicate()
     events = [json.loads(line) for line in out.splitlines()]
     assert events[-1]["event"] == "ended"
     with Recording(path) as recording:
