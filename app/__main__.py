@@ -95,6 +95,11 @@ def run_parser() -> argparse.ArgumentParser:
         action="store_true",
         help=_("let robots move that are not virtual; Ctrl+C stops them"),
     )
+    made.add_argument(
+        "--keep-position",
+        action="store_true",
+        help=_("begin where the virtual robots are, not at their start position"),
+    )
     return made
 
 
@@ -197,6 +202,7 @@ def run_behaviour(arguments: Sequence[str]) -> int:
         robot_wait_s=options.robot_wait,
         master=options.master,
         allow_moving=options.allow_moving,
+        keep_position=options.keep_position,
     )
 
 

@@ -54,14 +54,16 @@ def run_file(
     out: TextIO | None = None,
     interrupted: threading.Event | None = None,
     allow_moving: bool = False,
+    keep_position: bool = False,
 ) -> int:
     """Run a behaviour file to its end; the exit code of this module's docstring.
 
     It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
-    one line each. Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots
-    stopped. Without `allow_moving` a behaviour that would move a robot which is not virtual is refused.
-    When `out` takes nothing more (its reader has left, its disk is full) the behaviour is stopped in the same
-    way, and the exit code is 1.
+    one line each. Virtual robots begin at their start position, or where they are with `keep_position`.
+    Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots stopped. Without
+    `allow_moving` a behaviour that would move a robot which is not virtual is refused. When `out` takes
+    nothing more (its reader has left, its disk is full) the behaviour is stopped in the same way, and the
+    exit code is 1.
     """
     ending = interrupted or threading.Event()
     say = _Lines(out or sys.stdout, ending)
@@ -80,6 +82,8 @@ def run_file(
             used = [robot for robot in found.robots if robot.name in program.robots]
             if not allow_moving and _would_move(program, used, say):
                 return MAY_NOT_MOVE
+            if not keep_position:
+                _to_start(node, [robot for robot in used if robot.virtual])
             with closing(RobotStopper(node)) as stopper:
                 stopper.set_robots(StopTarget(robot, found.owners.get(robot.name)) for robot in used)
                 return _run(program, found, _Reach(master, node, stopper), say, ending)
@@ -203,6 +207,14 @@ def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], 
                 )
             )
     return any(moves.values())
+
+
+def _to_start(node: nep.Node, robots: Sequence[Robot]) -> None:
+    """Put virtual robots back to where they stood at first."""
+    names = [robot.name for robot in robots]
+    for topic in filter(None, (robot.topics.world for robot in robots)):
+        with node.new_pub(topic, "json") as world:
+            world.publish({"start": names})
 
 
 @dataclass(frozen=True)

@@ -171,6 +171,8 @@ class VirtualWheels:
                     self._shared.move(moved, x, y)
             if change.get("reset") is True:
                 self.body.reset(self._shared.put_back())
+            if "start" in change:
+                self._shared.to_start(change["start"])
         if isinstance(change.get("happen"), str):
             event, given = told_event(change)
             data = {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **given}

@@ -49,6 +49,7 @@ from nep.protocol.graph_view import GraphView
 
 MAX_HELD = 64
 """Answers of one publisher that no master has told of yet, kept until the next graph."""
+BEGINS_AT_START = "runs_begin_at_start"
 
 
 class Fleet:
@@ -75,6 +76,7 @@ class Fleet:
         self._senders = Senders()
         self._announcements = Announcements(watches, self._senders, clock, self._is_proven)
         self._unlisted: tuple[StopTarget, ...] = ()
+        self._settings = settings
         self._names: dict[str, str] = {}
         self._view = GraphView(0, 0)
         self._held: dict[str, HeldMessages] = {}
@@ -199,6 +201,23 @@ class Fleet:
         may = self.permission.permits([(link.robot, actions)], lambda: self._change_again(name, change))
         if may and link.world is not None:
             link.world.publish(dict(change))
+
+    @property
+    def begins_at_start(self) -> bool:
+        """Whether virtual robots go back to where they stood at first when a behaviour begins."""
+        return self._settings is None or self._settings.get(BEGINS_AT_START, True)
+
+    def choose_start(self, *, begins: bool) -> None:
+        """Choose whether they do. Raises SettingsError when that can't be kept."""
+        if self._settings is not None:
+            self._settings.set(BEGINS_AT_START, begins)
+
+    def to_start(self, names: Iterable[str]) -> None:
+        """Put the virtual robots among these back to where they stood at first, if the person wants that."""
+        links = [link for name in names if (link := self._links.get(name)) is not None and link.virtual]
+        for link in links if self.begins_at_start else ():
+            if link.world is not None:
+                link.world.publish({"start": [each.name for each in links]})
 
     def _change_again(self, name: str, change: Payload) -> None:
         """Do what was asked before a person said that the robot may move."""

@@ -442,6 +442,8 @@ class Runs:
             asked = wanted_by(program, used)
             if not self._fleet.permission.permits(asked, partial(self._begin_now, wanted)):
                 return  # a person is asked first; the question stands in the window
+            if wanted.stack is None:
+                self._fleet.to_start(program.robots)
             runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
             owners = owners_of(self._fleet)

@@ -31,6 +31,9 @@ class InRoom(Protocol):
     def place(self, x: float, y: float) -> None:
         """Stand there from now on."""
 
+    def reset(self, room: Room) -> None:
+        """Back to the start, in this room, with nothing going on."""
+
 
 class SharedRoom:
     """Keeps a body's room as everybody has it; ``lock`` guards the body, and is held where it says so."""
@@ -45,6 +48,7 @@ class SharedRoom:
         self._revision = self._map.revision
         self._is_new = body.room != Room()
         self._arrives_until_s = clock.now() + ARRIVES_S
+        self._start = body.x, body.y
         self._tell_room = link.share(TOPIC, self._hear_room, latched=True)
         self._tell_robots = link.share(ROBOTS_TOPIC, self._hear_robot)
 
@@ -70,6 +74,7 @@ class SharedRoom:
             radius = self._like.radius
             if self._neighbours.makes_way(body.x, body.y, radius):
                 body.place(*body.room.nearest_free(body.x, body.y, radius))
+                self._start = body.x, body.y
 
     def follow(self) -> None:
         """What the body pushed away is elsewhere for everybody."""
@@ -80,6 +85,19 @@ class SharedRoom:
         """A person moves a thing."""
         self._is_new = self._map.move(name, x, y) or self._is_new
         self.take_over()
+
+    def to_start(self, together: object) -> None:
+        """Let the body begin again where it stood when it came; the things of the room stay.
+
+        ``together`` are the names of the robots that go back now: their places become free. Another robot
+        that stands there is avoided.
+        """
+        self.take_over()
+        body, leaving = self._body, together if isinstance(together, list) else []
+        body.reset(body.room)
+        staying = tuple(other for other in body.room.others if other.name not in leaving)
+        room = replace(body.room, others=staying)
+        body.place(*room.nearest_free(*self._start, self._like.radius))
 
     def put_back(self) -> Room:
         """Everything is where it was at the start; the room then."""

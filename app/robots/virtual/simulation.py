@@ -187,7 +187,7 @@ class Simulation:
         return Beat(self._clock, self._ended, 1 / rate_hz)
 
     def act(self, change: Mapping[str, object]) -> None:
-        """A person does something to the world: touch, move, say, reset."""
+        """A person does something to the world: touch, move, say, reset; or a run begins: start."""
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite(change.get("x")), finite(change.get("y"))
         with self.changed:
@@ -204,6 +204,8 @@ class Simulation:
                 self.body.hear(word.strip())
             if change.get("reset") is True:
                 self.body.reset(self._shared.put_back())
+            if "start" in change:
+                self._shared.to_start(change["start"])
         if isinstance(change.get("happen"), str):
             self._let_happen(change)
 

@@ -201,3 +201,24 @@ def test_a_strangers_virtual_robot_on_the_network_is_asked_about(session: Sessio
         assert session.fleet.permission.question is not None
     finally:
         made.communicate()
+
+
+def test_only_virtual_robots_go_to_their_start_position_and_only_if_wanted(fleet: Fleet) -> None:
+    fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
+    stranger = parse(td_for(ROBOT.thing_model, "Other"))
+    fleet.join(stranger, "/Other/description", replace(STRANGE, node_id="3"))
+    worlds = {"Turtle": World(), "Other": World()}
+    for name, world in worlds.items():
+        link = fleet.link(name)
+        assert link is not None
+        link.world = cast("Publisher", world)
+    fleet.to_start(["Turtle", "Other", "Nobody"])
+    assert worlds["Turtle"].changes == [{"start": ["Turtle"]}]
+    assert worlds["Other"].changes == []
+    assert fleet.permission.question is None
+    fleet.choose_start(begins=False)
+    fleet.to_start(["Turtle"])
+    assert len(worlds["Turtle"].changes) == 1
+    fleet.choose_start(begins=True)
+    fleet.to_start(["Turtle"])
+    assert len(worlds["Turtle"].changes) == 2

@@ -18,6 +18,7 @@ import pytest
 import nep
 from app import resources
 from app.robots import turtle
+from app.robots.description.description import td_for
 from app.robots.driver.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
 from tests.blocks.fakes import until
@@ -203,6 +204,26 @@ def test_publishing_on_a_robots_topic_is_moving_it(master, tmp_path):
         code, out = run(path, allow_moving=True)
         assert code == OK, out
         assert "Rover stopped (" in out
+
+
+def test_virtual_robot_begins_at_its_start_position_or_keeps_the_one_it_has(master, tmp_path):
+    light = block("robot_diffdrive_do_light", ROBOT="Turtle", COLOUR="#ff0000")
+    described = td_for(turtle.ROBOT.thing_model, "Turtle")
+    content = {"format": "nep-behaviour", "version": 1, "name": "Light", "robots": {"Turtle": described}}
+    path = tmp_path / "light.nepb"
+    path.write_text(json.dumps(content | {"workspace": workspace(started(light))}))
+    with nep.node("turtle", master=master.address) as node, Driver(turtle.ROBOT, "Turtle", node):
+        state, world = node.new_sub("/Turtle/state", "json"), node.new_pub("/Turtle/world", "json")
+
+        def x() -> float:
+            return state.receive(30.0).payload["x"]
+
+        first = x()
+        until(lambda: world.publish({"move": "robot", "x": 1.0, "y": 1.0}) or x() == 1.0)
+        assert run(path, keep_position=True)[0] == OK
+        assert x() == 1.0
+        assert run(path)[0] == OK
+        until(lambda: x() == first)
 
 
 def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, pepper, saved):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -227,3 +228,29 @@ def test_two_of_a_kind_do_not_stand_in_each_other(robots: Robots) -> None:
 
     eventually(lambda: gap() >= 2 * RADIUS)
     assert (first.heard["state"][-1]["x"], first.heard["state"][-1]["y"]) == (-0.5, 0.0)
+
+
+def test_robots_go_back_to_where_they_came_and_the_things_of_the_room_stay(robots: Robots) -> None:
+    ears = {name: robots.start(PEPPER, name) for name in ("Ada", "Bob")}
+
+    def pose(name: str) -> tuple[float, float, float]:
+        state = ears[name].heard["state"][-1]
+        return state["x"], state["y"], state["theta_deg"]
+
+    eventually(lambda: math.dist(pose("Bob")[:2], pose("Ada")[:2]) >= 2 * RADIUS)
+    first = {name: pose(name) for name in ears}
+    worlds = {name: robots.person.new_pub(f"/{name}/world", "json") for name in ears}
+    eventually(lambda: all(world.subscribers for world in worlds.values()))
+
+    def is_carried(name: str, x: float, y: float) -> bool:
+        worlds[name].publish({"move": "robot", "x": x, "y": y})  # refused as long as the other stands there
+        return pose(name) != first[name]
+
+    eventually(lambda: is_carried("Bob", 1.0, 1.0))
+    eventually(lambda: is_carried("Ada", *first["Bob"][:2]))
+    worlds["Ada"].publish({"move": "ball", "x": 0.3, "y": -1.5})
+    eventually(lambda: place(ears["Bob"], "ball") == (0.3, -1.5))
+    for world in worlds.values():
+        world.publish({"start": ["Ada", "Bob"]})
+    eventually(lambda: {name: pose(name) for name in ears} == first)
+    assert place(ears["Ada"], "ball") == (0.3, -1.5)

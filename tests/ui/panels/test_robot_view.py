@@ -9,7 +9,9 @@ from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
+from app.blocks.compiler.stack import Stack
 from app.ui.panels.robot.panel import PANEL, STALE_AFTER_S, RobotPanel
+from tests.blocks.samples import block, number, started, workspace
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
 from tests.ui.sample_data import drawing, pepper
@@ -180,3 +182,16 @@ def test_a_robot_that_is_not_drawn_names_only_what_it_has(qtbot, kept, words) ->
     panel = window.make(PANEL, (384, 288))
     qtbot.addWidget(panel)
     assert words in [shown.text() for shown in panel.empty.findChildren(QLabel)]
+
+
+@pytest.mark.parametrize("is_tried", [False, True])
+def test_run_begins_at_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
+    session = Session.full()
+    turn = block("robot_virtual_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(90))
+    session.document.edited(workspace(started(turn)))
+    if is_tried:
+        session.runs.try_stack(Stack("t"))
+    else:
+        session.runs.run()
+    assert session.runs.active
+    assert session.changes("Pepper") == ([] if is_tried else [{"start": ["Pepper"]}])

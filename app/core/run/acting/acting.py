@@ -41,12 +41,7 @@ from nep.errors import NepError
 from nep.i18n import _, listed, ngettext
 
 FILE = "messages.json"
-_MOVED_BY: Mapping[Asker, str] = {
-    "publish": "shelf",
-    "image": "click",
-    "replay": "replay",
-    "switch": "key",
-}
+_MOVED_BY: Mapping[Asker, str] = {"publish": "shelf"}
 
 
 class ActingSession(Protocol):
@@ -99,7 +94,7 @@ class SessionActing:
         """Gives Studio's node on the live network to a job."""
         self.gate = session.fleet.gate
         self.on_moved: OnMoved = ignore_moved
-        """Told the robots that something moves, and by what: "shelf", "click" or "replay"."""
+        """Told the robots that something moves, and by what: "shelf", "image" or "replay"."""
         self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
         self.recorded_commands: frozenset[str] = frozenset()
@@ -212,7 +207,7 @@ class SessionActing:
         """Something is about to be sent there: tell `on_moved` the robots that it moves."""
         moved = self._moved(target)
         if moved:
-            self.on_moved(moved, _MOVED_BY.get(asker, "program"))
+            self.on_moved(moved, _MOVED_BY.get(asker, asker))
 
     # ---- messages
 

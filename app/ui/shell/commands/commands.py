@@ -67,6 +67,7 @@ class Commands:
         self.menus = MenuLists(shell, session, self.actions, menus, self.view, self.files.open)
         self.view.use(self.actions, self.entries)
         self.actions.choose("run.full_speed")
+        self.actions["run.from_start"].setChecked(session.fleet.begins_at_start)
         self.stop_keys = StopKeys(shell.surface, lambda: keys.of(STOP), self.actions[STOP].trigger)
 
     def run(self, name: str) -> bool:

@@ -51,6 +51,14 @@ class RobotCommands:
 
     # -- virtual robots ---------------------------------------------------------------------------
 
+    def choose_start(self) -> None:
+        """Let virtual robots go to their start position before each run, or leave them where they are."""
+        fleet = self._session.fleet
+        try:
+            fleet.choose_start(begins=not fleet.begins_at_start)
+        except SettingsError as error:
+            self._shell.complain(str(error))
+
     def start_pepper(self) -> None:
         """Start the virtual Pepper; what shows stays."""
         self._session.launcher.start_virtual_robot()
