@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from PySide6.QtCore import QUrl
@@ -145,7 +146,20 @@ class BehaviourCommands:
         if runs.view().state == "paused":
             runs.go_on()
         else:
-            self._files.with_newest(runs.run)
+            self._files.with_newest(partial(self._instead_of_what_runs, runs.run))
+
+    def _instead_of_what_runs(self, begin: Callable[[], object]) -> None:
+        """Begin something, and say which other behaviour was stopped for it."""
+        session = self._session
+        runs, shown, running = session.runs, session.document, session.runs.document
+        was_active = runs.active
+        begin()
+        if was_active and running is not None and running is not shown and not runs.concerns(running):
+            self._shell.say(
+                _("Stopped “{stopped}” to run “{name}”").format(
+                    stopped=session.documents.title(running), name=session.documents.title(shown)
+                )
+            )
 
     def run_named(self, name: str) -> str:
         """Run the behaviour of this name, open or opened lately; why it can't be run, "" when it begins.
@@ -173,7 +187,8 @@ class BehaviourCommands:
 
     def try_stack(self, stack: Stack) -> None:
         """Run one stack alone, with the editor's newest edit."""
-        self._files.with_newest(lambda: self._session.runs.try_stack(stack))
+        try_it = partial(self._session.runs.try_stack, stack)
+        self._files.with_newest(partial(self._instead_of_what_runs, try_it))
 
     def restart(self) -> None:
         """Run anew what runs, with the editor's newest edit."""
