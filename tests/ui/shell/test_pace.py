@@ -44,3 +44,12 @@ def test_a_speed_reaches_the_program_that_runs_and_the_next_one(
     window.tick()
     assert not window.run_bar.pace.isChecked()
     runs._runner = None
+
+
+def test_start_position_of_virtual_robots_is_a_choice(window: MainWindow, commands: Commands) -> None:
+    fleet, action = window.session.fleet, commands.actions["run.from_start"]
+    assert (fleet.begins_at_start, action.isChecked()) == (True, True)
+    commands.run("run.from_start")
+    assert (fleet.begins_at_start, action.isChecked()) == (False, False)
+    commands.run("run.from_start")
+    assert (fleet.begins_at_start, action.isChecked()) == (True, True)

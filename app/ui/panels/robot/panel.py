@@ -282,7 +282,7 @@ class RobotPanel(OneRobotPanel):
                 action.triggered.connect(lambda _on=False, kind=kind: self._add(kind))
             menu.addSeparator()
         menu.addAction(self.theme.icon("rotate-cw"), _("Put the room back")).triggered.connect(self._put_back)
-        start = menu.addAction(_("Begin at the start position"))
+        start = menu.addAction(_("Begin each run at the start position"))
         start.setCheckable(True)
         start.setChecked(self.session.fleet.begins_at_start)
         start.triggered.connect(lambda: self.context.run("run.from_start"))

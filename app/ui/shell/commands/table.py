@@ -298,9 +298,9 @@ COMMANDS: tuple[C, ...] = (
       group="pace"),
     C("run.very_slow", lazy("Very slow: 1.5 s a block"), lambda do: do.session.runs.set_pace(1.5), "Run",
       group="pace"),
-    C("run.from_start", lazy("Begin at the start position"), lambda do: do.robots.choose_start(), "Run",
-      tip=lazy("Virtual robots go back to where they stood at first, before each run"), check=True,
-      above=True),
+    C("run.from_start", lazy("Begin each run at the start position"),
+      lambda do: do.robots.choose_start(), "Run", check=True, above=True,
+      tip=lazy("Virtual robots go back to where they stood at first, before each run")),
     # two keys: F12 is one for sound on Macs and many laptops
     C("run.stop", lazy("Stop the program and all robots"), lambda do: do.session.runs.stop(), "Run",
       ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), above=True, everywhere=True),

@@ -55,18 +55,21 @@ class VariableCommands:
         return next(n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.refusal(n))
 
     def ask_other_name(self, id: str) -> None:
-        """Ask for another name of a variable."""
+        """Ask for another name of a variable, or for one of a variable that has none."""
 
         def asked() -> None:
-            old = self._workspace().variables.get(id)
-            if old is not None:
-                self._ask().ask(
-                    _("Another name for “{name}”").format(name=old),
-                    _("Rename it"),
-                    lambda name: "" if name == old else self.refusal(name, id),
-                    lambda name: self._edit({"do": "rename", "id": id, "name": name}),
-                    old,
-                )
+            workspace = self._workspace()
+            old = workspace.variables.get(id)
+            if old is None:
+                return
+            has_name = id not in workspace.nameless
+            self._ask().ask(
+                _("Another name for “{name}”").format(name=old) if has_name else _("Name of the variable"),
+                _("Rename it") if has_name else _("Name it"),
+                lambda name: "" if name == old else self.refusal(name, id),
+                lambda name: self._edit({"do": "rename", "id": id, "name": name}),
+                old if has_name else "",
+            )
 
         self._with_newest(asked)
 
