@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
+from shiboken6 import isValid
 
 _LEADS = "keyboardLeads"
 
@@ -57,9 +58,13 @@ def proxy_of(widget: QWidget) -> QWidget | None:
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
-    """What takes the keyboard by Tab inside a widget, in order, after (or before) ``begin``; each once."""
+    """What takes the keyboard by Tab inside a widget, in order, after (or before) ``begin``; each once.
+
+    It ends early at a widget that PySide takes for one that was deleted at the same address: only Qt itself
+    knows what comes behind that.
+    """
     step = following(begin, forward=forward)
-    while step is not begin:
+    while step is not begin and isValid(step):
         takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
         if takes and step.isVisible() and step.isEnabled() and widget.isAncestorOf(step):
             yield step
@@ -80,5 +85,7 @@ def stops_of(widget: QWidget) -> list[QWidget]:
 
 def _own_again(found: QWidget) -> QWidget:
     """Tell PySide whose child this is: Qt, which knows it, finds nothing to do."""
+    if not isValid(found):
+        return found
     QObject.setParent(found, found.parentWidget())
     return found

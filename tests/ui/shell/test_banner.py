@@ -206,3 +206,20 @@ def test_the_count_of_alerts_opens_them_by_mouse_and_by_keyboard(window: MainWin
     QTest.keyClick(item, Qt.Key.Key_Return)
     assert opened == ["alerts", "alerts"]
     assert window.showing == "behaviour"
+
+
+def test_shift_tab_leads_from_the_banner_through_the_whole_window(
+    qtbot, window: MainWindow, mouse: Mouse
+) -> None:
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    say(window)
+    window.banner.banner.button.setFocus()
+    names: list[str] = []
+    while len(names) < 40 and "1 alert" not in names:
+        focus = QApplication.focusWidget()
+        assert focus is not None
+        QTest.keyClick(focus, Qt.Key.Key_Backtab, Qt.KeyboardModifier.ShiftModifier)
+        names.append(QApplication.focusWidget().accessibleName())  # type: ignore[union-attr]
+    assert "Stop" in names
+    assert names[-1] == "1 alert"
