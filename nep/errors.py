@@ -119,11 +119,14 @@ class NoServerError(WaitTimeoutError):
         self.known = tuple(known)
         super().__init__(service, timeout_s)
         near = nearest(service, self.known)
-        step = (
-            _("did you mean '{near}'?").format(near=near)
-            if near is not None
-            else _("'nep service list' shows all services")
-        )
+        if service in self.known:
+            step = _(
+                "its server can't be reached; programs of the original NEP serve their own computer only"
+            )
+        elif near is not None:
+            step = _("did you mean '{near}'?").format(near=near)
+        else:
+            step = _("'nep service list' shows all services")
         self.args = (
             _("no server for '{service}' within {seconds:g} s; {step}").format(
                 service=service, seconds=timeout_s, step=step

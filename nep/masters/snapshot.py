@@ -68,7 +68,11 @@ class GraphViewer:
         nodes = {each.node.id: _node_info(each) for each in registry.members.values()}
         topics = {name: topic for name in names if (topic := known[name]) is not None}
         services = {each.name: each for each in (_service(name, registry) for name in served)}
-        alerts = (*self._all_alerts(), *_service_alerts(services, registry))
+        alerts = (
+            *self._all_alerts(),
+            *_service_alerts(services, registry),
+            *_original_client_alerts(services, registry),
+        )
         patterns = {name: self._patterns[name] for name in sorted(self._patterns)}
         return GraphView(
             epoch, registry.revision, nodes, topics, alerts, services=services, patterns=patterns
@@ -228,6 +232,28 @@ def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> 
                 ),
                 _("Clients call the first one, and another when that ends. Give one of them another name."),
             )
+
+
+def _original_client_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> Iterator[Alert]:
+    """Programs of the original NEP connect to nothing but the port that the gateway gave to their service."""
+    for name, service in sorted(services.items()):
+        clients = [each for each in service.clients if _is_original(each.node_id, registry)]
+        servers = service.servers
+        if clients and servers and not any(_is_original(each.node_id, registry) for each in servers):
+            yield Alert(
+                f"service:{name}:original",
+                _("{clients} of the original NEP can't call the service “{service}” of {servers}").format(
+                    clients=_names(registry.members[each.node_id].node.name for each in clients),
+                    service=name,
+                    servers=_names(registry.members[each.node_id].node.name for each in servers),
+                ),
+                _("Let both use a fixed address: nep.client(ip, port) there, node.direct(ip, port) here."),
+            )
+
+
+def _is_original(node_id: str, registry: Registry) -> bool:
+    member = registry.members.get(node_id)
+    return member is not None and member.node.generation in {"A", "B"}
 
 
 def _name_alerts(registry: Registry) -> Iterator[Alert]:

@@ -26,6 +26,7 @@ __all__ = [
     "HEADER_BYTES",
     "NATIVE",
     "ORIGINAL",
+    "ORIGINAL_CODEC",
     "PAYLOAD_MAX_BYTES",
     "PREFIX",
     "SERVICE_TYPE",
@@ -48,6 +49,8 @@ SURVEY = "survey:"
 """Before a survey's name: its respondents are listed as the servers of a service that is called so."""
 SERVICE_TYPE = "service"
 """Type and codec under which the master lists servers and clients."""
+ORIGINAL_CODEC = "original"
+"""Codec of servers that speak `ORIGINAL`: programs of the original NEP, listed by the gateway."""
 PAYLOAD_MAX_BYTES = 64 * 2**20
 """Whoever sends a larger call or answer is disconnected."""
 

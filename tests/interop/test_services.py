@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from tests.interop.conftest import LONG_S, Peers
+from tests.interop.conftest import LONG_S, Peers, Program
+from tests.nep.programs import eventually
 
 pytestmark = [pytest.mark.interop]
 VERSIONS = ("0.5.3.5", "0.5.4.5", "0.5.4.8")
@@ -82,3 +83,16 @@ def test_an_original_server_answers_in_the_order_of_the_calls(
             client.call({}, timeout_s=0.3)
         originals.start(version, "server_at", str(port)).wait_ready()
         assert client.call({"again": 1}) == {"echo": {"again": 1}}
+
+
+def test_services_of_originals_that_the_gateway_lists(peers: Peers, master: Program) -> None:
+    with nep.node("ours") as node:
+        client = node.new_client("weather", timeout_s=LONG_S)
+        server = peers.start("0.5.3.5", "server", "weather").wait_ready()
+        assert client.call({"city": "Turin"}) == {"echo": {"city": "Turin"}}
+        server.kill()
+        with pytest.raises((nep.NoServerError, nep.ServerGoneError)):
+            client.call({}, timeout_s=0.3)
+        node.new_server("clock", lambda request: request, threads=1)
+        peers.start("0.5.4.5", "client", "clock").wait_ready()
+        eventually(lambda: "service:clock:original" in {each.id for each in node.graph().alerts})

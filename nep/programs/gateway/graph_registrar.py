@@ -12,6 +12,7 @@ from nep.errors import BadTopicError
 from nep.programs.gateway.processes import load_of
 from nep.programs.gateway.programs import OriginalProgram, TopicLink
 from nep.programs.gateway.relay import Key
+from nep.programs.gateway.requests import LOOPBACK
 from nep.protocol.requests import (
     Join,
     Leave,
@@ -24,6 +25,7 @@ from nep.protocol.requests import (
     SubscriberCount,
     SubscriberRecord,
 )
+from nep.protocol.service_wire import ORIGINAL_CODEC, SERVICE_TYPE, check_service, topic_of
 from nep.protocol.wire import check_topic
 from nep.system.cpu import CpuLoad
 from nep.text import escaped, shortened
@@ -124,19 +126,17 @@ class GraphRegistrar:
             program.generation,
             since_ns,
         )
-        links = [link for link in program.links if _is_topic(link.topic)]
+        links = [link for link in program.links if _can_be_listed(link)]
         return Join(
             node,
             self._epoch,
             tuple(
-                PublisherRecord(_id(program, link), link.topic, _type(link), link.codec)
-                for link in links
-                if link.role == "publisher"
+                _publisher(_id(program, link), link) for link in links if link.role in {"publisher", "server"}
             ),
             tuple(
-                SubscriberRecord(_id(program, link), link.topic, _type(link))
+                _subscriber(_id(program, link), link)
                 for link in links
-                if link.role == "subscriber"
+                if link.role in {"subscriber", "client"}
             ),
             managed=True,
         )
@@ -156,6 +156,19 @@ class GraphRegistrar:
         return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
 
 
+def _publisher(id: int, link: TopicLink) -> PublisherRecord:
+    if link.role == "server":
+        endpoint = f"tcp://{LOOPBACK}:{link.port}"
+        return PublisherRecord(id, topic_of(link.topic), SERVICE_TYPE, ORIGINAL_CODEC, (endpoint,))
+    return PublisherRecord(id, link.topic, _type(link), link.codec)
+
+
+def _subscriber(id: int, link: TopicLink) -> SubscriberRecord:
+    if link.role == "client":
+        return SubscriberRecord(id, topic_of(link.topic), SERVICE_TYPE)
+    return SubscriberRecord(id, link.topic, _type(link))
+
+
 def _type(link: TopicLink) -> str:
     """The originals' names of types differ where the datum does not: the codec's name is what all share."""
     return link.codec
@@ -168,9 +181,11 @@ def _id(program: OriginalProgram, link: TopicLink) -> int:
     return int.from_bytes(digest, "big") >> 1 or 1
 
 
-def _is_topic(name: str) -> bool:
+def _can_be_listed(link: TopicLink) -> bool:
+    if link.role == "server" and link.port is None:
+        return False
     try:
-        check_topic(name)
+        (check_service if link.role in {"server", "client"} else check_topic)(link.topic)
     except BadTopicError:
         return False
     return True

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal, cast, get_args
 
 from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.processes import Processes
@@ -16,14 +17,18 @@ _COMING_S = 10.0
 """So long after it asked a program may still be about to come: who comes and goes may be somebody else."""
 
 
+ServiceRole = Literal["server", "client"]
+
+
 @dataclass(frozen=True)
 class TopicLink:
-    """An original program publishes or subscribes a topic."""
+    """What an original program does: publishes or subscribes a topic; serves or calls a service at `port`."""
 
     topic: str
     msg_type: str
     codec: str
-    role: Role
+    role: Role | ServiceRole
+    port: int | None = None
 
 
 @dataclass(frozen=True)
@@ -156,9 +161,18 @@ class ProgramTable:
             for registration in asked
             for role in sorted(self._roles.get(registration, ()))
         }
+        links |= dict.fromkeys(self._service_links(asked))
         first = asked[0]
         generation = self._unserved(asked) or first.generation
         return OriginalProgram(node_id, first.node, first.pid, generation, first.language, tuple(links))
+
+    def _service_links(self, asked: list[Registration]) -> Iterator[TopicLink]:
+        """Services of programs whose end would be noticed: their connections can't be seen."""
+        for each in asked:
+            if each.line.is_service and each.started is not None and each.socket in get_args(ServiceRole):
+                role = cast("ServiceRole", each.socket)
+                port = self._known.port_of(each.line)
+                yield TopicLink(each.line.topic, each.msg_type, each.line.codec, role, port)
 
     def _unserved(self, asked: list[Registration]) -> str | None:
         """The version of a program that can't be served, where no other program on the line can be meant."""

@@ -123,3 +123,20 @@ def test_the_names_of_one_datum_are_no_conflict_of_types(desk, listing):
 def test_a_name_that_is_no_native_topic_is_left_out_of_the_graph(desk, listing):
     listing.show((program("a", publishes("not a topic"), publishes("t")),))
     assert set(desk.view().topics) == {"t"}
+
+
+def test_services_of_originals_are_listed_with_the_port_of_the_server(desk, listing):
+    listing.show(
+        (
+            program("a", TopicLink("weather", "json", "service", "server", 9000)),
+            program("b", TopicLink("weather", "json", "service", "client", 9000), pid=2),
+        )
+    )
+    view = desk.view()
+    service = view.services["weather"]
+    assert view.topics == {}
+    assert [view.nodes[each.node_id].name for each in service.servers] == ["a"]
+    assert [each.endpoints for each in service.servers] == [("tcp://127.0.0.1:9000",)]
+    assert [view.nodes[each.node_id].name for each in service.clients] == ["b"]
+    listing.show(())
+    assert desk.view().services == {}

@@ -30,7 +30,7 @@ from nep.errors import (
 )
 from nep.i18n import _
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
-from nep.protocol.service_wire import Framing
+from nep.protocol.service_wire import ORIGINAL, ORIGINAL_CODEC, Framing
 
 __all__ = ["SocketClient"]
 
@@ -52,7 +52,7 @@ class _Call:
     """A call that is under way."""
 
     number: int
-    parts: list[bytes | memoryview]
+    data: bytes | memoryview
     timeout_s: float | None
     deadline: float
     then: Then
@@ -60,7 +60,7 @@ class _Call:
 
     @property
     def size(self) -> int:
-        return len(self.parts[1])
+        return len(self.data)
 
 
 class Connection(Protocol):
@@ -115,7 +115,9 @@ class SocketClient:
         self.spec = spec
         self._connect_to = connect_to
         self._connection: Connection | None = None
-        self._framing = framing
+        self._framing = self._usual_framing = framing
+        self._originals: set[int] = set()
+        """Servers that are programs of the original NEP."""
         self._soon = soon
         self._closer = closer
         self._known_services = known_services
@@ -181,8 +183,7 @@ class SocketClient:
         """See `ClientTransport.begin`."""
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        parts = self._framing.call(number, self.spec.codec.number, timeout_s, data)
-        call = _Call(number, parts, timeout_s, deadline, then)
+        call = _Call(number, data, timeout_s, deadline, then)
         with self._lock:
             if self._is_closed:
                 raise ClosedError(_("client of '{service}'").format(service=self.spec.service))
@@ -222,7 +223,8 @@ class SocketClient:
         connection = self._connection
         if connection is None or not connection.is_open or self._current not in self._servers:
             return
-        connection.send(call.parts)
+        codec = self.spec.codec.number
+        connection.send(self._framing.call(call.number, codec, call.timeout_s, call.data))
         call.is_sent = True
         self._unanswered[call.number] = call.size
         self._unanswered_bytes += call.size
@@ -233,7 +235,7 @@ class SocketClient:
         """These servers are there, too."""
         with self._lock:
             for remote in remotes:
-                if remote.publisher.endpoints:
+                if self._can_call(remote):
                     self._servers[remote.publisher.id] = remote.publisher.endpoints[0]
                     if remote.publisher.id == self._unlisted:
                         self._unlisted = None
@@ -243,11 +245,19 @@ class SocketClient:
             self._try_at = 0.0
         self._soon(self)
 
+    def _can_call(self, remote: RemotePublisher) -> bool:
+        """Whether a server is in reach and takes this client's codec. With the lock held."""
+        if remote.publisher.codec == ORIGINAL_CODEC:
+            self._originals.add(remote.publisher.id)
+            return bool(remote.publisher.endpoints) and self.spec.codec.name == "json"
+        return bool(remote.publisher.endpoints)
+
     def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
         """A server is not listed any more. Unless it said so itself, it may only be suspended."""
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
+                self._originals.discard(server)
             else:
                 self._unlisted = server
         self._soon(self)
@@ -261,10 +271,11 @@ class SocketClient:
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """These are all servers that are there."""
-        listed = {
-            each.publisher.id: each.publisher.endpoints[0] for each in remotes if each.publisher.endpoints
-        }
         with self._lock:
+            self._originals = {each for each in self._originals if each == self._current}
+            listed = {
+                each.publisher.id: each.publisher.endpoints[0] for each in remotes if self._can_call(each)
+            }
             current, self._unlisted = self._current, None
             if not listed and current in self._servers and self.is_connected:
                 listed, self._unlisted = {current: self._servers[current]}, current
@@ -398,6 +409,7 @@ class SocketClient:
         place = known.index(self._current) + 1 if self._current in self._servers and self._tries else 0
         self._current = known[place % len(known)]
         endpoint = self._place = self._servers[self._current]
+        self._framing = ORIGINAL if self._current in self._originals else self._usual_framing
         self._tries += 1
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)
