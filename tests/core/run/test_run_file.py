@@ -10,6 +10,9 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +24,7 @@ from app.robots import turtle
 from app.robots.description.description import td_for
 from app.robots.driver.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
+from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, robot, say, started, text, workspace, write
 from tests.blocks.wire_robot import RizeRobot, WireRobot
@@ -237,84 +241,71 @@ def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, p
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
 
 
-@pytest.fixture
-def virtual_pepper(master):
-    environment = {**os.environ, "NEP_MASTER": master.address}
-    command = [
-        sys.executable,
-        "-m",
-        "app.robots.simulated",
-        "--name",
-        "Pepper",
-        "--owner-pid",
-        str(os.getpid()),
-    ]
-    process = subprocess.Popen(command, env=environment)
-    yield process
-    process.terminate()
-    process.wait(10)
-
-
-LAST = {  # tests/test_readme.py runs "Greeting"
-    "Tour guide": "Thank you for coming.",
-    "The finder": "Hello! Did you lose a ball?",
-}
-
-
-@pytest.mark.parametrize("name", LAST)
-@pytest.mark.slow
-@pytest.mark.timeout(240)
-def test_the_examples_run_on_the_virtual_robot(master, virtual_pepper, name):
-    files = sorted(resources.path("examples").glob("*.nepb"))
-    (path,) = [each for each in files if json.loads(each.read_text("utf-8"))["name"] == name]
-    code, out = run(path, robot_wait_s=100)
-    assert code == OK, out
-    assert f"Pepper says “{LAST[name]}”" in out
-    assert "Pepper stopped (" in out
-
-
 SAID = {
+    "Tour guide": ["Thank you for coming."],
+    "The finder": ["Hello! Did you lose a ball?"],
     "Reaction to touch": ["Touch my head or my hands.", "Ha ha! That tickles."],
     "A quiz": ["Is the sky blue?", "Is ice cold?", "Right answers: "],
     "A dance": ["Let us dance.", "Thank you."],
     "A careful walk": ["I go on while there is room."],
     "Weather station": ["I am a weather station.", "It is cold, ", "It is warm, "],
 }
+"""What the robot says in each example. tests/test_readme.py runs the greeting."""
+ENDLESS = set(SAID) - {"Tour guide", "The finder"}
+"""Those that are interrupted when all was said."""
 STROKED = {"Reaction to touch", "A quiz"}
 
 
-@pytest.mark.parametrize("name", SAID)
-@pytest.mark.slow
-@pytest.mark.timeout(240)
-def test_the_examples_that_listen_do_so_on_the_virtual_robot(master, virtual_pepper, name):
-    """Somebody strokes the robot where it asks for that and tells the weather; it ends when all was said."""
+@contextmanager
+def virtual_pepper() -> Iterator[str]:
+    """A virtual robot in a process of its own; the address of its master, which nobody else uses."""
+    with Master("127.0.0.1:0", learn_s=0.0) as master:
+        command = [sys.executable, "-m", "app.robots.simulated", "--name", "Pepper"]
+        command += ["--owner-pid", str(os.getpid())]
+        process = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
+        try:
+            yield master.address
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+def example_runs(name: str) -> tuple[int, str]:
+    """Run an example; somebody strokes the robot where it asks for that, and tells the weather."""
     (path,) = [
         each
         for each in resources.path("examples").glob("*.nepb")
         if json.loads(each.read_text("utf-8"))["name"] == name
     ]
     out, interrupted = io.StringIO(), threading.Event()
-    found: list[int] = []
-    run = threading.Thread(
-        target=lambda: found.append(run_file(path, out=out, robot_wait_s=100, interrupted=interrupted))
-    )
-    with nep.node("somebody", master=master.address) as node:
-        hand, weather = node.new_pub("/Pepper/world", "json"), node.new_pub("/weather", "json")
-        run.start()
-        pause = threading.Event()
-        for turn in range(1000):
-            if not run.is_alive() or all(f"Pepper says “{words}" in out.getvalue() for words in SAID[name]):
-                break
-            if name in STROKED:
-                hand.publish({"touch": "head", "down": turn % 2 == 0})
-            weather.publish({"temperature": 5 if turn % 40 < 20 else 25})
-            pause.wait(0.1)
-        interrupted.set()
-        run.join(30)
-    assert found[0] in {OK, INTERRUPTED}, out.getvalue()
-    for words in SAID[name]:
-        assert f"Pepper says “{words}" in out.getvalue()
-    assert "Pepper stopped (" in out.getvalue()
+    with virtual_pepper() as address, ThreadPoolExecutor(1) as pool:
+        code = pool.submit(run_file, path, master=address, out=out, robot_wait_s=100, interrupted=interrupted)
+        with nep.node("somebody", master=address) as node:
+            hand, weather = node.new_pub("/Pepper/world", "json"), node.new_pub("/weather", "json")
+            pause = threading.Event()
+            for turn in range(2000):
+                all_said = all(f"Pepper says “{words}" in out.getvalue() for words in SAID[name])
+                if code.done() or (name in ENDLESS and all_said):
+                    break
+                if name in STROKED:
+                    hand.publish({"touch": "head", "down": turn % 2 == 0})
+                weather.publish({"temperature": 5 if turn % 40 < 20 else 25})
+                pause.wait(0.1)
+            interrupted.set()
+        return code.result(60), out.getvalue()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_the_examples_run_on_the_virtual_robot():
+    """All of them at once: they mostly wait for their robots."""
+    with ThreadPoolExecutor(len(SAID)) as pool:
+        ended = dict(zip(SAID, pool.map(example_runs, SAID), strict=True))
+    for name, (code, out) in ended.items():
+        assert code in ({OK, INTERRUPTED} if name in ENDLESS else {OK}), (name, out)
+        for words in SAID[name]:
+            assert f"Pepper says “{words}" in out, (name, out)
+        assert "Pepper stopped (" in out, (name, out)
 
 
 @pytest.mark.timeout(240)
