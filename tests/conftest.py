@@ -22,6 +22,7 @@ from nep.text import escaped
 from tests import leftovers
 from tests.nep.programs import GREETINGS_S
 
+gc.disable()  # until all tests are read: what is made meanwhile stays
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts tests in the background lets them, and all they start, ignore Ctrl+C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -36,6 +37,8 @@ hypothesis.settings.load_profile("nep")
 pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
+MOSTLY_WAITING = ("tests/nep/", "tests/core/", "tests/robots/", "tests/blocks/")
+"""They open no window, and wait for timeouts and other processes for two thirds of their time and more."""
 USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
 """What a test takes, all in all, and one that starts Studio, ..."""
 LONG_S = {
@@ -68,25 +71,39 @@ _GRACE_S = 20.0
 _allowances = leftovers.Allowances()
 
 
+def may_take(worker: str, workers: int, processors: int, scope: str) -> bool:
+    """Whether a process of pytest-xdist may run the tests of `scope`: see `ByFile`."""
+    is_last = workers > processors + 1 and worker == f"gw{workers - 1}"
+    return not is_last or scope.startswith(MOSTLY_WAITING)
+
+
 class ByFile(LoadScopeScheduling):
     """Tests of one file stay in one process; so do all that bind fixed ports, which exist once.
 
     By name, not by mark: pytest-xdist 3.8 can't tell its groups to pytest 9.2. What takes long begins first:
-    at the end no process waits long for another.
+    at the end no process waits long for another. Where there are more processes than processors and one
+    (`tools.check.side_by_side`), the last is given only what is `MOSTLY_WAITING`: it fills the time in which
+    the others wait, and no more windows are open at a time than without it.
     """
+
+    def _may_take(self, node: WorkerController, scope: str) -> bool:
+        return may_take(node.gateway.id, self.numnodes, os.cpu_count() or 1, scope)
 
     def _split_scope(self, nodeid: str) -> str:
         return "ports" if nodeid.startswith(WITH_FIXED_PORTS) else nodeid.partition("::")[0]
 
     def _assign_work_unit(self, node: WorkerController) -> None:
-        """Give a process the file that takes longest of those that are left."""
-        longest = max(self.workqueue, key=self._seconds)
+        """Give a process the file that takes longest of those that are left for it."""
+        left = [each for each in self.workqueue if self._may_take(node, each)] or list(self.workqueue)
+        longest = max(left, key=self._seconds)
         self.workqueue.move_to_end(longest, last=False)
         super()._assign_work_unit(node)
 
     def _reschedule(self, node: WorkerController) -> None:
         """Give a process more than it has in hand: it begins a test only when it knows the one after it."""
         while not node.shutting_down and self._pending_of(self.assigned_work[node]) <= 2:
+            if self.workqueue and not any(self._may_take(node, each) for each in self.workqueue):
+                node.shutdown()
             super()._reschedule(node)  # gives it a file, or tells it that there is no other
 
     def remove_node(self, node: WorkerController) -> str | None:
@@ -138,6 +155,7 @@ def pytest_collection_finish() -> None:
     """What stands now, modules and tests, stands to the end: no collection of garbage looks at it again."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import may_take
 from tools.check import ROOT, Check, Outcome, checks, run, run_all, summary
 
 
@@ -64,6 +65,14 @@ def test_the_summary_names_what_failed() -> None:
     lines = summary([Outcome("mypy", True, 1.25), Outcome("pytest", False, 60.0)]).splitlines()
     assert lines[0].split() == ["mypy", "ok", "1.2", "s"]
     assert lines[1].split() == ["pytest", "FAILED", "60.0", "s"]
+
+
+def test_with_two_processes_more_than_processors_the_last_opens_no_windows() -> None:
+    window, waiting = "tests/e2e/test_stop.py", "tests/nep/services/test_calls.py"
+    assert not may_take("gw3", 4, 2, window)
+    assert may_take("gw3", 4, 2, waiting)
+    assert all(may_take("gw2", workers, 2, each) for each in (window, waiting) for workers in (3, 4))
+    assert may_take("gw5", 6, 8, window)
 
 
 def test_a_process_of_tests_that_crashes_fails_one_test_and_the_others_run_to_their_end(

@@ -63,12 +63,12 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Options of pytest-xdist: one process more than processors, six at most; tests/conftest.py groups tests.
+    """Options of pytest-xdist: two processes more than processors, six at most; see tests/conftest.py.
 
     Many tests wait for processes and windows: on two processors, with one more a fifth of the time is idle.
-    With two more all is done a little sooner, and some tests wait too long for a robot or a page.
+    With two more some tests would wait too long for a robot or a page, so the last one opens no windows.
     """
-    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 1)
+    workers = min(MOST_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
 
 
