@@ -137,9 +137,13 @@ class StopModel(RuleBasedStateMachine):
             self.answered[press].add(robot.id)
             for command in [each for each, place in told.items() if place < asked]:
                 del told[command]
-        elif answer["op"] == "invoke" and answer["action"] == "turn" and state in FINAL:
-            if not robot.body.is_turning:
-                told.pop(id, None)
+        elif (
+            answer["op"] == "invoke"
+            and answer["action"] == "turn"
+            and state in FINAL
+            and not robot.body.is_turning
+        ):
+            told.pop(id, None)
 
     # -- robots come, freeze, die and come back
 

@@ -1,1 +1,1 @@
-"""A simulated computer room for Stop: virtual time, a network that fails, robots, strangers and Studio's session."""
+"""A simulated lab for Stop: virtual time, an unreliable network, robots, strangers and Studio's session."""

@@ -163,7 +163,7 @@ class SimulatedNode:
         self.network.revision += 1
         return made
 
-    def graph(self, timeout_s: float = 2.0) -> GraphView:  # noqa: ARG002
+    def graph(self, timeout_s: float = 2.0) -> GraphView:
         return self.network.view()
 
     def halt(self, *, is_dead: bool) -> None:

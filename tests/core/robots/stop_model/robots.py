@@ -30,13 +30,13 @@ class Rover:
 
     @action("drive %speed m/s", category="Movement", icon="move", uses=("base",), on_busy="replace",
             risk="locomotes", cancellable=False, repeat_s=0.2)  # fmt: skip
-    def drive(self, call: Call, speed: Annotated[float, Range(-1, 1, 0.1, "m/s")] = 0.2) -> None:  # noqa: ARG002
+    def drive(self, call: Call, speed: Annotated[float, Range(-1, 1, 0.1, "m/s")] = 0.2) -> None:
         """Keep driving until the next drive or stop."""
         self.is_driving = speed != 0
 
     @action("turn %angle degrees", category="Movement", icon="move", uses=("base",), on_busy="queue",
             risk="locomotes", timeout_s=5)  # fmt: skip
-    def turn(self, call: Call, angle: Annotated[float, Range(-90, 90, 5, "deg")] = 45) -> None:  # noqa: ARG002
+    def turn(self, call: Call, angle: Annotated[float, Range(-90, 90, 5, "deg")] = 45) -> None:
         """Turn for a second."""
         self.is_turning = True
         try:

@@ -110,10 +110,10 @@ class _Driving(Wanted):
     def program(self) -> Program:
         robots: tuple[str, ...] = self.robots  # type: ignore[attr-defined]
         return Program(
-            "driving", "", "", {}, robots=robots, actions={name: ("drive",) for name in robots}, starts=1
+            "driving", "", "", {}, robots=robots, actions=dict.fromkeys(robots, ("drive",)), starts=1
         )
 
-    def problems(self, program: Program) -> dict[str, str]:  # noqa: ARG002
+    def problems(self, program: Program) -> dict[str, str]:
         return {}
 
 
