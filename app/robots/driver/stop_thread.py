@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable
 
-from app.robots.driver.call import Failed
+from app.robots.driver.call import Clock, Failed
 from app.robots.identity import ERROR_MOST, MAY_MOVE
 from nep.i18n import _
 from nep.system.log_rarely import SurvivedErrors
@@ -23,7 +23,11 @@ class StopThread:
     """
 
     def __init__(
-        self, name: str, stop: Callable[[], object], ended: Callable[[int, str | None], object]
+        self,
+        name: str,
+        stop: Callable[[], object],
+        ended: Callable[[int, str | None], object],
+        clock: Clock,
     ) -> None:
         """Create the thread; `start` starts it.
 
@@ -31,8 +35,9 @@ class StopThread:
             name: Name of the robot.
             stop: The robot's stop function.
             ended: Called in this thread with the number of a run and the sentence of its failure, or None.
+            clock: Waits for the next stop.
         """
-        self._name, self._stop, self._ended = name, stop, ended
+        self._name, self._stop, self._ended, self._clock = name, stop, ended, clock
         self._errors = SurvivedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
         self._wake = threading.Event()
@@ -75,7 +80,7 @@ class StopThread:
             while not self._is_closing:
                 with self._errors:
                     if self._requested == self._finished:
-                        self._wake.wait()
+                        self._clock.wait(self._wake, None)
                     self._wake.clear()
                     if self._requested > self._finished:
                         self._run(self._requested)

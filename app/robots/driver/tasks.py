@@ -128,7 +128,7 @@ class Tasks:
             next_due_s=self._next_due,
             on_restart=self._restarted,
         )
-        self._stop_thread = StopThread(name, stop, self._stop_run_ended)
+        self._stop_thread = StopThread(name, stop, self._stop_run_ended, clock)
         self._ended_run = 0
         self._ended_error: str | None = None
         self._lock = threading.Lock()

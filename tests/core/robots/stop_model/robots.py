@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Annotated, Any, cast
 
 import orjson
@@ -99,8 +100,8 @@ class SimulatedRobot:
     @property
     def is_deciding(self) -> bool:
         """Whether the thread that decides what the robot does is alive."""
-        tasks = self.driver._tasks
-        return tasks is not None and tasks._thread.is_alive()
+        names = {thread.name for thread in threading.enumerate()}
+        return names >= {f"{self.name} commands", f"{self.name} stop"}
 
     def thaw(self) -> None:
         self.node.is_frozen = False

@@ -18,7 +18,7 @@ from tests.core.robots.stop_model.clock import SimulatedClock
 from tests.core.robots.stop_model.network import SimulatedNetwork, SimulatedNode, SimulatedSource
 
 GRAPH_POLL_S = 0.4
-ALIVE_S = 0.2
+ALIVE_S = GRAPH_POLL_S  # at the same moments, so that fewer have to be simulated
 
 
 class SimulatedHeartbeat:
