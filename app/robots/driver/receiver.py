@@ -22,7 +22,7 @@ from nep.system.log_rarely import is_logged
 MAX_COMMAND_BYTES = 64_000
 _MAX_BACKLOG = 2_000
 _MAX_BACKLOG_BYTES = 16_000_000
-_HEAD_BYTES = 2_048
+_END_BYTES = 2_048
 _ID = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
 _OPERATION = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
 _log = logging.getLogger(__name__)
@@ -183,6 +183,7 @@ class CommandReceiver:
 
 
 def _found(pattern: re.Pattern[bytes], message: Message) -> str:
-    """The member of a command that is too large to decode, if it is among the first 2 kB; else ""."""
-    found = pattern.search(bytes(message.data[:_HEAD_BYTES]))
+    """The member of a command that is too large to decode, if it is in the first or last 2 kB; else ""."""
+    data = message.data
+    found = pattern.search(bytes(data[:_END_BYTES])) or pattern.search(bytes(data[-_END_BYTES:]))
     return "" if found is None else found[1].decode()

@@ -141,6 +141,9 @@ def test_commands_received_before_a_stop_are_not_run_after_it(busy, how):
         assert {answer["state"] for answer in answers} == {"canceled"}
         assert driver.body.done == []
         assert ears.final("s", "stop" if how == "native" else "invoke")["state"] == "succeeded"
+    else:
+        answered = ears.heard["action_state"]
+        eventually(lambda: ("s", "success") in [(each["id"], each["state"]) for each in answered])
     eventually(lambda: ears.invoke("after", "light") or "succeeded" in ears.states("after"))
 
 
@@ -153,9 +156,11 @@ def test_command_after_a_stop_in_the_same_batch_is_run(turtle):
     assert len(body.done) == 1
 
 
-def test_large_stop_is_carried_out(busy):
+@pytest.mark.parametrize("order", [("id", "op", "ends"), ("ends", "op", "id")], ids=" ".join)
+def test_large_stop_is_carried_out(busy, order):
     driver, ears, go_on = busy
-    ears.command(id="s", op="stop", ends="z" * 1_000_000)
+    stop = {"id": "s", "op": "stop", "ends": "z" * 1_000_000}
+    ears.command(**{name: stop[name] for name in order})
     eventually(lambda: driver.body.stops >= 1 and not driver.body.moving)
     go_on.set()
     assert ears.final("s", "stop")["state"] == "succeeded"
