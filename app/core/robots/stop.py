@@ -209,6 +209,8 @@ class RobotStopper:
             if timeout_s is not None
             else patience_s((line.target.robot for line in lines), self._longest_s)
         )
+        if asked:  # a program that came since the last graph was told as well, and must answer
+            self._refresh_view()
         while True:
             self._look_for(asked)
             undelivered = [each for each in asked if not self._deliver(each)]
@@ -379,13 +381,17 @@ class RobotStopper:
             if looks:
                 self._looked_s = now
         if looks:
-            with suppress(NepError):  # then what was known before counts; who is unknown proves nothing
-                self.see(self._node.graph(GRAPH_S))
+            self._refresh_view()
         with self._changed:
             for each in asked:
                 if not each.serving:
                     each.serving |= self._serving(each)
                     self._judge_again(each)  # none of it is late: they are asked just now
+
+    def _refresh_view(self) -> None:
+        """Ask the master who is there; without an answer, what was known before counts."""
+        with suppress(NepError):
+            self.see(self._node.graph(GRAPH_S))
 
     def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
         """Who must answer: the robot's own program first, then whoever else serves its commands, by node.

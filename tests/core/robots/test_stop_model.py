@@ -62,7 +62,8 @@ class StopModel(RuleBasedStateMachine):
         self.told: dict[
             SimulatedRobot, dict[str, int]
         ] = {}  # ids of commands that moved it -> when it was sent
-        self.press = 0
+        self.press = self.press_of_all = 0  # the newest Stop, and the newest of all robots
+        self.pressed_at = 0  # how many messages had been sent then
         self.stops: dict[
             str, tuple[int, int]
         ] = {}  # id of a stop -> the press that it belongs to, when it was sent
@@ -246,6 +247,7 @@ class StopModel(RuleBasedStateMachine):
     @rule(wait_s=waits)
     def press_stop(self, wait_s: float) -> None:
         self.press += 1
+        self.press_of_all, self.pressed_at = self.press, len(self.network.sent)
         self.pressed_s = self.clock.now()
         self._undisturbed_now()
         self.studio.session.runs.stop()
@@ -304,8 +306,9 @@ class StopModel(RuleBasedStateMachine):
         self._seen_report = report = run.report
         if run.state == "proven":
             assert report.robots, "an empty report proves nothing"
+        answered = self.answered[self.press_of_all]
         for robot, commands in self.told.items():
-            if commands and robot.id not in self.answered[self.press]:
+            if robot.id not in answered and any(place < self.pressed_at for place in commands.values()):
                 assert not report.proven, f"{robot} is called stopped and did not answer"
                 assert robot.name in report.silent, (
                     f"{robot} was told to move, did not answer and is not named"
