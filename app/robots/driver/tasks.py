@@ -370,7 +370,8 @@ class Tasks:
     def _take_unasked(self, answer: Answer) -> None:
         """The answer to a stop that nobody asked for: a failure is logged, and told by each sign of life."""
         if answer.state == "failed":
-            _log.error("%s", answer.error)
+            if answer.error != self._not_stopped:  # the same again says nothing new
+                _log.error("%s", answer.error)
             self._not_stopped = answer.error
 
     def _end(self, task: Task, how: Answer) -> None:
