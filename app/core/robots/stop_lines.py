@@ -145,7 +145,7 @@ class StopLine:
         """Why it can't have heard anything, in a sentence; empty once one of its ways was connected."""
         if any(way.was_connected for way in self.ways.values()):
             return ""
-        return _("{robot} is not connected yet; Stop is sent as soon as it is").format(robot=self.name)
+        return _("{robot} is not connected yet").format(robot=self.name)
 
     @property
     def untold(self) -> str:

@@ -22,7 +22,8 @@ class RobotStop:
     never answer a stop (RIZE), and for programs that only listen to a robot's commands. ``program`` names
     another program than the robot's own that serves its commands; ``node`` is the id of the program
     that answered. ``waits`` says that other programs of the same robot had not answered yet when this was
-    told. ``waited_ms`` is how long the command waited until the robot was connected.
+    told. ``is_pending``: it is told as soon as it is connected. ``waited_ms`` is how long the command waited
+    until then.
     """
 
     name: str
@@ -35,6 +36,7 @@ class RobotStop:
     waits: bool = False
     node: str = ""
     waited_ms: float = 0.0
+    is_pending: bool = False
 
     @property
     def who(self) -> str:

@@ -71,11 +71,14 @@ class StopRequest:
 
     def results(self) -> list[RobotStop]:
         """A line for each program; those that have said nothing did not answer."""
-        error = self.error or self.line.unconnected
+        unconnected = self.line.unconnected
+        silent = RobotStop(
+            self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
+        )
         if not self.serving:
-            return [RobotStop(self.line.name, False, None, error=error)]
+            return [silent]
         return [
-            each or RobotStop(self.line.name, False, None, error=error, program=self.programs.get(node, ""))
+            each or replace(silent, program=self.programs.get(node, ""))
             for node, each in self.serving.items()
         ]
 

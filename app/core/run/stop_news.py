@@ -26,9 +26,13 @@ class StopNews:
         self._fleet.stopped(words, report)
 
     def doubts(self, report: StopReport) -> tuple[str, ...]:
-        """What is known of why robots that are not proven to stand still may move."""
+        """What is known of why robots that are not proven to stand still may move, and who is told later."""
+        pending = [name for name, robot in report.by_name.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.silent)
-        return tuple(motion.sentence for motion in motions if motion is not None and motion.is_known)
+        return (
+            *(motion.sentence for motion in motions if motion is not None and motion.is_known),
+            *(_("Stop is sent to {robot} as soon as it is connected").format(robot=name) for name in pending),
+        )
 
     def tell_person(self, report: StopReport, origin: str) -> None:
         """Tell in the Console, for ``origin``, and by an alert as long as a robot may still move."""
