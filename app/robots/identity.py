@@ -11,6 +11,7 @@ import hashlib
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 from app.robots.description.description import topic_of
 from app.robots.description.model import Robot, RobotTopics
@@ -189,3 +190,25 @@ class Senders:
         """The id of the node that sent it; None while no master has told of its publisher."""
         with self._lock:
             return None if message.publisher is None else self._nodes.get(message.publisher)
+
+
+class RobotProcesses(Protocol):
+    """What is needed to know about the processes of robots."""
+
+    def is_ours(self, identity: Identity) -> bool:
+        """Whether this program is a virtual robot of this person."""
+
+    def has_ended(self, identity: Identity) -> bool:
+        """Whether it is sure that this program runs no more."""
+
+
+class AllVirtual:
+    """Believes every robot that says that it is virtual (what tests need)."""
+
+    def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
+        """All are."""
+        return True
+
+    def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
+        """Nobody knows."""
+        return False

@@ -18,7 +18,6 @@ from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.moved_robots import MovedRobots
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
-from app.core.robots.robot_processes import AllVirtual, RobotProcesses
 from app.core.robots.stop_lines import MOST_TOPICS, StopTarget
 from app.core.robots.stop_reach import targets_of, unlisted_targets
 from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, StopReport
@@ -30,7 +29,9 @@ from app.robots.description.description import Robot, topic_of
 from app.robots.heartbeat import Heartbeat
 from app.robots.identity import (
     GATEWAY,
+    AllVirtual,
     Identity,
+    RobotProcesses,
     Senders,
     foreign_topic,
     hearing,

@@ -46,7 +46,7 @@ def ignore_moved(_names: Sequence[str], _by: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class UnprovenMotion:
     """Something that a robot was told to do and that nobody has seen to end.
 
     ``number`` counts all motions, ``since_s`` is monotonic, ``program`` is the robot's program at that time.
@@ -88,7 +88,7 @@ class MovedRobots:
             clock: Monotonic seconds.
         """
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
-        self._motions: dict[str, list[Motion]] = {}
+        self._motions: dict[str, list[UnprovenMotion]] = {}
         self._count = 0
 
     def __contains__(self, name: object) -> bool:
@@ -104,7 +104,7 @@ class MovedRobots:
         """Number of the newest motion. A Stop that begins now proves nothing about later ones."""
         return self._count
 
-    def motion(self, name: str) -> Motion | None:
+    def motion(self, name: str) -> UnprovenMotion | None:
         """The newest motion of a robot whose cause is known, or None when it is not in the ledger.
 
         That an action or a Stop did not end is told only when nothing else is known.
@@ -136,7 +136,7 @@ class MovedRobots:
         for name in names:
             self._count += 1
             meant = program if program is not None else self._program_of(name)
-            motion = Motion(self._count, name, by, self._clock(), meant, id)
+            motion = UnprovenMotion(self._count, name, by, self._clock(), meant, id)
             found = self._motions.setdefault(name, [])
             if not id or len(found) >= MAX_MOTIONS:  # the newest of several that end together stands for them
                 motion = replace(motion, id="")
@@ -188,7 +188,7 @@ class MovedRobots:
         """Forget what ended programs were told: a virtual robot is its program, and moves no more."""
         self._keep(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
-    def _keep(self, name: str, stays: Callable[[Motion], bool]) -> None:
+    def _keep(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:
         left = [motion for motion in self._motions.get(name, ()) if stays(motion)]
         if left:
             self._motions[name] = left
