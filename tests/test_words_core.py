@@ -151,7 +151,14 @@ def test_alerts_of_health() -> None:
     real = replace(PEPPER, virtual=False)
     links = [
         SimpleNamespace(
-            name=name, robot=robot, virtual=robot.virtual, connected=on, goes_on="", may_move="", silent=None
+            name=name,
+            robot=robot,
+            virtual=robot.virtual,
+            connected=on,
+            goes_on="",
+            may_move="",
+            not_stopped="",
+            silent=None,
         )
         for name, robot, on in (("Nao", real, False), ("Turtle", PEPPER, False), ("Pepper", real, False))
     ]

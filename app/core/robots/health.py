@@ -265,7 +265,9 @@ class Health:
 
     def _check_motion(self, link: RobotLink) -> None:
         """Tell of a robot that could not end an action, as it says, or may move and can't be heard."""
-        wrong = link.goes_on if link.connected and link.goes_on else link.may_move
+        wrong = link.goes_on if link.connected else ""
+        if not wrong and not link.not_stopped:  # else the alert of the stop says it
+            wrong = link.may_move
         if not wrong:
             self._alerts.resolve(f"moving:{link.name}")
             return

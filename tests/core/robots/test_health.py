@@ -116,7 +116,14 @@ def test_taken_ports_are_one_alert_for_developers_that_leads_to_the_doctor(case:
 def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     shown = SimpleNamespace(sensors=())
     return SimpleNamespace(
-        name="Rover", virtual=virtual, connected=connected, silent=None, robot=shown, goes_on="", may_move=""
+        name="Rover",
+        virtual=virtual,
+        connected=connected,
+        silent=None,
+        robot=shown,
+        goes_on="",
+        may_move="",
+        not_stopped="",
     )
 
 
