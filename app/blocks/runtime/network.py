@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 import uuid
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
@@ -17,6 +16,7 @@ from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.heartbeat import Heartbeat
+from app.robots.held_messages import HeldMessages
 from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
 from nep.errors import NepError
 from nep.i18n import _
@@ -27,7 +27,7 @@ from nep.text import bounded_str
 
 LOOK_S = 0.2
 """The master is asked so often at most who sent what came from an unknown publisher."""
-MOST_UNKNOWN = 256
+MOST_UNKNOWN = 32
 
 Told = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -106,7 +106,7 @@ class Network:
         self._senders = Senders()
         self._view = GraphView(0, 0)
         self._judging = threading.Lock()  # answers are taken one after the other
-        self._unknown: deque[Message] = deque(maxlen=MOST_UNKNOWN)
+        self._unknown = HeldMessages(per_publisher=MOST_UNKNOWN)
         self._asks = threading.Event()
         self._finder: threading.Thread | None = None
         self._refused: dict[str, str] = {}
@@ -327,8 +327,7 @@ class Network:
                 first = first_to_announce(view, robot.topics.description)
                 if robot.dialect != "rize" and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
-            waiting, self._unknown = list(self._unknown), deque(maxlen=MOST_UNKNOWN)
-            for message in waiting:
+            for message in self._unknown.take():
                 if self._senders.node_of(message) is not None:
                     self._judge(message)
         self._poke()
@@ -387,20 +386,26 @@ class Network:
 
     def _judge(self, message: Message) -> None:
         """Take an answer; who sent it must be known first. Under `_judging`."""
-        payload = payload_of(message)
-        if not isinstance(payload, Mapping):
-            return
         node = self._senders.node_of(message)
         native = any(
             robot.dialect != "rize" and robot.topics.answer == message.topic
             for robot in self._robots.values()
         )
-        waits = any(each.publisher == message.publisher for each in self._unknown)
-        if native and (node is None or waits):
-            self._unknown.append(message)
+        if native and (node is None or self._unknown.holds(message.publisher)):
+            self._unknown.put(message)
             self._ask()
             return
-        self._answer(message.topic, payload, node or "")
+        if native and not self._serves(message.topic, node or ""):
+            return  # nothing of it is decoded
+        payload = payload_of(message)
+        if isinstance(payload, Mapping):
+            self._answer(message.topic, payload, node or "")
+
+    def _serves(self, topic: str, node: str) -> bool:
+        """Whether a node is a robot with this answer topic, or must answer a stop."""
+        with self._arrived:
+            must_answer = any(node in waiting for _name, waiting in self._stops.values())
+        return must_answer or any(self._is_own(robot, topic, node) for robot in self._robots.values())
 
     def _answer(self, topic: str, told: Mapping[str, object], node: str) -> None:
         """Take an answer of a node: a stop's of all that serve the robot, others only of the robot's own."""

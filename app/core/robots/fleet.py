@@ -12,7 +12,6 @@ from dataclasses import replace
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
-from app.core.robots.held_messages import HeldMessages
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
@@ -27,6 +26,7 @@ from app.errors import AppError, RobotInputError, RobotUnknownError
 from app.robots import rize
 from app.robots.description.description import Robot, topic_of
 from app.robots.heartbeat import Heartbeat
+from app.robots.held_messages import HeldMessages
 from app.robots.identity import (
     GATEWAY,
     AllVirtual,

@@ -15,12 +15,12 @@ from contextlib import suppress
 from functools import partial
 
 from app.core.faults import error_words
-from app.core.robots.held_messages import HeldMessages
 from app.core.robots.stop_lines import StopLine, StopNode, StopTarget, StopWay
 from app.core.robots.stop_report import RobotStop, StopReport
 from app.core.robots.stop_request import StopRequest
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
+from app.robots.held_messages import HeldMessages
 from app.robots.identity import (
     Senders,
     first_to_announce,

@@ -21,6 +21,10 @@ class HeldMessages:
     def __bool__(self) -> bool:
         return bool(self._messages)
 
+    def holds(self, publisher: int | None) -> bool:
+        """Return whether messages of this publisher are held."""
+        return publisher in self._messages
+
     def put(self, message: Message) -> None:
         """Hold a message."""
         held = self._messages.get(message.publisher)

@@ -1,0 +1,28 @@
+"""Messages of unknown publishers are bounded, and a flood displaces nobody else's."""
+
+from __future__ import annotations
+
+import nep
+from app.robots.held_messages import HeldMessages
+
+
+def message(publisher: int, seq: int = 1) -> nep.Message:
+    return nep.Message("/Pepper/answer", b"{}", "json", "robot/answer", publisher=publisher, seq=seq)
+
+
+def test_a_flood_of_one_publisher_displaces_its_own_messages_only() -> None:
+    held = HeldMessages(per_publisher=2)
+    held.put(message(1))
+    for seq in range(1000):
+        held.put(message(2, seq))
+    assert [(each.publisher, each.seq) for each in held.take()] == [(1, 1), (2, 998), (2, 999)]
+    assert not held
+
+
+def test_a_flood_of_publishers_displaces_no_earlier_one() -> None:
+    held = HeldMessages(publishers=8)
+    for publisher in range(1000):
+        held.put(message(publisher))
+    assert [each.publisher for each in held.take()] == list(range(8))
+    held.put(message(1000))
+    assert held.holds(1000)
