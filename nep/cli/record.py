@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,14 +21,19 @@ from nep.cli.screen import console, say, show_json, size
 from nep.errors import RecordingError
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
+from nep.text import quotable
 
 if TYPE_CHECKING:
     from nep.recordings import recorder, writer
+    from nep.recordings import split as splits
 else:  # the other commands need not wait for it, nor have what it needs
     recorder = lazy_module("nep.recordings.recorder")
+    splits = lazy_module("nep.recordings.split")
     writer = lazy_module("nep.recordings.writer")
 
 _LOOK_S = 0.2
+_SIZE = re.compile(r"(\d{1,15}(?:[.,]\d{1,6})?) ?([kMGT]?)B?", re.IGNORECASE)
+_UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
 
 
 def record(
@@ -59,10 +66,23 @@ def record(
         float | None,
         typer.Option("--duration", metavar=_("SECONDS"), help=_("End after so long."), show_default=False),
     ] = None,
+    max_size: Annotated[
+        str | None,
+        typer.Option(
+            "--max-size",
+            metavar=_("SIZE"),
+            help=_("End with a file of this size, such as 500MB or 2GB; with --split, begin the next one."),
+            show_default=False,
+        ),
+    ] = None,
+    split: Annotated[
+        bool,
+        typer.Option("--split", help=_("Go on in another file: NAME-001.mcap, NAME-002.mcap, ...")),
+    ] = False,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Record what is published into an MCAP file, as it comes. Ctrl+C ends it cleanly.
+    """Record published messages to an MCAP file. Ctrl+C, SIGTERM and SIGHUP end it cleanly.
 
     Topics that appear later are recorded too. A pattern means all topics that match it: * is any letters
     between slashes, ? is one letter, ** is any parts or none. Put it into quotes, for the shell has patterns
@@ -73,45 +93,79 @@ def record(
             _("{given:g} is no time; give seconds, 0 or more").format(given=duration_s),
             param_hint="--duration",
         )
+    most_bytes = _most_bytes(max_size, split=split)
     path = output or Path(datetime.now().astimezone().strftime("recording-%Y-%m-%d-%H-%M-%S.mcap"))
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(left_out or ()))
     ended = threading.Event()
     with node_for("record", master) as node:
         node.graph()  # so that a master that is not there is said before a file is made
-        file = writer.RecordingWriter(path, note=note, on_problem=lambda _reason: ended.set())
+        parts = splits.SplitFiles(path, most_bytes) if split and most_bytes is not None else None
+        file = writer.RecordingWriter(parts or path, note=note, on_problem=lambda _reason: ended.set())
         try:
             with recorder.Recorder(node, file, selection):
                 interrupts.call_first(ended.set)
                 if not as_json:
                     said = _("recording into '{path}'; Ctrl+C ends it")
-                    say(said.format(path=path))
-                _wait(ended, file, duration_s)
+                    say(said.format(path=path if parts is None else parts.paths[0]))
+                _wait(ended, file, duration_s, None if split else most_bytes)
         finally:
             status = file.close()
-    if as_json:
-        plain = {topic: each.to_plain() for topic, each in status.topics.items()}
-        show_json(
-            {
-                "path": str(path),
-                "message_count": status.message_count,
-                "size_bytes": status.size_bytes,
-                "duration_s": status.duration_s,
-                "topics": plain,
-                "problem": status.problem,
-            }
-        )
-    else:
-        _say_end(path, status)
+    _tell_end([path] if parts is None else parts.paths, status, as_json=as_json)
     if status.problem:
         raise RecordingError(str(path), status.problem)
 
 
-def _wait(ended: threading.Event, file: writer.RecordingWriter, duration_s: float | None) -> None:
+def _tell_end(paths: Sequence[Path], status: writer.RecordingStatus, *, as_json: bool) -> None:
+    if as_json:
+        show_json(
+            {
+                "path": str(paths[0]),
+                "paths": [str(each) for each in paths],
+                "message_count": status.message_count,
+                "size_bytes": status.size_bytes,
+                "duration_s": status.duration_s,
+                "topics": {topic: each.to_plain() for topic, each in status.topics.items()},
+                "problem": status.problem,
+            }
+        )
+        return
+    _say_end(paths[0], status)
+    if len(paths) > 1:
+        said = ngettext(
+            "in {count} file, the last is '{path}'", "in {count} files, the last is '{path}'", len(paths)
+        )
+        say(said.format(count=len(paths), path=paths[-1]))
+
+
+def _most_bytes(text: str | None, *, split: bool) -> int | None:
+    """The size in bytes; None without one. Raises `typer.BadParameter`."""
+    if text is None:
+        if split:
+            raise typer.BadParameter(_("--split needs a size: --max-size 500MB"), param_hint="--split")
+        return None
+    found = _SIZE.fullmatch(text.strip())
+    size_bytes = round(float(found[1].replace(",", ".")) * _UNITS[found[2].lower()]) if found else 0
+    if not splits.MIN_PART_BYTES <= size_bytes < 2**63:
+        raise typer.BadParameter(
+            _("'{given}' is no size; give 100kB or more, such as 500MB or 2GB").format(given=quotable(text)),
+            param_hint="--max-size",
+        )
+    return size_bytes
+
+
+def _wait(
+    ended: threading.Event,
+    file: writer.RecordingWriter,
+    duration_s: float | None,
+    most_bytes: int | None,
+) -> None:
     """Until it is to end; how far it is stands on a terminal's last line."""
     out = console(stderr=True)
     until = None if duration_s is None else time.monotonic() + duration_s
 
     def has_ended() -> bool:
+        if most_bytes is not None and file.status.size_bytes >= most_bytes:
+            return True
         left = _LOOK_S if until is None else min(_LOOK_S, until - time.monotonic())
         return left <= 0.0 or ended.wait(left)
 

@@ -87,6 +87,9 @@ def _show(recording: reader.Recording, told: Mapping[str, figures.TopicFigures])
     write(f"{head}\n")
     if recording.words.get("note"):
         write(f"{escaped(recording.words['note'])}\n")
+    if recording.words.get("part"):
+        part = quotable(recording.words["part"])
+        write(_("file {number} of a recording that was split").format(number=part) + "\n")
     write(f"{_written_by(recording.facts)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
     show_table(_COLUMNS, [_row(recording, each, told.get(each.name)) for each in topics])

@@ -16,8 +16,8 @@ import orjson
 
 from nep.errors import RecordingError
 from nep.i18n import _
+from nep.recordings.destination import disk_sentence
 from nep.recordings.reader import Recording
-from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
 
 __all__ = ["MOST_BOOKMARKS", "Bookmark", "Bookmarks"]

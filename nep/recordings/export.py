@@ -20,9 +20,9 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
+from nep.recordings.destination import disk_sentence
 from nep.recordings.film import Container, Film, container_there, frame_of
 from nep.recordings.reader import RecordedMessage, Recording
-from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
 
 __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
@@ -35,7 +35,7 @@ _MOST_ITEMS = 100
 """Of a list that get a column each; a longer one is one column of JSON."""
 _DEEPEST = 20
 _CELLS_AT_ONCE = 200_000
-_FIRST_COLUMNS = ("time_s", "stamp_s", "seq", "publisher")
+_FIRST_COLUMNS = ("time_ns", "time_s", "stamp_ns", "stamp_s", "seq", "publisher")
 _FPS = 30.0
 _SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "pictures": ""}
 Progress = Callable[[int, int], object]
@@ -228,7 +228,9 @@ class _Source:
 def _times(each: RecordedMessage) -> dict[str, object]:
     message = each.message
     return {
+        "time_ns": each.log_ns,
         "time_s": each.log_ns / 1e9,
+        "stamp_ns": message.stamp_ns,
         "stamp_s": None if message.stamp_ns is None else message.stamp_ns / 1e9,
         "seq": message.seq,
         "publisher": None if message.publisher is None else str(message.publisher),

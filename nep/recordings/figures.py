@@ -37,6 +37,17 @@ class TopicFigures:
     unkept: int = 0
     size_bytes: int = 0
 
+    def since(self, earlier: TopicFigures) -> TopicFigures:
+        """What was counted since earlier figures of the same counts."""
+        return TopicFigures(
+            max(0, self.received - earlier.received),
+            None if self.lost is None else max(0, self.lost - (earlier.lost or 0)),
+            max(0, self.late - earlier.late),
+            max(0, self.undecodable - earlier.undecodable),
+            max(0, self.unkept - earlier.unkept),
+            max(0, self.size_bytes - earlier.size_bytes),
+        )
+
     def to_plain(self) -> dict[str, int | None]:
         """As a map, for JSON."""
         return {

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, BinaryIO, Protocol
 from nep.errors import ClosedError
 from nep.recordings.channels import ChannelDefinition
 from nep.recordings.compression import check_packages
+from nep.recordings.destination import disk_sentence
 from nep.recordings.index import Attachment, Damage, FileIndex, read_chunk, read_entries, read_index
 from nep.recordings.limits import ReadBudget
 from nep.recordings.records import ChunkInfo, RawMessage, messages_in
-from nep.recordings.writer import disk_sentence
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -21,6 +21,7 @@ from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.channels import ChannelDecoder
 from nep.recordings.compression import check_packages, decompressed, decompressed_part
+from nep.recordings.destination import disk_sentence
 from nep.recordings.index import MOST_SMALL_BYTES, Definitions, RecordCounter, read_chunk, read_index
 from nep.recordings.limits import open_budget
 from nep.recordings.mcap_file import ChannelTable, FileWriter
@@ -41,7 +42,6 @@ from nep.recordings.records import (
     read_record,
 )
 from nep.recordings.walk import Place
-from nep.recordings.writer import disk_sentence
 from nep.system.replace_file import replace_file
 
 __all__ = ["RepairReport", "repair", "repaired_path"]

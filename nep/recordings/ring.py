@@ -12,7 +12,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -24,6 +24,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.channels import Role
 from nep.recordings.compression import decompressed
+from nep.recordings.destination import USUAL_LIMITS, WriterLimits, disk_sentence
 from nep.recordings.figures import TopicFigures, read_figures
 from nep.recordings.mcap_file import ChannelTable, FileWriter
 from nep.recordings.records import (
@@ -34,7 +35,7 @@ from nep.recordings.records import (
     chunk_head,
     messages_in,
 )
-from nep.recordings.writer import USUAL_LIMITS, LogClock, RecordingWriter, WriterLimits, disk_sentence
+from nep.recordings.writer import LogClock, RecordingWriter
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -143,6 +144,12 @@ class _Segments:
                 if self._all[0].users:  # it frees nothing yet, and whoever copies it is soon done
                     return
                 self._remove_oldest()
+
+    is_full = False
+    """Never: segments are removed as a whole, and hold no counts of their own."""
+
+    def next_file(self) -> None:
+        """See `Destination`."""
 
     def finish(self) -> None:
         """Nothing of it is needed any more."""
@@ -373,14 +380,5 @@ class _FiguresSince:
 
     def _difference(self, topic: str, count: int) -> TopicFigures:
         nothing = TopicFigures()
-        first, last = self._first.get(topic, nothing), self._last.get(topic, nothing)
-        lost = None if last.lost is None else max(0, last.lost - (first.lost or 0))
-        unkept = max(0, last.unkept - first.unkept)
-        return TopicFigures(
-            count + unkept,
-            lost,
-            max(0, last.late - first.late),
-            max(0, last.undecodable - first.undecodable),
-            unkept,
-            max(0, last.size_bytes - first.size_bytes),
-        )
+        made = self._last.get(topic, nothing).since(self._first.get(topic, nothing))
+        return replace(made, received=count + made.unkept)

@@ -7,10 +7,8 @@ so a process that is killed loses less than a second, and a reader finds whole r
 
 from __future__ import annotations
 
-import errno
 import logging
 import os
-import shutil
 import threading
 import time
 from collections import deque
@@ -18,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import orjson
 
@@ -32,21 +30,15 @@ from nep.recordings.channels import (
     encoding_of,
     own_channel,
 )
+from nep.recordings.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_sentence
 from nep.recordings.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
 from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.part import RecordingPart
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = [
-    "USUAL_LIMITS",
-    "Destination",
-    "LogClock",
-    "RecordingStatus",
-    "RecordingWriter",
-    "WriterLimits",
-    "disk_sentence",
-]
+__all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 
 MOST_ONES_CHANNELS = 10_000
 """With more, publishers that come later share a channel for each topic."""
@@ -55,25 +47,6 @@ _KNOWN = 10_000
 _OTHERS = ""
 """Where topics are counted of which there are too many."""
 _log = logging.getLogger("nep.recordings")
-
-
-@dataclass(frozen=True)
-class WriterLimits:
-    """How much a writer holds, and how long.
-
-    `queue_bytes`, `queue_messages`: what may wait to be written. `least_free_bytes`: with less of it free on
-    the disk a recording ends, because other programs need some, too. `flush_s`: what came is in the file so
-    long after at most. `figures_s`: how often it writes what became of the topics' messages.
-    """
-
-    queue_bytes: int = 256_000_000
-    queue_messages: int = 200_000
-    least_free_bytes: int = 200_000_000
-    flush_s: float = 0.5
-    figures_s: float = 1.0
-
-
-USUAL_LIMITS = WriterLimits()
 
 
 class LogClock:
@@ -88,72 +61,6 @@ class LogClock:
     def __call__(self) -> int:
         """Now."""
         return time.monotonic_ns() + self._add_ns
-
-
-class Destination(Protocol):
-    """Where a writer's thread writes to. All of it is called by that thread alone."""
-
-    @property
-    def file(self) -> FileWriter:
-        """The file for what comes next."""
-
-    def flushed(self) -> None:
-        """A chunk was written. Raises `OSError`, `RecordingError`."""
-
-    def look(self) -> None:
-        """Once a second: is there still room? Raises `RecordingError` with the sentence when not."""
-
-    def finish(self) -> None:
-        """Nothing more comes. Raises `OSError`."""
-
-    def fail(self) -> None:
-        """Close it as it is, after an error."""
-
-
-class _OneFile:
-    """A recording's file."""
-
-    def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
-        self.file = file
-        self._least_free_bytes = least_free_bytes
-        self._identity = _identity(file.path)
-
-    def flushed(self) -> None:
-        """There is nothing to do."""
-
-    def look(self) -> None:
-        """See `Destination`."""
-        if _identity(self.file.path) != self._identity:
-            raise RecordingError(
-                str(self.file.path), _("somebody has moved or deleted it while it was written")
-            )
-        if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
-            raise RecordingError(str(self.file.path), _("the disk is full; what came before is kept"))
-
-    def finish(self) -> None:
-        """See `Destination`."""
-        self.file.finish()
-
-    def fail(self) -> None:
-        """See `Destination`."""
-        self.file.close()
-
-
-def _identity(path: Path) -> tuple[int, int] | None:
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
-
-
-def disk_sentence(path: Path, error: OSError) -> RecordingError:
-    """What a disk's error means for a recording."""
-    if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
-        reason = _("the disk is full; what came before is kept")
-    else:
-        reason = (error.strerror or str(error)).lower()
-    return RecordingError(str(path), reason)
 
 
 @dataclass(frozen=True)
@@ -216,7 +123,7 @@ class RecordingWriter:
         if isinstance(path, str | os.PathLike):
             whole = Path(path)
             try:
-                self._destination: Destination = _OneFile(FileWriter(whole), limits.least_free_bytes)
+                self._destination: Destination = OneFile(FileWriter(whole), limits.least_free_bytes)
             except FileExistsError:
                 raise RecordingError(
                     str(whole), _("there is such a file already; choose another name")
@@ -240,6 +147,7 @@ class RecordingWriter:
         self._figures: dict[str, TopicFigures] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
+        self._part = RecordingPart()
         self._own_numbers: set[int] = set()
         self._rest: list[Sequence[Message]] = []
         """What was taken from the queue and not added to the file when the disk took no more."""
@@ -452,6 +360,8 @@ class RecordingWriter:
                 return
             if not encoding.is_apart:
                 known.channels[key] = channel
+        if message.kind.is_latched:
+            self._part.keep(message)
         file = self._destination.file
         file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.before, message.raw)
         known.counter.add(
@@ -495,6 +405,24 @@ class RecordingWriter:
         file.flush()
         self._count_file(file)
         self._destination.flushed()
+        if self._destination.is_full:
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        """Finish a file that is full, with what was counted in it, and go on in the next one."""
+        self._write_figures(all_of_them=True)
+        file = self._destination.file
+        self._add_words(file, "")
+        self._destination.next_file()
+        self._count_file(file)
+        self._part = self._part.following(self._figures, self._message_count, self._size_bytes)
+        for message in self._part.latched.values():  # who plays this file alone needs them, too
+            encoding = encoding_of(message, self._last_ns)
+            number, encoding = self._channel(message, encoding, self._last_ns)
+            if number is not None:
+                times = (self._last_ns, encoding.publish_ns)
+                self._destination.file.add(number, times, encoding.sequence, encoding.before, message.raw)
+                self._part.repeated += 1
 
     def _write_figures(self, *, all_of_them: bool = False) -> None:
         with self._lock:
@@ -509,34 +437,46 @@ class RecordingWriter:
             counter.is_changed = False
         with self._lock:
             self._figures = {**self._figures, **figures}
-        plain = {topic: each.to_plain() for topic, each in figures.items()}
+        plain = {topic: each.to_plain() for topic, each in self._part.of(figures).items()}
         self._write_own("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
 
     # ---- the end
 
     def _finish(self, reason: str = "") -> None:
         self._write_figures(all_of_them=True)
-        self._flush()
         file = self._destination.file
+        file.flush()
+        self._count_file(file)
+        self._destination.flushed()
+        file = self._destination.file
+        self._add_words(file, reason)
+        self._destination.finish()
+        self._count_file(file)
+
+    def _add_words(self, file: FileWriter, reason: str) -> None:
         words = {
             "started_ns": str(self._started_ns),
             "ended_ns": str(self._last_ns or self._started_ns),
             "note": self._note,
             "end": reason,
         }
+        if self._part.number > 1 or self._destination.is_full:
+            words["part"] = str(self._part.number)
         file.add_metadata("nep.recording", words)
         plain = {
-            topic: orjson.dumps(each.to_plain()).decode() for topic, each in sorted(self._figures.items())
+            topic: orjson.dumps(each.to_plain()).decode()
+            for topic, each in sorted(self._part.of(self._figures).items())
         }
         if plain:
             file.add_metadata("nep.figures", plain)
-        self._destination.finish()
         self._count_file(file)
 
     def _count_file(self, file: FileWriter) -> None:
+        part = self._part
         own = sum(file.counts.get(each, 0) for each in self._own_numbers)
         with self._lock:
-            self._message_count, self._size_bytes = file.message_count - own, file.size_bytes
+            self._message_count = part.messages_before + max(0, file.message_count - own - part.repeated)
+            self._size_bytes = part.bytes_before + file.size_bytes
 
     def _end_early(self, error: RecordingError) -> None:
         """It may not go on, but what is there can be finished."""

@@ -66,6 +66,10 @@ def test_csv_has_every_field_of_every_message_that_can_be_read(recording, tmp_pa
     assert rows[1]["new.deep[1].a"] == "2"
     assert json.loads(rows[2]["long"]) == list(range(101))
     assert (rows[0]["seq"], rows[0]["stamp_s"], rows[0]["publisher"]) == ("1", "1.0", str(2**64 - 1))
+    assert rows[0]["stamp_ns"] == str(10**9)
+    assert [int(row["time_ns"]) for row in rows] == [
+        each.log_ns for each in recording.read(topics=("/arm/state",)) if each.message.seq != 4
+    ]
     assert not list((tmp_path / "out").glob("*.part"))
 
 

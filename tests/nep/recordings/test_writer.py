@@ -29,6 +29,11 @@ from tests.small_disk import SmallDisk
 class HeldDestination:
     """A disk that takes nothing until it is let go."""
 
+    is_full = False
+
+    def next_file(self) -> None:
+        raise AssertionError
+
     def __init__(self, path: Path) -> None:
         self.file = FileWriter(path)
         self.is_held, self.go_on = threading.Event(), threading.Event()
@@ -212,7 +217,7 @@ def test_a_disk_that_is_really_full(tmp_path):
 def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path, monkeypatch):
     path, free = tmp_path / "a.mcap", [1000]
     monkeypatch.setattr(
-        "nep.recordings.writer.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
+        "nep.recordings.destination.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
     )
     writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=1000, figures_s=0.001))
     writer.post([json_message(1)])
