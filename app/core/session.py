@@ -232,7 +232,7 @@ class Session:
             self.alerts,
             clock=self._clock,
             acting=self.acting,
-            reading=self.recordings.new_reading(),
+            opener=self.recordings.new_opener(),
         )
         self.replay = opened
         self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks

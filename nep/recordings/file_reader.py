@@ -21,7 +21,7 @@ from nep.errors import ClosedError
 from nep.recordings.channels import ChannelDefinition
 from nep.recordings.compression import check_packages
 from nep.recordings.destination import disk_sentence
-from nep.recordings.index import Attachment, Damage, FileIndex, read_chunk, read_entries, read_index
+from nep.recordings.index import AttachedFile, Damage, FileIndex, read_chunk, read_entries, read_index
 from nep.recordings.limits import ReadBudget
 from nep.recordings.records import ChunkInfo, RawMessage, messages_in
 
@@ -57,7 +57,7 @@ class FileFacts:
     size_bytes: int = 0
     is_complete: bool = True
     metadata: Sequence[tuple[str, Mapping[str, str]]] = ()
-    attachments: Sequence[Attachment] = ()
+    attachments: Sequence[AttachedFile] = ()
     compressions: Mapping[str, int] = field(default_factory=dict)
     profile: str = ""
     library: str = ""

@@ -10,7 +10,7 @@ from typing import IO
 from nep.messages.packing import pack, unpack
 from nep.recordings.channels import ChannelDefinition
 from nep.recordings.file_reader import FileFacts
-from nep.recordings.index import Attachment, Damage
+from nep.recordings.index import AttachedFile, Damage
 from nep.recordings.records import RawMessage, message_head
 
 __all__ = [
@@ -107,7 +107,7 @@ def facts_of(plain: object) -> FileFacts:
         channels=definitions,
         counts=plain["counts"],
         metadata=tuple((name, values) for name, values in plain["metadata"]),
-        attachments=tuple(Attachment(**each) for each in plain["attachments"]),
+        attachments=tuple(AttachedFile(**each) for each in plain["attachments"]),
         compressions=plain["compressions"],
         **{name: plain[name] for name in _SCALARS},
     )

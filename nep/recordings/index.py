@@ -3,7 +3,7 @@
 A file that was closed properly but has no summary, no chunk index or no chunks is read as it is. Messages
 outside of chunks (ROS 2's preset "fastwrite") are grouped into runs of about 1 MB, which are read like
 uncompressed chunks. The package `mcap` is not used for this, because its reader takes offsets, lengths and
-counts of the file as they are (docs/adr/0030-reading-foreign-recordings.md).
+counts of the file as they are (docs/adr/0033-reading-foreign-recordings.md).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MOST_SMALL_BYTES",
-    "Attachment",
+    "AttachedFile",
     "Damage",
     "Definitions",
     "FileIndex",
@@ -91,7 +91,7 @@ class Damage:
 
 
 @dataclass(frozen=True)
-class Attachment:
+class AttachedFile:
     """A file inside the recording: its name, media type and size."""
 
     name: str
@@ -176,7 +176,7 @@ class FileIndex:
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    attachments: list[Attachment] = field(default_factory=list)
+    attachments: list[AttachedFile] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)
     counts: dict[int, int] | None = None
     """Messages of each channel; None where the file does not tell."""
@@ -321,7 +321,7 @@ class _Summary:
         elif opcode == Opcode.ATTACHMENT_INDEX and place.length <= _MAX_HEADER_BYTES:
             told = read_record("AttachmentIndex", _content(self._file, place))
             if self._is_new(told.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
-                index.attachments.append(Attachment(told.name, told.media_type, told.data_size))
+                index.attachments.append(AttachedFile(told.name, told.media_type, told.data_size))
 
     def _is_new(self, offset: int) -> bool:
         """Whether no other entry of the summary leads to this offset."""
@@ -494,7 +494,7 @@ class _Scan:
             words.append(begin[at + 4 : end].decode("utf-8", "replace"))
             at = end
         size = int.from_bytes(begin[at : at + 8], "little")
-        self._index.attachments.append(Attachment(words[0], words[1], min(size, place.length)))
+        self._index.attachments.append(AttachedFile(words[0], words[1], min(size, place.length)))
 
 
 def _info(place: Place, head: ChunkHead) -> ChunkInfo:

@@ -33,7 +33,6 @@ from nep.recordings.channels import (
 from nep.recordings.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_sentence
 from nep.recordings.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
 from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
-from nep.recordings.part import RecordingPart
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -44,6 +43,7 @@ MOST_ONES_CHANNELS = 10_000
 """With more, publishers that come later share a channel for each topic."""
 _CLOSE_S = 30.0
 _KNOWN = 10_000
+_MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
 _OTHERS = ""
 """Where topics are counted of which there are too many."""
 _log = logging.getLogger("nep.recordings")
@@ -100,6 +100,49 @@ class _Said:
         self.text = text
 
 
+@dataclass
+class _Part:
+    """What is known of one file of a recording that is split."""
+
+    number: int = 1
+    messages_before: int = 0
+    bytes_before: int = 0
+    repeated: int = 0
+    """Latched messages that stand in an earlier file, too."""
+    before: Mapping[str, TopicFigures] = field(default_factory=dict)
+    """The counts when it began."""
+    latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
+    latched_bytes: int = 0
+
+    def keep(self, message: Message) -> None:
+        """A latched message, which the next file needs, too; as many as fit."""
+        key = (message.topic, message.publisher)
+        old = self.latched.get(key)
+        grown = message.size_bytes - (old.size_bytes if old is not None else 0)
+        if old is None and len(self.latched) >= _MAX_LATCHED:
+            return
+        if self.latched_bytes + grown <= _MAX_LATCHED_BYTES:
+            self.latched[key] = message
+            self.latched_bytes += grown
+
+    def of(self, figures: Mapping[str, TopicFigures]) -> dict[str, TopicFigures]:
+        """What was counted in this file."""
+        nothing = TopicFigures()
+        return {topic: each.since(self.before.get(topic, nothing)) for topic, each in figures.items()}
+
+    def following(self, figures: Mapping[str, TopicFigures], messages: int, size_bytes: int) -> _Part:
+        """The next file's, where so much is in this one and those before."""
+        return _Part(
+            self.number + 1,
+            messages,
+            size_bytes,
+            0,
+            dict(figures),
+            self.latched,
+            self.latched_bytes,
+        )
+
+
 class RecordingWriter:
     """Writes a recording. Use it from any thread; a context manager."""
 
@@ -147,7 +190,7 @@ class RecordingWriter:
         self._figures: dict[str, TopicFigures] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
-        self._part = RecordingPart()
+        self._part = _Part()
         self._own_numbers: set[int] = set()
         self._rest: list[Sequence[Message]] = []
         """What was taken from the queue and not added to the file when the disk took no more."""

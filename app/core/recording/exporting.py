@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from app.core.recording.reading import LocalReading, Reading
+from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import NepError
 from nep.i18n import _, ngettext
 from nep.recordings.damage import damage_words
@@ -25,13 +25,13 @@ class RecordingExport:
         kind: str,
         folder: Path,
         part: Part = ALL_OF_IT,
-        reading: Reading | None = None,
+        opener: RecordingOpener | None = None,
     ) -> None:
         """Begin; ``kind`` is one of `nep.recordings.export.FORMATS`, the folder is made.
 
-        ``reading`` is closed at the end.
+        ``opener`` is closed at the end.
         """
-        self._reading: Reading = LocalReading() if reading is None else reading
+        self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.damage = ""
         """What of the recording could not be read, in words; "" for nothing."""
         self._part = part
@@ -85,7 +85,7 @@ class RecordingExport:
 
     def _run(self) -> None:
         try:
-            with self._reading.open(self._recording) as recording:
+            with self._opener.open(self._recording) as recording:
                 made = export(recording, self._kind, self.folder, self._part, progress=self._tell)
                 self.damage = damage_words(recording.damage, recording.start_ns)
             self.files = tuple(made)
@@ -94,7 +94,7 @@ class RecordingExport:
         except (NepError, OSError, MemoryError) as error:
             self.problem = str(error) or type(error).__name__
         finally:
-            self._reading.close()
+            self._opener.close()
             self._is_over.set()
 
     def _tell(self, done: int, total: int) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.folder import CACHE_BYTES
-from app.core.recording.reading import Reading
+from app.core.recording.opener import RecordingOpener
 from nep.errors import NepError
 from nep.recordings.export import Part
 from nep.recordings.reader import RecordedTopic, Recording
@@ -75,10 +75,12 @@ class FilmStripLook:
         return sum(part * count for part, count in zip(inside, counts, strict=True)) / whole
 
 
-def film_strip(path: Path, pictures: int, bars: int, fit: Size, reading: Reading) -> FilmStripLook | None:
+def film_strip(
+    path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
+) -> FilmStripLook | None:
     """Look at a recording: so many pictures, each for a view of that size; None when it can't be read."""
     try:
-        with reading.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
+        with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
             if not recording.message_count:
                 return None
             start_ns, end_ns = recording.start_ns, recording.end_ns

@@ -12,7 +12,7 @@ import platformdirs
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.messages.picture import Picture, Size, decode
-from app.core.recording.reading import LocalReading, Reading
+from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import NepError, RecordingTooLargeError
 from nep.i18n import _
 
@@ -88,10 +88,10 @@ def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
 class RecordingFolder:
     """Looks at a folder again and again, and opens only what is new. One thread uses it (the window's)."""
 
-    def __init__(self, folder: Path, reading: Reading | None = None) -> None:
-        """Nothing is looked at before `look`. ``reading`` is closed with it."""
+    def __init__(self, folder: Path, opener: RecordingOpener | None = None) -> None:
+        """Nothing is looked at before `look`. ``opener`` is closed with it."""
         self.folder = folder
-        self._reading: Reading = LocalReading() if reading is None else reading
+        self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self._worker: BackgroundWorker[FolderLook] = BackgroundWorker("recordings-folder")
         self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
         """By the thread of the worker alone."""
@@ -106,7 +106,7 @@ class RecordingFolder:
 
     def close(self) -> None:
         """Look no more."""
-        self._reading.close()
+        self._opener.close()
         self._worker.close()
 
     def _look(self, being_written: Path | None) -> FolderLook:
@@ -132,17 +132,17 @@ class RecordingFolder:
             plain = RecordingFacts(path, about.st_size, about.st_mtime)
             if path != being_written and opened < AT_ONCE:
                 opened += 1
-                plain = read_facts(plain, self._reading)
+                plain = read_facts(plain, self._opener)
                 self._known[path] = (mark, plain)
             files.append(plain)
         is_whole = all(each.is_read or each.path == being_written for each in files)
         return FolderLook(tuple(files), "", left_out, is_whole)
 
 
-def read_facts(plain: RecordingFacts, reading: Reading) -> RecordingFacts:
+def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
     """The same with what the file says of itself, or why it cannot be read or was not scanned."""
     try:
-        with reading.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
+        with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words, figures = recording.words, recording.figures()
             return RecordingFacts(
                 plain.path,
@@ -166,10 +166,10 @@ def read_facts(plain: RecordingFacts, reading: Reading) -> RecordingFacts:
         return replace(plain, is_read=True, problem=str(error))
 
 
-def picture_in(path: Path, fit: Size, reading: Reading) -> Picture | None:
+def picture_in(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
     """A picture of its fullest topic of pictures, for a view of that size; None where it has none."""
     try:
-        with reading.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
+        with opener.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             topics = [each for each in recording.topics.values() if each.codec == "image"]
             if not topics:
                 return None

@@ -40,10 +40,10 @@ from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from app.core.recording import folder as folders
-    from app.core.recording import reading as readings
+    from app.core.recording import opener as openers
 else:  # they read recordings: no start waits for that
     folders = lazy_module("app.core.recording.folder")
-    readings = lazy_module("app.core.recording.reading")
+    openers = lazy_module("app.core.recording.opener")
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
@@ -132,9 +132,9 @@ class SessionRecordings:
         )
         return None
 
-    def new_reading(self) -> readings.Reading:
+    def new_opener(self) -> openers.RecordingOpener:
         """Return what opens recordings; who has it closes it."""
-        return readings.process_reading() if self._reads_apart else readings.LocalReading()
+        return openers.process_opener() if self._reads_apart else openers.LocalOpener()
 
     # ---- recording
 

@@ -7,7 +7,7 @@ import threading
 from app.core.recording import exporting as exporting_module
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.folder import picture_in
-from app.core.recording.reading import LocalReading
+from app.core.recording.opener import LocalOpener
 from nep.recordings.export import Part, export
 from tests.nep.programs import eventually
 from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, record
@@ -65,7 +65,7 @@ def test_who_gives_it_up_finds_no_half_file(tmp_path, monkeypatch):
 
 def test_without_pictures_there_is_none(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1, topic="/odom")]])
-    assert picture_in(tmp_path / "a.mcap", (128, 96), LocalReading()) is None
-    assert picture_in(tmp_path / "gone.mcap", (128, 96), LocalReading()) is None
+    assert picture_in(tmp_path / "a.mcap", (128, 96), LocalOpener()) is None
+    assert picture_in(tmp_path / "gone.mcap", (128, 96), LocalOpener()) is None
     (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
-    assert picture_in(tmp_path / "none.mcap", (128, 96), LocalReading()) is None
+    assert picture_in(tmp_path / "none.mcap", (128, 96), LocalOpener()) is None

@@ -8,7 +8,7 @@ import pytest
 from mcap.writer import Writer
 
 from app.core.recording.film_strip import film_strip, part_of
-from app.core.recording.reading import LocalReading
+from app.core.recording.opener import LocalOpener
 from nep.errors import BadTopicError
 from nep.messages.message import Message
 from nep.recordings.export import Part
@@ -24,7 +24,7 @@ def look(tmp_path):
     messages = [picture(seq) if seq % 10 == 5 else json_message(seq) for seq in range(COUNT)]
     messages[35] = Message("/camera", b"\xff\xd8none", "image", "image", stamp_ns=5, seq=9, publisher=9)
     record(tmp_path / "a.mcap", [messages])
-    made = film_strip(tmp_path / "a.mcap", 4, 10, (24, 16), LocalReading())
+    made = film_strip(tmp_path / "a.mcap", 4, 10, (24, 16), LocalOpener())
     assert made is not None
     return made
 
@@ -41,13 +41,13 @@ def test_pictures_stand_in_the_middles_of_equal_parts(look):
 
 def test_without_pictures_there_are_counts_and_what_is_none_is_not_there(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(1)]])
-    look = film_strip(tmp_path / "a.mcap", 4, 3, (24, 16), LocalReading())
+    look = film_strip(tmp_path / "a.mcap", 4, 3, (24, 16), LocalOpener())
     assert look is not None
     assert (look.pictures, look.counts) == ((), (1, 0, 0))
     (tmp_path / "none.mcap").write_bytes(b"nothing of the kind")
     record(tmp_path / "empty.mcap", [])
     for name in ("none", "empty", "gone"):
-        assert film_strip(tmp_path / f"{name}.mcap", 4, 3, (24, 16), LocalReading()) is None
+        assert film_strip(tmp_path / f"{name}.mcap", 4, 3, (24, 16), LocalOpener()) is None
 
 
 def test_a_part_has_both_its_ends_and_the_topics_that_fit(look):
@@ -89,7 +89,7 @@ def test_sizes_of_what_nobody_counted_are_those_of_some_messages(tmp_path):
         for at_ns in range(1, 100):
             writer.add_message(channels[1], at_ns, b"1" * 50, at_ns)
         writer.finish()
-    look = film_strip(path, 0, 10, (24, 16), LocalReading())
+    look = film_strip(path, 0, 10, (24, 16), LocalOpener())
     assert look is not None
     assert [(each.name, look.size_of(each)) for each in look.topics] == [
         ("/few", 2),

@@ -125,11 +125,11 @@ def files() -> dict[str, Callable[[], bytes]]:
         "empty records, 210 000": lambda: MAGIC + record(12, b"") * 210_000,
         "one channel 210 000 times": lambda: MAGIC + channel() * 210_000,
         "one metadata record 1 500 times": _many_metadata,
-        "10 000 channels": _many_channels,
+        "3 000 channels": _many_channels,
         "chunk of empty records": lambda: begin + chunk_of(record(0x80, b"") * 300_000),
         "all chunks at all times": lambda: (
             begin
-            + b"".join(chunk(data, len(data), "", times=(0, 2**64 - 1)) for data in [_messages(1000)] * 40)
+            + b"".join(chunk(data, len(data), "", times=(0, 2**64 - 1)) for data in [_messages(1000)] * 20)
         ),
     }
 
@@ -156,7 +156,7 @@ def _many_metadata() -> bytes:
 
 
 def _many_channels() -> bytes:
-    numbers = range(1, 10_001)
+    numbers = range(1, 3_001)
     channels = b"".join(channel(number, f"/t{number}/{'x' * 200}") for number in numbers)
     data = chunk_of(b"".join(map(message, numbers)))
     return closed(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.core.recording.reading import LocalReading, Reading
+from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.bookmarks import Bookmarks
@@ -26,14 +26,14 @@ class OpenedRecording:
     figures: dict[str, TopicFigures]
 
 
-def open_recording(path: Path, progress: Progress, reading: Reading | None = None) -> OpenedRecording:
+def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
     """Open a recording to play it. Raises `RecordingError` when it holds no message that can be read."""
 
     def told(done: int, whole: int) -> None:
         progress(done / max(1, whole))
 
     progress(0.0)
-    recording = (reading or LocalReading()).open(path, progress=told)
+    recording = (opener or LocalOpener()).open(path, progress=told)
     try:
         if not recording.message_count:
             raise RecordingError(str(path), _("it holds no message that can be read"))

@@ -14,7 +14,7 @@ from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
 from app.core.network.watches import Watch, Watches
 from app.core.networks.networks import Networks
-from app.core.recording.reading import Reading
+from app.core.recording.opener import RecordingOpener
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.recording.replay.sending import ReplaySending
@@ -56,11 +56,11 @@ class Replay:
         *,
         clock: Callable[[], float] = time.monotonic,
         acting: SessionActing | None = None,
-        reading: Reading | None = None,
+        opener: RecordingOpener | None = None,
     ) -> None:
         """Nothing is read before `start`. Without ``acting`` nothing of it can be sent.
 
-        ``reading`` opens the file, by default in this process; it is closed with the replay.
+        ``opener`` opens the file, by default in this process; it is closed with the replay.
         """
         self.path = path
         self.opened: OpenedRecording | None = None
@@ -69,7 +69,7 @@ class Replay:
         self.networks = Networks(settings, (), lambda _event: None, alerts)
         self.images = Images(self.watch, clock)
         self.images.now_ns = self._position_ns
-        self.source = ReplaySource(path, self.images, clock=clock, reading=reading)
+        self.source = ReplaySource(path, self.images, clock=clock, opener=opener)
         self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_deep)
         self.console = Console(lambda: self._position_ns() / 1e9)
         self.graph: GraphView | None = None

@@ -17,7 +17,7 @@ from typing import Literal, Protocol
 
 from app.core.faults import error_words
 from app.core.network.mailbox import Drained, Mailbox
-from app.core.recording.reading import LocalReading, Reading
+from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError
 from nep.messages.message import Message, new_message
@@ -102,14 +102,14 @@ class ReplaySource:
         pictures: PictureSink,
         *,
         clock: Callable[[], float] = time.monotonic,
-        reading: Reading | None = None,
+        opener: RecordingOpener | None = None,
     ) -> None:
         """Nothing is read before `start`, or `open` and `turn`, which are what the thread does.
 
-        ``reading`` is closed at the end.
+        ``opener`` is closed at the end.
         """
         self.path = path
-        self._reading: Reading = LocalReading() if reading is None else reading
+        self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.opened: OpenedRecording | None = None
         self._pictures, self._clock = pictures, clock
         self._changed = threading.Condition()
@@ -194,7 +194,7 @@ class ReplaySource:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
-        self._reading.close()
+        self._opener.close()
 
     @property
     def has_ended(self) -> bool:
@@ -235,7 +235,7 @@ class ReplaySource:
 
     def open(self) -> None:
         """Read the index; the playhead is at the first message then. Raises `RecordingError`."""
-        self.opened = opened = open_recording(self.path, self._tell_progress, self._reading)
+        self.opened = opened = open_recording(self.path, self._tell_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
         self._tell(playback)

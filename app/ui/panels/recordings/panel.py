@@ -19,7 +19,7 @@ from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
 from app.core.recording.film_strip import FilmStripLook, film_strip
 from app.core.recording.folder import FolderLook, RecordingFacts, RecordingFolder, picture_in
-from app.core.recording.reading import Reading
+from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
 from app.ui.other_programs import open_outside
 from app.ui.panels.base import Density, Panel, PanelContext
@@ -54,8 +54,8 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def __init__(self, context: PanelContext) -> None:
         self._recordings = context.session.recordings
-        self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_reading())
-        self._reading = self._recordings.new_reading()
+        self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_opener())
+        self._opener = self._recordings.new_opener()
         self._look = FolderLook(is_whole=False)
         self._has_looked = False
         self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
@@ -110,7 +110,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         recordings = self._recordings
         if recordings.folder != self._folder.folder:
             self._folder.close()
-            self._folder = RecordingFolder(recordings.folder, recordings.new_reading())
+            self._folder = RecordingFolder(recordings.folder, recordings.new_opener())
             self._ticks = FIRST_LOOK
         seen = recordings.client.revision
         is_new = seen != self._recorder_seen
@@ -220,7 +220,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         owner = str(facts.path)
         if self._asked.get(owner) != mark:
             self._asked[owner] = mark
-            self._artist.ask(owner, lambda: (_drawn(facts.path, self._reading),))
+            self._artist.ask(owner, lambda: (_drawn(facts.path, self._opener),))
         return None
 
     def _take_pictures(self) -> bool:
@@ -247,7 +247,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.details.show_strip(None)
         if mark is not None:
             path = mark[0]
-            self._strips.ask("strip", lambda: _strip(path, self._reading))
+            self._strips.ask("strip", lambda: _strip(path, self._opener))
 
     def _follow_strip(self) -> None:
         """Take over what is ready; a loop in the time line is the part that is exported."""
@@ -391,7 +391,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self.context.toast(_("No topic of it fits"))
             return
         folder = free(self.details.place() or facts.path.with_suffix(""), is_folder=True)
-        self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_reading())
+        self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_opener())
         self.details.show_export(self._job)
 
     def _choose_folder(self) -> None:
@@ -454,16 +454,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def shut(self) -> None:
         self._folder.close()
-        self._reading.close()
+        self._opener.close()
         self._artist.close()
         self._strips.close()
         if self._job is not None:
             self._job.close()
 
 
-def _drawn(path: Path, reading: Reading) -> QImage | None:
+def _drawn(path: Path, opener: RecordingOpener) -> QImage | None:
     """The small picture of a recording; asked in another thread."""
-    found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()), reading)
+    found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()), opener)
     return cropped(_image(found)).copy() if found is not None else None
 
 
@@ -473,9 +473,9 @@ def _image(picture: Picture) -> QImage:
     return QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32).copy()
 
 
-def _strip(path: Path, reading: Reading) -> tuple[FilmStripLook | None, Sequence[QImage | None]]:
+def _strip(path: Path, opener: RecordingOpener) -> tuple[FilmStripLook | None, Sequence[QImage | None]]:
     """What is along the time of a recording; asked in another thread."""
-    look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, reading)
+    look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
     if look is None:
         return None, ()
     return look, [_image(each) if each is not None else None for each in look.pictures]

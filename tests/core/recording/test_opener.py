@@ -9,7 +9,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.recording.folder import RecordingFacts, read_facts
-from app.core.recording.reading import LocalReading, process_reading
+from app.core.recording.opener import LocalOpener, process_opener
 from app.core.recording.replay.replay import FAILED, Replay
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -20,7 +20,7 @@ from tests.nep.programs import eventually
 from tests.nep.recordings.messages import json_message, record
 
 
-class Failing(LocalReading):
+class Failing(LocalOpener):
     """Opens nothing, or dies while its files are read."""
 
     def __init__(self, error: RecordingError, opened: int = 0) -> None:
@@ -67,19 +67,19 @@ def test_a_file_that_takes_too_much_is_listed_as_not_scanned(path: Path) -> None
 def test_a_reader_that_dies_is_an_alert_and_the_window_goes_on(
     tmp_path: Path, path: Path, opened: int
 ) -> None:
-    alerts, reading = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
-    replay = Replay(path, Settings(tmp_path / "home"), alerts, reading=reading)
+    alerts, opener = Alerts(), Failing(RecordingError(str(path), "the process has ended"), opened)
+    replay = Replay(path, Settings(tmp_path / "home"), alerts, opener=opener)
     replay.start()
     eventually(lambda: replay.has_ended)
     replay.tick(1.0)
     (alert,) = (each for each in alerts.active if each.id == FAILED)
     assert "the process has ended" in alert.detail
     replay.close()
-    assert reading.is_closed
+    assert opener.is_closed
 
 
 def test_a_recording_is_played_by_a_process_of_its_own(tmp_path: Path, path: Path) -> None:
-    replay = Replay(path, Settings(tmp_path / "home"), Alerts(), reading=process_reading())
+    replay = Replay(path, Settings(tmp_path / "home"), Alerts(), opener=process_opener())
     replay.start()
     watch = replay.watch("/odom")
 
@@ -101,8 +101,8 @@ def test_a_recording_is_played_by_a_process_of_its_own(tmp_path: Path, path: Pat
 def test_studio_reads_in_processes_of_their_own(tmp_path: Path) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=True)
     try:
-        reading = session.recordings.new_reading()
-        assert isinstance(reading, ReaderProcess)
-        reading.close()
+        opener = session.recordings.new_opener()
+        assert isinstance(opener, ReaderProcess)
+        opener.close()
     finally:
         session.close()

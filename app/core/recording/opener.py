@@ -15,10 +15,10 @@ from nep.recordings.limits import ReadBudget
 from nep.recordings.reader import Recording
 from nep.recordings.remote import ReaderProcess
 
-__all__ = ["LocalReading", "Reading", "StartReading", "process_reading"]
+__all__ = ["LocalOpener", "RecordingOpener", "process_opener"]
 
 
-class Reading(Protocol):
+class RecordingOpener(Protocol):
     """Opens recordings. See `nep.recordings.remote.ReaderProcess`."""
 
     def open(
@@ -35,15 +35,12 @@ class Reading(Protocol):
         """End at once, also while a recording is read. May be called twice."""
 
 
-StartReading = Callable[[], Reading]
-
-
-def process_reading() -> Reading:
+def process_opener() -> RecordingOpener:
     """Return what reads recordings in a process of its own, which is started with the first one."""
     return ReaderProcess(module_command("nep.recordings.reader_process"))
 
 
-class LocalReading:
+class LocalOpener:
     """Reads recordings in this process."""
 
     def open(
@@ -54,11 +51,11 @@ class LocalReading:
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """See `Reading`."""
+        """See `RecordingOpener`."""
         limit = None if budget is None else ReadBudget(path, *budget)
         return Recording(
             path, file=FileReader(path, cache_bytes=cache_bytes, progress=progress, budget=limit)
         )
 
     def close(self) -> None:
-        """See `Reading`."""
+        """See `RecordingOpener`."""
