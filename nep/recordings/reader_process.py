@@ -99,7 +99,7 @@ class RecordingService:
         """Messages that follow; a cursor of 0 when there are no more."""
         number = request["cursor"]
         if number not in self._cursors:
-            raise ValueError(_("it was not read for too long"))
+            raise ValueError(_("it is read in too many places at once"))
         self._cursors.move_to_end(number)
         cursor, batch, size = self._cursors[number], list[RawMessage](), 0
         for raw in islice(cursor, min(request["most"], _MAX_BATCH)):
