@@ -169,7 +169,7 @@ export class TryAnswer {
     }
   }
 
-  /** Also for blocks of the toolbox, which are no part of the program. */
+  /** Also for blocks of the toolbox, which are no part of the program: an error stands beside the toolbox and covers none. */
   say(block: Blockly.BlockSvg, sentence: string, isError: boolean): void {
     this.box.textContent = sentence;
     this.box.classList.toggle('nepTryFailed', isError);
@@ -177,7 +177,8 @@ export class TryAnswer {
     const place = block.getSvgRoot().querySelector(':scope > .blocklyPath') ?? block.getSvgRoot();
     const at = place.getBoundingClientRect();
     const {offsetWidth, offsetHeight} = this.box;
-    const right = at.right + 12;
+    const toolbox = isError && block.isInFlyout ? block.workspace.getParentSvg().getBoundingClientRect().right : 0;
+    const right = Math.max(at.right, toolbox) + 12;
     const left = right + offsetWidth > window.innerWidth - 8 ? window.innerWidth - offsetWidth - 8 : right;
     const beside = left === right ? at.top + (at.height - offsetHeight) / 2 : at.bottom + 8;
     this.box.style.left = `${Math.max(8, left)}px`;
