@@ -38,7 +38,8 @@ class NumberField extends Blockly.FieldNumber {
 
   override onFinishEditing_(value: unknown): void {
     super.onFinishEditing_(value);
-    if (this.problem) this.explain(`${t(SENTENCES[this.problem])} ${t('The field keeps {number}.', {number: String(value)})}`);
+    const keeps = t('The field keeps {number}.', {number: String(value)});
+    if (this.problem) this.explain(`${t(SENTENCES[this.problem])} ${keeps}`);
     this.problem = null;
   }
 
