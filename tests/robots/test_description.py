@@ -240,6 +240,11 @@ NUMBERS = {"type": "array", "items": {"type": "number"}}
     [
         (NUMBERS, "1, 2.5, 0.0, 0", [1, 2.5, 0.0, 0]),
         (NUMBERS, "1, far", [1, "far"]),
+        (NUMBERS, "1,2,3", [1, 2, 3]),
+        (NUMBERS, "1; 2,5; -0,2", [1, 2.5, -0.2]),
+        (NUMBERS, "1.234,5; 2", ["1.234.5", 2]),
+        (NUMBERS, "0,2, 0,5", "0,2, 0,5"),
+        ({"type": "array"}, "a;b, c", ["a;b", "c"]),
         (NUMBERS, "", []),
         (NUMBERS, "[1, 2]", [1, 2]),
         ({"type": "array"}, "a, b", ["a", "b"]),

@@ -23,6 +23,7 @@ _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
 _DEEPEST = 40
 _MAX_WORD_LENGTH = 100
 _MAX_UNKNOWN_NAMED = 5  # looking for a similar name takes 20 µs, and a stranger may send any number of names
+NUMBER_KINDS = frozenset({"number", "integer", "angle"})
 _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
 
@@ -154,13 +155,23 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
 
 
 def from_words(parameter: Parameter, words: str) -> object:
-    """The list or object that a person typed: ``1, 2.5`` or JSON; what it can't be stays for the check."""
+    """The list or object that a person typed: ``1, 2.5`` or JSON; what it can't be stays for the check.
+
+    Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. In ``0,2, 0,5`` it can't be told
+    which commas separate numbers, so it stays for the check.
+    """
     if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
         try:
             found: object = json.loads(words)
         except (ValueError, RecursionError):
             return words
         return found
+    kinds = {each.kind for each in parameter.places or filter(None, (parameter.each,))}
+    is_numeric = bool(kinds) and kinds <= NUMBER_KINDS
+    if is_numeric and re.search(r"\d,\d", words) and re.search(r",\s", words):
+        return words
+    if is_numeric and ";" in words:
+        words = words.replace(",", ".").replace(";", ",")
     items = [word.strip() for word in words.split(",") if word.strip()]
     if parameter.places:
         return [_of_word(each, item) for each, item in zip(parameter.places, items, strict=False)] + items[
@@ -185,7 +196,7 @@ def _of_word(parameter: Parameter, word: str) -> object:
         return known[0]
     if parameter.kind == "boolean":
         return {"yes": True, "true": True, "no": False, "false": False}.get(word.lower(), word)
-    if parameter.kind not in {"number", "integer", "angle"}:
+    if parameter.kind not in NUMBER_KINDS:
         return word
     found = number_of(word)
     if found is None:

@@ -36,7 +36,9 @@ def test_a_click_in_the_toolbox_tries_the_block_and_adds_nothing(qtbot, view, pe
     them.wait_for("!!document.querySelector('.blocklyFlyout .nepState-running')")
     view.set_errors({what["id"]: "“wait” needs a number."})
     them.wait_for(ANSWER, "“wait” needs a number.")
-    assert them.box(".nepTryAnswer")["left"] >= them.box(".blocklyFlyout")["right"], "it covers no other block"
+    assert them.box(".nepTryAnswer")["left"] >= them.box(".blocklyFlyout")["right"], (
+        "it covers no other block"
+    )
 
 
 def test_dragging_out_of_the_toolbox_tries_nothing(qtbot, view, person, asked):

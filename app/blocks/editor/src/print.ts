@@ -151,7 +151,8 @@ function sheet({title, date, width, height, edge}: Wanted, page: number, count: 
   const head = document.createElement('header');
   const [name, about] = [document.createElement('b'), document.createElement('span')];
   name.textContent = title;
-  about.textContent = `${date} · ${t('Page {page} of {count}', {page: page + 1, count})}`;
+  const place = t('Page {page} of {count}', {page: page + 1, count});
+  about.textContent = `${date} · ${place}`;
   head.append(name, about);
   made.append(head);
   for (const piece of pieces) made.append(drawnPiece(piece, edge));
