@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from app.missing_packages import why_not_imported
 from nep.errors import NepError
 from nep.i18n import _, begin
 from nep.system.addresses import MASTER_VARIABLE, master_address
@@ -109,6 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _main(words_given() if arguments is None else list(arguments))
     except ImportError as error:
+        from app.core.reports.not_installed import why_not_imported  # noqa: PLC0415  for this alone
+
         why = why_not_imported(error)
         if not why:
             raise
@@ -158,8 +159,14 @@ def _main(given: Sequence[str]) -> int:
 def start_again(theme: str | None) -> None:
     """Start Studio as a process of its own, once this one has closed everything."""
     from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  for this alone
+    from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  for this alone
 
-    subprocess.Popen(studio_command(theme), stdin=subprocess.DEVNULL, env=fresh_environ(os.environ))
+    subprocess.Popen(
+        studio_command(theme),
+        stdin=subprocess.DEVNULL,
+        env=fresh_environ(os.environ),
+        creationflags=NO_CONSOLE,
+    )
 
 
 def self_test(folder: Path, *, web: bool) -> int:

@@ -24,11 +24,11 @@ from app.core.documents.journal import left_behind, of_newer
 from app.core.documents.versions import bring_here
 from app.core.reports import studio_versions
 from app.core.reports.crash_reports import CrashLog, CrashReports, offer
+from app.core.reports.not_installed import missing_libraries, tell_missing
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import home
-from app.core.system_libraries import missing_libraries, tell_missing
 from app.ui.panels.registry import PanelRegistry
 from app.ui.self_drive import SelfDrive
 from app.ui.shell.bars.logo import LogoEngine

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
-from app.core import system_libraries
 from app.core.network.topics import split_key
 from app.core.networks.networks import LOOK_COMMAND, lost_words, topic_words
+from app.core.reports import not_installed
 from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Separator, label
 from app.ui.widgets.cards import AlertRow
@@ -155,7 +155,7 @@ class DoctorPanel(PanelWidget):
     def _hindrances(self) -> Iterator[Hindrance]:
         """What hides messages in Studio itself; the panel that asked tells the rest."""
         session, topic = self.session, self.session.doctor.missed
-        libraries = session.alerts.get(system_libraries.ALERT)
+        libraries = session.alerts.get(not_installed.ALERT)
         if libraries is not None:
             yield Hindrance(libraries.title, libraries.detail, "", lambda: None)
         if session.replay is not None and (topic or self._asker is not None):

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.blocks import Problem
-from app.core import system_libraries
 from app.core.documents.problems import Listed, Mend, listed
+from app.core.reports import not_installed
 from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
@@ -142,7 +142,7 @@ class ProblemsPanel(PanelWidget):
         if program is None:
             self.checked.setText(_("Checking"))
             return
-        of_editor = self.session.alerts.get(system_libraries.ALERT)
+        of_editor = self.session.alerts.get(not_installed.ALERT)
         if program is self._program and of_editor == self._of_editor:
             return
         self._program, self._of_editor = program, of_editor

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
-from app.core.system_libraries import ALERT, MissingLibraries
+from app.core.reports.not_installed import ALERT, MissingLibraries
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.carried_blocks import BESIDE, CarriedPicture, brought_words
 from app.ui.panels.behaviour.panel import BehaviourPanel

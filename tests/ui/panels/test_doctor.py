@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
-from app.core.system_libraries import MissingLibraries, tell_missing
+from app.core.reports.not_installed import MissingLibraries, tell_missing
 from app.ui.panels import console
 from app.ui.panels.base import Hindrance, PanelWidget, paused_hindrance
 from app.ui.panels.doctor import PANEL, DoctorPanel

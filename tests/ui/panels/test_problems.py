@@ -5,7 +5,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.blocks import Problem
-from app.core.system_libraries import MissingLibraries, tell_missing
+from app.core.reports.not_installed import MissingLibraries, tell_missing
 from app.ui.panels.problems import PANEL, ProblemsPanel
 from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session

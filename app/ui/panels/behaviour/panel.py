@@ -16,8 +16,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.core.documents.backpack import Backpack
 from app.core.documents.rename import why_not
 from app.core.documents.titles import told_apart
+from app.core.reports.not_installed import MissingLibraries, missing_libraries, tell_missing
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
-from app.core.system_libraries import MissingLibraries, missing_libraries, tell_missing
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper

@@ -1,12 +1,13 @@
-"""System libraries that Qt and its web engine need on Linux: which are missing, and how to install them.
+"""What Studio needs and this computer lacks: packages of Python, and system libraries of Qt on Linux.
 
 Wheels of PySide6 bring no system libraries, and Python's error names only the first one that is missing.
-Standard library only: it is asked when nothing else can be imported.
+It imports nothing that is not there without the extra ``studio``.
 """
 
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import platform
 import re
 import sys
@@ -16,7 +17,15 @@ from dataclasses import dataclass
 from app.core.alerts import Alerts
 from nep.i18n import _, listed, ngettext
 
-__all__ = ["ALERT", "LIBRARIES", "MissingLibraries", "missing_libraries", "named_in", "tell_missing"]
+__all__ = [
+    "ALERT",
+    "EXTRA_MODULES",
+    "LIBRARIES",
+    "MissingLibraries",
+    "missing_libraries",
+    "tell_missing",
+    "why_not_imported",
+]
 
 ALERT = "system-libraries"
 LIBRARIES: Mapping[str, str] = {
@@ -52,6 +61,18 @@ LIBRARIES: Mapping[str, str] = {
 
 What only the plug-in for X11 needs, such as libxcb-cursor0, Qt itself names when it starts.
 """
+EXTRA_MODULES = (
+    "PySide6",
+    "cv2",
+    "graphlay",
+    "jsonpath",
+    "jsonschema",
+    "mcap",
+    "numpy",
+    "platformdirs",
+    "pyqtgraph",
+)
+"""Modules of the extra ``studio`` in pyproject.toml without which there is no window."""
 _RENAMED = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
 _RENAMED_SINCE = {"debian": 13.0, "ubuntu": 24.04}
 _UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
@@ -126,7 +147,7 @@ def missing_libraries(
         try:
             load(name)
         except OSError as error:
-            names[named_in(str(error)) or name] = None
+            names[_named_in(str(error)) or name] = None
     return _missing(tuple(names), release) if names else None
 
 
@@ -135,10 +156,25 @@ def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
     alerts.put(ALERT, "error", missing.title, missing.remedy, count=0)
 
 
-def named_in(error: str) -> str:
+def _named_in(error: str) -> str:
     """Return the library that an error of the dynamic linker names; "" when it names none."""
     found = _UNOPENED.search(error)
     return found[1] if found is not None else ""
+
+
+def why_not_imported(
+    error: ImportError,
+    is_installed: Callable[[str], bool] = lambda name: bool(importlib.util.find_spec(name)),
+) -> str:
+    """Return what is missing and how to install it; "" when the error is about something else."""
+    package = (error.name or "").partition(".")[0]
+    if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
+        missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]
+        return _(
+            "NEP Studio needs packages that are not installed ({names}); install them with “{command}”"
+        ).format(names=listed(missing), command="pip install 'nep-studio[studio]'")
+    libraries = missing_libraries() if _named_in(str(error)) else None
+    return f"{libraries.start_title} {libraries.start_remedy}" if libraries is not None else ""
 
 
 def _missing(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -> MissingLibraries:

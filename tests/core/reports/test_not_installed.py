@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.system_libraries import LIBRARIES, MissingLibraries, missing_libraries
+from app.core.reports.not_installed import LIBRARIES, MissingLibraries, missing_libraries
 
 BROUGHT = ("libQt6", "libicu", "ld-linux")
 C_RUNTIME = {

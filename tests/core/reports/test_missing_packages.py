@@ -7,13 +7,13 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from app.missing_packages import EXTRA_MODULES, why_not_imported
+from app.core.reports.not_installed import EXTRA_MODULES, why_not_imported
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[3]
 WITHOUT_THE_EXTRA = """
 import importlib.machinery
 import sys
-from app.missing_packages import EXTRA_MODULES
+from app.core.reports.not_installed import EXTRA_MODULES
 
 class Absent:
     @staticmethod
