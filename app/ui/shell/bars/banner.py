@@ -23,7 +23,7 @@ from nep.i18n import _, ngettext
 
 FIGURES = re.compile(r"\d+")
 LEAST_WIDTH = 140  # px at 100 % text; with less room only the status bar tells of alerts
-LEAST_WORDS = 240  # px at 100 % text: with less the next step is its icon alone
+LEAST_WORDS = 160  # px at 100 % text: with less the next step is its icon alone
 FONTS = ("bodyLarge", "body", "small")
 TALL = 44  # px at 100 % text: lower banners have small buttons
 STEP_ICONS = {
