@@ -122,10 +122,12 @@ def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], ob
 
 def import_web_view(alerts: Alerts) -> None:
     """Import the block editor, or say which system libraries it lacks."""
-    missing = missing_libraries()
-    if missing is None:
+    try:
         importlib.import_module(WEB_VIEW)
-    else:
+    except ImportError as error:
+        missing = missing_libraries(error)
+        if missing is None:
+            raise
         tell_missing(alerts, missing)
         sys.stderr.write(f"nep-studio: {missing.title} {missing.remedy}\n")
 

@@ -10,7 +10,6 @@ import ctypes
 import importlib.util
 import platform
 import re
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -132,23 +131,25 @@ class MissingLibraries:
 
 
 def missing_libraries(
+    error: ImportError,
     load: Callable[[str], object] = ctypes.CDLL,
-    system: str = sys.platform,
     release: Callable[[], Mapping[str, str]] = platform.freedesktop_os_release,
 ) -> MissingLibraries | None:
-    """Return the libraries that Qt's window and web engine need and this computer lacks; None when all load.
+    """Return all libraries that are missing where an import failed because of one; None for other errors.
 
-    Each one is loaded, as importing Qt WebEngine would do: a library also fails when one that it needs fails.
+    Python's error names one of them; the others are looked for by loading each that Qt may need. A library
+    also fails to load when one that it needs itself is missing: then that one is named.
     """
-    if system != "linux":
+    named = _named_in(str(error))
+    if not named:
         return None
-    names: dict[str, None] = {}
+    names = {named: None}
     for name in LIBRARIES:
         try:
             load(name)
-        except OSError as error:
-            names[_named_in(str(error)) or name] = None
-    return _missing(tuple(names), release) if names else None
+        except OSError as failure:
+            names[_named_in(str(failure)) or name] = None
+    return _missing(tuple(names), release)
 
 
 def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
@@ -173,7 +174,7 @@ def why_not_imported(
         return _(
             "NEP Studio needs packages that are not installed ({names}); install them with “{command}”"
         ).format(names=listed(missing), command="pip install 'nep-studio[studio]'")
-    libraries = missing_libraries() if _named_in(str(error)) else None
+    libraries = missing_libraries(error)
     return f"{libraries.start_title} {libraries.start_remedy}" if libraries is not None else ""
 
 

@@ -32,20 +32,21 @@ def lacking(*names: str, also: str = ""):
     return load
 
 
-def found(*names: str, system: str = "linux", release=dict, also: str = "") -> MissingLibraries | None:
-    return missing_libraries(lacking(*names, also=also), system, release)
+def found(*names: str, release=dict, also: str = "") -> MissingLibraries | None:
+    error = ImportError(f"{also or names[0]}: cannot open shared object file: No such file or directory")
+    return missing_libraries(error, lacking(*names, also=also), release)
 
 
-def test_a_computer_with_all_libraries_lacks_none() -> None:
-    assert found() is None
-    assert found("libnss3.so", system="darwin") is None
+def test_other_errors_of_an_import_are_about_no_library() -> None:
+    assert missing_libraries(ImportError("cannot import name 'x'"), lacking("libnss3.so"), dict) is None
 
 
 def test_every_missing_library_is_named_with_one_command_for_their_packages() -> None:
     made = found("libnss3.so", "libsmime3.so", "libXtst.so.6")
     assert made is not None
+    assert made.names[0] == "libnss3.so"
     assert set(made.names) == {"libnss3.so", "libsmime3.so", "libXtst.so.6"}
-    assert made.command == "sudo apt install libxtst6 libnss3"
+    assert made.command == "sudo apt install libnss3 libxtst6"
     assert made.command in made.remedy
     assert "libsmime3.so" in made.title
 

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.core.documents.workspace_json import WorkspaceJson
-from app.core.reports.not_installed import ALERT, MissingLibraries
+from app.core.reports.not_installed import ALERT
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.carried_blocks import BESIDE, CarriedPicture, brought_words
 from app.ui.panels.behaviour.panel import BehaviourPanel
@@ -451,16 +451,18 @@ def test_plus_has_a_ring_while_a_block_is_over_it_and_makes_a_new_behaviour(pane
 def test_missing_system_libraries_are_told_in_place_of_the_blocks_and_the_program_is_there(
     qtbot, window: Window
 ) -> None:
-    lacks = MissingLibraries(("libnss3.so",), ("libnss3",))
+    tries: list[QWidget] = []
 
-    def never(_parent: QWidget) -> Editor:
-        raise AssertionError("the editor can't be opened")
+    def fail(parent: QWidget) -> Editor:
+        tries.append(parent)
+        raise ImportError("libnss3.so: cannot open shared object file: No such file or directory")
 
-    panel = BehaviourPanel(window.context(), never, lambda: lacks)
+    panel = BehaviourPanel(window.context(), fail)
     qtbot.addWidget(panel)
     qtbot.addWidget(panel.replaces_title())
     for _ in range(10):
         panel.refresh()
+    assert len(tries) == 1
     (told,) = panel.findChildren(EmptyState)
     words = " ".join(label.text() for label in told.findChildren(QLabel))
     assert "sudo apt install libnss3" in words

@@ -117,15 +117,8 @@ def blockly(parent: QWidget) -> Editor:
 class BehaviourPanel(PanelWidget):
     """The behaviour that is open: Blocks to build with, Python to read."""
 
-    def __init__(
-        self,
-        context: PanelContext,
-        make_editor: Callable[[QWidget], Editor] = blockly,
-        missing: Callable[[], MissingLibraries | None] = missing_libraries,
-    ) -> None:
-        """``missing`` tells which system libraries the editor lacks; asked once, before ``make_editor``."""
+    def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
         super().__init__(context, _("Behaviour"))
-        self._missing = missing
         self._can_open = True
         self._bar = BehaviourTitle(self.theme)
         self._bar.mode.changed.connect(self.set_mode)
@@ -241,12 +234,15 @@ class BehaviourPanel(PanelWidget):
         return True
 
     def _open_editor(self) -> Editor | None:
-        missing = self._missing()
-        if missing is not None:
+        try:
+            editor = self._make_editor(self._place)
+        except ImportError as error:
+            missing = missing_libraries(error)
+            if missing is None:
+                raise
             self._can_open = False
             self._refuse(missing)
             return None
-        editor = self._make_editor(self._place)
         editor.changed.connect(self._edited)
         editor.recovered.connect(
             lambda: self.context.toast(_("The block editor was started again. Undo begins anew."))
