@@ -305,7 +305,7 @@ def test_every_help_page_of_the_command_line_is_translated(pseudo) -> None:
         for parameter in page.params:
             words = getattr(parameter, "help", None) or ""
             ours = "completion" not in words and not words.startswith(
-                ("Show this message", "Where the master is;")
+                ("Show this message", "Address of the master (default:")
             )
             assert not ours or is_pseudo(_(words)), (page.name, words)
 

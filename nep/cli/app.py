@@ -137,14 +137,9 @@ def _told(name: str) -> typer.Typer:
     elif callable(found):
         made.command(name)(found)
     for command, english in _docstrings(made):
-        command.help = _reflowed(_(english))
+        command.help = _(english)
         command.cls = TranslatedCommand
     return made
-
-
-def _reflowed(text: str) -> str:
-    """Put each paragraph on one line: rich wraps it to the terminal and would keep our line breaks."""
-    return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in text.split("\n\n"))
 
 
 def docstrings() -> Iterator[tuple[CommandInfo, str]]:

@@ -89,8 +89,22 @@ def _write_usage(command: Any, ctx: Any, formatter: Any) -> None:  # noqa: ANN40
     formatter.write_usage(ctx.command_path, " ".join(pieces), prefix=_("Usage:") + " ")
 
 
+def _reflowed(text: str) -> str:
+    """Put each paragraph on one line: rich wraps it to the terminal and would keep our line breaks."""
+    return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in text.split("\n\n"))
+
+
 class TranslatedCommand(TyperCommand):
     """A command whose help is all in one language."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """See `click.Command`."""
+        text = self.help
+        self.help = _reflowed(text or "")
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self.help = text
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
         """See `click.Command`."""
