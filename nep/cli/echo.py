@@ -6,8 +6,8 @@ import itertools
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing
 from datetime import datetime, timezone
 from functools import partial
 from typing import Annotated
@@ -26,6 +26,7 @@ from nep.cli.values import cleaned, json_of, presented
 from nep.errors import DecodeError, WaitTimeoutError
 from nep.i18n import _, listed, ngettext
 from nep.messages.message import Message
+from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
@@ -101,8 +102,8 @@ def echo(
     """
     if as_csv and as_json:
         raise typer.BadParameter(_("--csv and --json are two ways to write; choose one"))
-    chosen = None if expression is None else MessageFilter(expression)
-    with ExitStack() as opened, node_for("echo", master, backend) as node:
+    condition = None if expression is None else MessageFilter(expression)
+    with node_for("echo", master, backend) as node:
         graph = node.graph()
         topics, fields = topics_and_fields(topic, more or (), graph)
         if as_csv and not fields:
@@ -110,34 +111,38 @@ def echo(
                 _("name the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
         picked = Fields(fields)
-        exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
-        patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
-        names_topic = len(topics) > 1 or bool(patterns.patterns)
-        waiting = TopicWait(node, exact)
-        waiting.look(graph)
-        show: Callable[[Message], object]
-        if as_csv:
-            show = Table(picked, names_topic=names_topic)
-        elif as_json:
+        names_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
+        show: Callable[[Message], object] = Lines(picked, names_topic=names_topic, whole=full)
+        if as_json:
             show = partial(show_record, fields=picked)
-        else:
-            show = Lines(picked, names_topic=names_topic, whole=full)
-        wanted = [(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph)
-        subscribers: list[Subscriber] = []
+        elif as_csv:
+            show = Table(picked, names_topic=names_topic)
+        with closing(_messages(node, topics, graph, timeout_s)) as messages:
+            passing = (each for each in messages if condition is None or _passes(condition, each))
+            try:
+                for message in itertools.islice(passing, count or None):
+                    show(message)
+            finally:
+                picked.say_missing()
+
+
+def _messages(
+    node: Node, topics: Sequence[str], graph: GraphView, timeout_s: float | None
+) -> Generator[Message, None, None]:
+    """Subscribe to topics and patterns, and yield their messages as `_coming` does."""
+    exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
+    patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
+    waiting = TopicWait(node, exact)
+    waiting.look(graph)
+    subscribers: list[Subscriber] = []
+    with ExitStack() as opened:
 
         def hear(topics: Sequence[tuple[str, str]]) -> None:
             for name, msg_type in topics:
                 subscribers.append(opened.enter_context(node.new_sub(name, msg_type)))
 
-        hear(wanted)
-        coming = _coming(subscribers, timeout_s, waiting, patterns, hear)
-        if chosen is not None:
-            coming = (message for message in coming if _passes(chosen, message))
-        try:
-            for message in itertools.islice(coming, count or None):
-                show(message)
-        finally:
-            picked.say_missing()
+        hear([(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph))
+        yield from _coming(subscribers, timeout_s, waiting, patterns, hear)
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:

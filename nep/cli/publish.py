@@ -81,40 +81,46 @@ _RateOption = Annotated[
 ]
 
 
+_TopicArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar=_("TOPIC"),
+        help=_("Topic to publish on."),
+        show_default=False,
+        autocompletion=complete_topic,
+    ),
+]
+_CountOption = Annotated[
+    int,
+    typer.Option(
+        "--count", "-n", min=0, metavar="N", help=_("With --rate: exit after N messages (0: never).")
+    ),
+]
+_LatchedOption = Annotated[
+    bool, typer.Option("--latched", help=_("Keep running, and send the last message to new subscribers."))
+]
+_WaitOption = Annotated[
+    int,
+    typer.Option(
+        "--wait",
+        "-w",
+        min=0,
+        metavar="N",
+        help=_("Wait for N subscribers before the first message."),
+        show_default=False,
+    ),
+]
+
+
 def publish(
-    topic: Annotated[
-        str,
-        typer.Argument(
-            metavar=_("TOPIC"),
-            help=_("Topic to publish on."),
-            show_default=False,
-            autocompletion=complete_topic,
-        ),
-    ],
+    topic: _TopicArgument,
     payload: _Payload,
     msg_type: _TypeOption = None,
     rate_hz: _RateOption = None,
-    count: Annotated[
-        int,
-        typer.Option(
-            "--count", "-n", min=0, metavar="N", help=_("With --rate: exit after N messages (0: never).")
-        ),
-    ] = 0,
-    latched: Annotated[
-        bool, typer.Option("--latched", help=_("Keep running, and send the last message to new subscribers."))
-    ] = False,
+    count: _CountOption = 0,
+    latched: _LatchedOption = False,
     master: MasterOption = None,
-    wait: Annotated[
-        int,
-        typer.Option(
-            "--wait",
-            "-w",
-            min=0,
-            metavar="N",
-            help=_("Wait for N subscribers before the first message."),
-            show_default=False,
-        ),
-    ] = 0,
+    wait: _WaitOption = 0,
     backend: BackendOption = None,
 ) -> None:
     """Publish a message once, or with --rate repeatedly until Ctrl+C.

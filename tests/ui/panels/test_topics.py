@@ -6,7 +6,15 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy, QTest
 
 from app.core.network.master import MasterState
-from app.ui.panels.topics.columns import age_cell, curve_cell, loss_cell, name_cell, nodes_cell, type_cell
+from app.ui.panels.topics.columns import (
+    age_cell,
+    bandwidth_cell,
+    curve_cell,
+    loss_cell,
+    name_cell,
+    nodes_cell,
+    type_cell,
+)
 from app.ui.panels.topics.panel import PANEL, TopicsPanel
 from app.ui.widgets import Button
 from app.ui.widgets.table.model import CELL_ROLE
@@ -390,3 +398,9 @@ def test_the_menu_of_a_folder_opens_and_closes_all_and_copies_its_pattern(panel,
     assert QGuiApplication.clipboard().text() == "/robot/*"
     by_words["Open all folders"].trigger()
     assert shown(panel) == whole
+
+
+def test_bandwidth_of_a_topic_without_subscribers_is_unknown() -> None:
+    unheard = Topic("/t", rate_hz=50.0, bandwidth_Bps=0.0)
+    assert "0" not in bandwidth_cell(unheard).text
+    assert "0" in bandwidth_cell(Topic("/t", rate_hz=50.0, bandwidth_Bps=0.0, subscribers=1)).text

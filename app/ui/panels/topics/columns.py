@@ -77,8 +77,21 @@ def rate_cell(topic: Topic) -> Cell:
 
 
 def bandwidth_cell(topic: Topic) -> Cell:
-    """Bytes a second."""
+    """Bytes a second; unknown where nobody subscribes."""
+    if _is_unheard(topic):
+        return Cell(bandwidth_words(None), role=_ink(topic, "textDisabled"))
     return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
+
+
+def _is_unheard(topic: Topic) -> bool:
+    """Whether messages are published that nobody subscribes: they are not encoded, so have no size."""
+    return bool(topic.rate_hz) and not topic.bandwidth_Bps and not topic.subscribers
+
+
+def _bandwidth_tip(topic: Topic) -> str:
+    if _is_unheard(topic):
+        return _("Not subscribed: messages are counted, but their size is unknown")
+    return _not_told(topic)
 
 
 def age_cell(topic: Topic) -> Cell:
@@ -210,7 +223,7 @@ COLUMNS: tuple[Column[Topic], ...] = (
         bandwidth_cell,
         lambda t: t.bandwidth_Bps,
         figures=True,
-        tip=_not_told,
+        tip=_bandwidth_tip,
         yields=3,
     ),
     Column("age", lazy("Age"), 58, age_cell, lambda t: t.age_s, figures=True, tip=_not_told, yields=2),
