@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -11,9 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
+from nep.backends.base import QuickPublish
 from nep.backends.zeromq.pending_batch import MOST, SOON_NS, WAIT_NS, PendingBatch
 from nep.errors import ClosedError, WireError
 from nep.masters.master import Master
+from nep.messages.encoded import Encoded
 from nep.protocol import wire
 from nep.protocol.batch import BATCH, BATCH_MAX, batch_part, entries
 from tests.nep.programs import eventually
@@ -302,3 +305,26 @@ def test_what_is_no_batch_is_refused_with_a_reason(body: bytes) -> None:
         assert error.reason  # noqa: PT017 - either is right
     else:
         assert read[-1].end == len(body)
+
+
+class _HeardWay:
+    is_heard = True
+    is_closed = False
+    problem = ""
+
+    def send_now(self, data: bytes) -> None: ...
+
+    def flush(self) -> None: ...
+
+    def flush_soon(self) -> None: ...
+
+
+def test_an_encoded_payload_is_not_encoded_again() -> None:
+    encoded: list[object] = []
+    passed: list[object] = []
+    asked = QuickPublish(
+        _HeardWay(), None, lambda payload: encoded.append(payload) or b"", None, passed.append
+    )
+    publish = PendingBatch(may_wait=False).publishing(asked, _HeardWay(), threading.Lock())
+    publish(Encoded(b"1"))
+    assert (encoded, passed) == ([], [Encoded(b"1")])
