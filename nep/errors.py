@@ -112,14 +112,20 @@ class ServiceTimeoutError(WaitTimeoutError):
 
 
 class NoServerError(WaitTimeoutError):
-    """No server for `service` within `timeout_s` seconds; `known` are the services that have one."""
+    """No server for `service` within `timeout_s` seconds; `known` are the services that have one.
 
-    def __init__(self, service: str, timeout_s: float, known: Sequence[str] = ()) -> None:
+    `address` is where it was expected, "" when a master tells.
+    """
+
+    def __init__(self, service: str, timeout_s: float, known: Sequence[str] = (), address: str = "") -> None:
         self.service = service
+        self.address = address
         self.known = tuple(known)
         super().__init__(service, timeout_s)
         near = nearest(service, self.known)
-        if service in self.known:
+        if address:
+            step = _("start it, or check the address '{address}'").format(address=address)
+        elif service in self.known:
             step = _(
                 "its server can't be reached; programs of the original NEP serve their own computer only"
             )

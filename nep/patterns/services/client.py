@@ -189,6 +189,8 @@ class Client:
 
     def _with_known(self, error: NoServerError) -> NoServerError:
         """The same error, with what there is instead."""
+        if error.address:
+            return error
         return NoServerError(error.service, error.timeout_s, self._transport.known(_LOOK_S))
 
     def _settle(self, future: Future[object], outcome: Outcome) -> None:

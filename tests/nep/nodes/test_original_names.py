@@ -42,6 +42,13 @@ def test_a_client_and_a_server_meet_at_a_fixed_port(port: int, transport: str) -
     assert requests == [{"question": 1}, {"question": 2}]
 
 
+def test_a_server_that_is_not_there_is_an_error_with_its_address(port: int) -> None:
+    with nep.client("127.0.0.1", port, timeout_s=0.01) as client:
+        client.send_info({})
+        with pytest.raises(nep.NoServerError, match=f"check the address '127.0.0.1:{port}'"):
+            client.listen_info()
+
+
 def test_a_node_over_plain_tcp_has_calls_and_says_what_it_lacks(port: int) -> None:
     with nep.node("arm", "TCP") as node:
         address = node.direct("127.0.0.1", port)

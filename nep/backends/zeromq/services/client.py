@@ -427,8 +427,13 @@ class SocketClient:
         for call in [each for each in self._calls.values() if each.deadline <= now]:
             self._take(call.number)
             self._failed += 1
-            kind = ServiceTimeoutError if call.is_sent else NoServerError
-            ended.append((call.then, kind(self._name, call.timeout_s or 0.0)))
+            timeout_s = call.timeout_s or 0.0
+            error: NepError = (
+                ServiceTimeoutError(self._name, timeout_s)
+                if call.is_sent
+                else NoServerError(self._name, timeout_s, address=self.place.removeprefix("tcp://"))
+            )
+            ended.append((call.then, error))
 
     def _due(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
