@@ -48,6 +48,7 @@ from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
 from app.core.recording.client import RecorderGone, RecorderSaid
 from app.core.recording.recordings import SessionRecordings
+from app.core.robots.bridged_commands import BridgedCommands
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
@@ -189,6 +190,7 @@ class Session:
         self.runs.coming, self.runs.also_stops = (lambda: self.coming), self.acting.disarm
         self.alarms.keep, self.alarms.on_event = self.recordings.carry, self.recordings.events.take_alarm
         self.alarms.on_moved = self.acting.on_moved = self.fleet.moved.note
+        self._bridged = BridgedCommands(self.fleet.moved.note)
 
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live
@@ -543,6 +545,7 @@ class Session:
         live.topics.update(view, now)
         live.nodes.update(view, now)
         self.fleet.update(view)
+        self._bridged.update(view, (link.robot for link in self.fleet.links if not link.virtual))
         self.room.update(view)
         for note in self.fleet.take_notes():
             self.console.add("warn", "robots", note)

@@ -31,7 +31,7 @@ from nep.messages.message import Message
 from tests.core.robots.stop_model.clock import SimulatedClock
 from tests.core.robots.stop_model.network import SimulatedNetwork
 from tests.core.robots.stop_model.robots import SimulatedRobot, Stranger
-from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedStudio
+from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedBridge, SimulatedStudio
 
 HISTORIES = int(os.environ.get("NEP_STOP_HISTORIES", "0"))
 FIXED_HISTORIES = 2000
@@ -57,7 +57,7 @@ class StopModel(RuleBasedStateMachine):
         self.network = SimulatedNetwork(self.clock.now)
         self.folder = tempfile.TemporaryDirectory(prefix="nep-stop-")
         self.studio = SimulatedStudio(self.network, self.clock, Path(self.folder.name))
-        self.stranger = Stranger(self.network)
+        self.stranger, self.bridge = Stranger(self.network), SimulatedBridge(self.network)
         self.robots: list[SimulatedRobot] = []
         self.told: dict[
             SimulatedRobot, dict[str, int]
@@ -218,6 +218,24 @@ class StopModel(RuleBasedStateMachine):
     def move_by_behaviour(self, robots: set[str], wait_s: float) -> None:
         there = {link.name for link in self.studio.session.fleet.connected}
         self.studio.run(sorted(robots & there))
+        self._settle()
+        self._advance(wait_s)
+
+    @rule(name=names, way=st.sampled_from(["shelf", "alarm", "replay", "bridge"]), wait_s=waits)
+    def move_by_message(self, name: str, way: str, wait_s: float) -> None:
+        if self.studio.session.fleet.link(name) is None:
+            return  # nobody knows yet that there is a robot of this name
+        match way:
+            case "shelf":
+                self.studio.send_from_shelf(name)
+            case "alarm":
+                self.studio.send_from_alarm(name)
+            case "replay":
+                self.studio.replay(name)
+            case _:
+                self.bridge.carry(name)
+                self._settle()
+                self.studio.see()  # the bridge renewed its lease, with its counts
         self._settle()
         self._advance(wait_s)
 

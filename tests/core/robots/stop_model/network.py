@@ -77,7 +77,7 @@ class SimulatedNetwork:
                 msg_type,
                 "json",
                 tuple(
-                    PublisherInfo(each.id, each.node.id, (), each.latched, 0, 0, 0, None, None, None)
+                    PublisherInfo(each.id, each.node.id, (), each.latched, each.count, 0, 0, None, None, None)
                     for each in of_topic
                 ),
                 tuple(SubscriberInfo(each.id, each.node.id, 0, 0) for each in hearing),
@@ -185,6 +185,10 @@ class SimulatedPublisher:
         self.kept: Message | None = None
         self._codec = codec_for(msg_type)
         self._seq = 0
+
+    @property
+    def count(self) -> int:
+        return self._seq
 
     @property
     def subscribers(self) -> int:

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+import orjson
+
 from app.blocks.model.program import Program
 from app.core.network.source import GraphSeen, MasterFound
 from app.core.robots.stop import RobotStopper
+from app.core.run.acting.arming import Target
+from app.core.run.acting.shelf import KeptMessage
 from app.core.run.runner import RunnerEvent
 from app.core.run.wanted import Wanted
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.identity import program_of
+from nep.programs.alarms.evaluator import AlarmEvent
+from nep.programs.alarms.rule import AlarmAction, AlarmCondition, AlarmRule
+from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.core.robots.stop_model.clock import SimulatedClock
-from tests.core.robots.stop_model.network import SimulatedNetwork, SimulatedNode, SimulatedSource
+from tests.core.robots.stop_model.network import (
+    SimulatedNetwork,
+    SimulatedNode,
+    SimulatedPublisher,
+    SimulatedSource,
+)
 
 GRAPH_POLL_S = 0.4
 ALIVE_S = GRAPH_POLL_S  # at the same moments, so that fewer have to be simulated
@@ -161,5 +174,54 @@ class SimulatedStudio:
         self.session.runs._want(wanted)
         self.allow()
 
+    def send_from_shelf(self, name: str) -> None:
+        """Send a message of the publish shelf, as its button and its key do."""
+        acting = self.session.acting
+        message = KeptMessage("m", "drive", f"/{name}/command", "robot/command", _drive_text(name))
+        acting.send(message)
+        while acting.question is not None or self.session.fleet.permission.question is not None:
+            if acting.question is not None:
+                acting.answer(let=True)
+            self.allow()
+
+    def send_from_alarm(self, name: str) -> None:
+        """Let an alarm come on that sends a command."""
+        action = AlarmAction("send", f"/{name}/command", orjson.loads(_drive_text(name)), "robot/command")
+        event = AlarmEvent("on", AlarmRule("a", AlarmCondition("appears", "/door"), (action,)), 0.0)
+        self.session.alarms._send(event, action, lambda _ok, _said: None)
+        self.allow()
+
+    def replay(self, name: str) -> None:
+        """Replay a command that was recorded: what `ReplayOutbox` tells and does for each route."""
+        topic = f"/{name}/command"
+        if self.session.fleet.gate.permits(topic, lambda: self.replay(name)):
+            self.session.acting.tell_moved(Target("topic", topic), "replay")
+            publisher = self.node.new_pub(topic, "robot/command")
+            self.network.connect()
+            publisher.publish(orjson.loads(_drive_text(name)))
+        else:
+            self.allow()
+
     def close(self) -> None:
         self.session.close()
+
+
+class SimulatedBridge:
+    """A bridge in a process of its own, which carries commands from another network."""
+
+    def __init__(self, network: SimulatedNetwork) -> None:
+        self.network = network
+        self.node = network.node("bridge")
+        self.node.new_pub(BRIDGES_TOPIC, latched=True).publish({})
+        self._made: dict[str, SimulatedPublisher] = {}
+
+    def carry(self, name: str) -> None:
+        topic = f"/{name}/command"
+        if topic not in self._made:
+            self._made[topic] = self.node.new_pub(topic, "robot/command")
+            self.network.connect()
+        self._made[topic].publish(orjson.loads(_drive_text(name)))
+
+
+def _drive_text(name: str) -> str:
+    return f'{{"id": "{name} {uuid.uuid4().hex}", "op": "invoke", "action": "drive", "input": {{}}}}'
