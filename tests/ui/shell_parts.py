@@ -167,15 +167,13 @@ def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fa
 
 
 def begin_run(session: fakes.Session, state: str) -> None:
-    """Run a behaviour until its run is running, paused, or proven to have ended."""
+    """Run a behaviour until its run is running or paused."""
     session.document.edited(WORKSPACE)
     session.runs.run()
     assert session.runner is not None
     session.runner.does("b2")
     if state == "paused":
         session.runs.pause()
-    elif state == "proven":
-        session.runner.ends()
 
     def has_come() -> bool:
         session.take_over()

@@ -281,6 +281,7 @@ class Fleet:
         self.moved.confirm(known)
         for link in map(self._links.get, known):
             if link is not None:
+                link.not_stopped = ""
                 self._judge_motion(link)
 
     def take_settled(self) -> tuple[str, ...]:
@@ -364,14 +365,18 @@ class Fleet:
         link = self._links.get(name)
         return None if link is None else link.identity
 
+    def _drop_ended(self, link: RobotLink) -> None:
+        """A virtual robot is its program: what an ended one did moves no more."""
+        if link.virtual and link.name in self.moved:
+            self.moved.drop_ended(link.name)
+            link.not_stopped = link.not_stopped if link.name in self.moved else ""
+
     def _judge_motion(self, link: RobotLink) -> None:
         """Say of a robot that may move and can't be heard why nobody knows that it stands still."""
-        if link.virtual and not link.connected:
-            self.moved.drop_ended(link.name)
+        if not link.connected:
+            self._drop_ended(link)
         motion = self.moved.motion(link.name)
         link.may_move = motion.sentence if motion is not None and not self._is_heard(link) else ""
-        if motion is None:
-            link.not_stopped = ""
 
     def _is_proven(self, topic: str) -> bool:
         link = self._links.get(self._names.get(topic, ""))
@@ -473,6 +478,7 @@ class Fleet:
             )
         )
         self._keep_going(link, before)
+        self._drop_ended(link)
 
     def _leave_topics(self, link: RobotLink) -> None:
         """Its description names other topics: what was asked on the old ones has ended."""

@@ -150,7 +150,6 @@ def shown(run: Run) -> tuple[object, ...]:
 READY = ("ready", True, False, True, "Run", "Stop")
 RUNNING = ("running", False, True, True, "Restart", "Stop")
 PAUSED = ("paused", True, False, True, "Go on", "Stop")
-PROVEN = ("proven", True, False, True, "Run", "Stop")
 
 
 def test_run_pause_step_go_on_and_stop(run: Run) -> None:
@@ -178,8 +177,8 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     assert runs.view().slow
     runs.stop()
     assert not runs.active
-    tick_until(run.session, lambda: runs.view().state == "proven")
-    assert shown(run) == PROVEN
+    tick_until(run.session, lambda: runs.view().state == "ready")
+    assert shown(run) == READY
     assert runs.view().title.startswith("Stopped after ")
     assert runs.view().detail == "The dashed outline shows where"
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
@@ -230,7 +229,7 @@ def test_run_again_stops_what_runs_and_begins_anew(run: Run) -> None:
     run.works("c")
     assert runs._runner is second
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     assert runs.view().title.startswith("Stopped after ")
 
 
@@ -241,7 +240,7 @@ def test_stop_takes_back_a_restart(run: Run) -> None:
     run.works("c")
     runs.restart()
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     run.session.tick()
     assert not runs.active
 
@@ -255,7 +254,7 @@ def test_a_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
     runs.restart()
     tick_until(run.session, lambda: runs.view().state == "running" and runs.active)
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
 
 
 def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run: Run) -> None:
@@ -290,7 +289,7 @@ def test_edits_while_it_runs_say_that_they_apply_later_until_they_are_undone(run
     tick_until(run.session, lambda: runs.active)
     assert not says()
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
 
 
 def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> None:
@@ -309,7 +308,7 @@ def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> No
     runs.tick()
     assert not runs.view().edited, "edits are no matter of a try"
     run.ends()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     view = runs.view()
     assert (view.title, view.detail) == ("Tried “change by”", "It came to its end")
 
@@ -341,7 +340,7 @@ def test_stop_ends_a_try(run: Run) -> None:
     runs.try_stack(Stack("loop"))
     run.works("c")
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     assert runs.view().title == "“repeat forever” was stopped"
     assert runs.stopped_blocks == ("c",)
 
@@ -396,7 +395,7 @@ def test_step_begins_a_program_at_its_first_block(run: Run) -> None:
     assert runs.stopped_blocks == ("w",)
     assert runs.view().title == "Paused at “write”"
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
 
 
 def test_a_program_that_ends_has_finished_and_another_can_run(run: Run) -> None:
@@ -405,8 +404,8 @@ def test_a_program_that_ends_has_finished_and_another_can_run(run: Run) -> None:
     for _ in range(2):
         runs.run()
         run.ends()
-        tick_until(run.session, lambda: runs.view().state == "proven")
-        assert shown(run) == PROVEN
+        tick_until(run.session, lambda: runs.view().state == "ready")
+        assert shown(run) == READY
         assert runs.view().title.startswith("Finished after ")
         assert (runs.running_blocks, runs.stopped_blocks, runs.block_errors) == ((), (), {})
     assert not run.session.alerts.active
@@ -418,7 +417,7 @@ def test_a_block_that_fails_ends_the_program_and_is_marked(run: Run) -> None:
     run.session.document.edited(workspace(started(write(half))))
     runs.run()
     run.fails("v")
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     assert runs.view().title.startswith("Stopped by a problem")
     assert list(runs.block_errors) == ["v"]
     assert runs.view().detail == runs.block_errors["v"]
@@ -431,7 +430,7 @@ def test_a_process_that_is_killed_is_told(run: Run) -> None:
     runs.run()
     run.works("c")
     run.is_killed()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     (alert,) = run.session.alerts.active
     assert (alert.id, alert.title) == ("program", "The behaviour ended by itself.")
     assert alert.detail.startswith("The program's process was killed")
@@ -445,7 +444,7 @@ def test_what_an_earlier_run_still_says_is_ignored(run: Run) -> None:
     earlier = runs._runner
     assert earlier is not None
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")
     runs.run()
     run.works("c")
     assert runs._runner is not None
@@ -453,4 +452,4 @@ def test_what_an_earlier_run_still_says_is_ignored(run: Run) -> None:
     runs.on_runner(RunnerEvent("running", earlier.run, ("other",)))
     assert runs.running_blocks != ("other",)
     runs.stop()
-    tick_until(run.session, lambda: runs.view().state == "proven")
+    tick_until(run.session, lambda: runs.view().state == "ready")

@@ -19,7 +19,6 @@ def chip(*states: str, run: str = "ready", silent: str | None = None) -> tuple[s
         ("busy", "ready", "Robot 1 moving"),
         ("ready", "running", "Robot 1 running"),
         ("ready", "paused", "Robot 1 holds still"),
-        ("ready", "proven", "Robot 1 ready"),
     ],
 )
 def test_one_robot_says_what_it_does(state: str, run: str, words: str) -> None:
