@@ -15,6 +15,7 @@ from app.core.messages.picture import Picture, Size, decode
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import NepError, RecordingTooLargeError
 from nep.i18n import _
+from nep.recordings.reader import Recording
 
 SUFFIX = ".mcap"
 MOST_FILES = 2_000
@@ -143,7 +144,7 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
     """The same with what the file says of itself, or why it cannot be read or was not scanned."""
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
-            words, figures = recording.words, recording.figures()
+            words = recording.words
             return RecordingFacts(
                 plain.path,
                 plain.size_bytes,
@@ -157,13 +158,21 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",
                 is_kept=words.get("kept") == "1",
-                lost=sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None,
+                lost=_lost(recording),
             )
     except RecordingTooLargeError as error:
         why = _("Not scanned: {reason}.").format(reason=error.reason)
         return replace(plain, is_read=True, is_complete=True, not_scanned=why)
     except (NepError, OSError) as error:
         return replace(plain, is_read=True, problem=str(error))
+
+
+def _lost(recording: Recording) -> int | None:
+    try:
+        figures = recording.figures()
+    except RecordingTooLargeError:  # of a file that was not closed all of them must be read
+        return None
+    return sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None
 
 
 def picture_in(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:

@@ -73,7 +73,7 @@ def test_a_reader_that_dies_is_an_alert_and_the_window_goes_on(
     eventually(lambda: replay.has_ended)
     replay.tick(1.0)
     (alert,) = (each for each in alerts.active if each.id == FAILED)
-    assert "the process has ended" in alert.detail
+    assert "process has ended" in alert.detail
     replay.close()
     assert opener.is_closed
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
-from nep.errors import NepError
+from nep.errors import NepError, RecordingError
 from nep.recordings.figures import TopicFigures
 from nep.recordings.reader import Recording
 
@@ -84,7 +84,7 @@ class Densities:
         try:
             return self._worker.take(owner)
         except NepError as error:
-            self.problem = str(error)
+            self.problem = error.reason if isinstance(error, RecordingError) else str(error)
             return None
 
     def close(self) -> None:

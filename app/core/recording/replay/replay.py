@@ -22,7 +22,7 @@ from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
 from app.core.run.acting.acting import SessionActing
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
-from nep.i18n import _, ngettext, number
+from nep.i18n import _, number
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
@@ -337,19 +337,10 @@ class Replay:
             action = f"{SHOW_FILE}:{self.path}"
             self._alerts.put(FAILED, "error", title, sentence, button=_("Show the file"), action=action)
         if len(status.damage) > self._damaged:
-            self._damaged = count = len(status.damage)
-            title = ngettext(
-                "{count} piece of {name} is damaged and is skipped.",
-                "{count} pieces of {name} are damaged and are skipped.",
-                count,
-            )
+            self._damaged = len(status.damage)
+            title = _("{name} is damaged.").format(name=self.name)
             detail = damage_words(status.damage, self.start_ns)
-            self._alerts.put(
-                DAMAGED,
-                "warn",
-                title.format(count=count, name=self.name),
-                f"{detail[:1].upper()}{detail[1:]}.",
-            )
+            self._alerts.put(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
 
     def _tell_not_closed(self, opened: OpenedRecording) -> None:
         """Say how much there is of a file that was cut off, or whose program was killed."""

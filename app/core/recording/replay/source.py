@@ -19,7 +19,7 @@ from app.core.faults import error_words
 from app.core.network.mailbox import Drained, Mailbox
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
-from nep.errors import NepError
+from nep.errors import NepError, RecordingError
 from nep.messages.message import Message, new_message
 from nep.recordings.index import Damage
 from nep.recordings.player import Due, Playback, PlayerStatus
@@ -226,7 +226,8 @@ class ReplaySource:
         except NepError as error:
             if self._closing:
                 return
-            self._status = ReplayStatus("failed", sentence=str(error))
+            reason = error.reason if isinstance(error, RecordingError) else str(error)
+            self._status = ReplayStatus("failed", sentence=reason)
         except Exception as error:  # noqa: BLE001  a file may do anything; the window says so and lives on
             self._status = ReplayStatus("failed", sentence=error_words(error))
         finally:

@@ -111,7 +111,11 @@ class TimelinePanel(PanelWidget):
         if replay is None or status is None:
             words = (_("No recording is open"), _("Open one, or drop it here."), True)
         elif status.stage == "failed":
-            words = (_("{name} can't be played.").format(name=replay.name), f"{status.sentence}.", True)
+            words = (
+                _("{name} can't be played.").format(name=replay.name),
+                f"{status.sentence[:1].upper()}{status.sentence[1:]}.",
+                True,
+            )
         else:
             percent = round(100 * status.progress)
             said = _("Reading the index, {percent} %")
