@@ -37,11 +37,12 @@ from mcap.writer import Writer
 
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.message import Message, arrived, kind_of
+from nep.recordings.destination import WriterLimits
 from nep.recordings.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from nep.recordings.records import ChunkInfo
 from nep.recordings.ring import FlightRecorder
-from nep.recordings.writer import RecordingWriter, WriterLimits
+from nep.recordings.writer import RecordingWriter
 
 PICTURE_BYTES = 200_000
 LIMITS = WriterLimits(queue_bytes=2_000_000_000, queue_messages=2_000_000, least_free_bytes=0)

@@ -45,6 +45,8 @@ else:  # the other commands need not wait for it, nor have what it needs
 _LOOK_S = 0.2
 _SETTLE_S = 1.0
 """How long descriptions of robots may take to arrive; until then their programs' topics are not sent."""
+_MAX_TOPICS = 1_000
+"""Each has a publisher, of which the whole network is told."""
 
 
 def play(
@@ -83,6 +85,9 @@ def play(
         chosen = list(recording.topics) if publish_all else named
         if not any(recording.topics[each].message_count for each in chosen):
             raise NepError(_("nothing of '{file}' can be played: it has no such messages").format(file=file))
+        if len(chosen) > _MAX_TOPICS:
+            said = _("'{file}' has {count} such topics; name {most} of them at most")
+            raise NepError(said.format(file=file, count=len(chosen), most=_MAX_TOPICS))
         names = _names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
         limits = _Limits(recording, names, frozenset(allow_moving or ()), armed)

@@ -16,6 +16,7 @@ from nep.recordings.recorder import TopicSelection
 
 _BUDGET = (1_000_000_000, 20.0)
 """Bytes and seconds of work for one recording."""
+_MAX_TOPICS = 10_000
 SAMPLES = 4
 """So many messages of a topic are looked at where nobody has counted its bytes."""
 MOST_SAMPLED = 200
@@ -81,7 +82,7 @@ def film_strip(
     """Look at a recording: so many pictures, each for a view of that size; None when it can't be read."""
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
-            if not recording.message_count:
+            if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
                 return None
             start_ns, end_ns = recording.start_ns, recording.end_ns
             counted = recording.densities(start_ns, end_ns + 1, bars)

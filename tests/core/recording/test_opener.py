@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts import Alerts
+from app.core.recording.film_strip import film_strip
 from app.core.recording.folder import RecordingFacts, read_facts
 from app.core.recording.opener import LocalOpener, process_opener
+from app.core.recording.replay.opening import MAX_TOPICS, open_recording
 from app.core.recording.replay.replay import FAILED, Replay
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -17,6 +19,7 @@ from nep.errors import RecordingError, RecordingTooLargeError
 from nep.recordings.reader import Recording
 from nep.recordings.remote import ReaderProcess
 from tests.nep.programs import eventually
+from tests.nep.recordings import hostile
 from tests.nep.recordings.messages import json_message, record
 
 
@@ -106,3 +109,11 @@ def test_studio_reads_in_processes_of_their_own(tmp_path: Path) -> None:
         opener.close()
     finally:
         session.close()
+
+
+def test_a_recording_of_too_many_topics_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "many.mcap"
+    path.write_bytes(hostile.many_channels(MAX_TOPICS + 1))
+    with pytest.raises(RecordingError, match=str(MAX_TOPICS)):
+        open_recording(path, lambda _share: None)
+    assert film_strip(path, 4, 3, (24, 16), LocalOpener()) is None

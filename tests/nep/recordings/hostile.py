@@ -125,7 +125,7 @@ def files() -> dict[str, Callable[[], bytes]]:
         "empty records, 210 000": lambda: MAGIC + record(12, b"") * 210_000,
         "one channel 210 000 times": lambda: MAGIC + channel() * 210_000,
         "one metadata record 1 500 times": _many_metadata,
-        "3 000 channels": _many_channels,
+        "3 000 channels": many_channels,
         "chunk of empty records": lambda: begin + chunk_of(record(0x80, b"") * 300_000),
         "all chunks at all times": lambda: (
             begin
@@ -155,8 +155,9 @@ def _many_metadata() -> bytes:
     return closed(one + first + data, summary)
 
 
-def _many_channels() -> bytes:
-    numbers = range(1, 3_001)
+def many_channels(count: int = 3_000) -> bytes:
+    """A file with so many topics and a message of each."""
+    numbers = range(1, count + 1)
     channels = b"".join(channel(number, f"/t{number}/{'x' * 200}") for number in numbers)
     data = chunk_of(b"".join(map(message, numbers)))
     return closed(

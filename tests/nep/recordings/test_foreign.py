@@ -14,6 +14,7 @@ from nep.errors import NepError, RecordingError
 from nep.recordings.export import Part, export
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
+from tests.nep.recordings import hostile
 from tests.nep.recordings.messages import json_message, record
 from tests.nep.recordings.test_commands import run
 
@@ -194,6 +195,13 @@ def test_playing_ends_with_a_sentence_where_nothing_can_be_played(tmp_path: Path
     record(empty, [])
     with pytest.raises(NepError, match="nothing of"):
         run("play", empty, "--all")
+
+
+def test_playing_all_of_too_many_topics_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "many.mcap"
+    path.write_bytes(hostile.many_channels(1_001))
+    with pytest.raises(NepError, match="1001 such topics"):
+        run("play", path, "--all")
 
 
 def test_a_recording_of_one_message_is_played_to_its_end(

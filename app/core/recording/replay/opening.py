@@ -13,6 +13,7 @@ from nep.recordings.bookmarks import Bookmarks
 from nep.recordings.figures import TopicFigures
 from nep.recordings.reader import Recording
 
+MAX_TOPICS = 10_000
 Progress = Callable[[float], object]
 """Told how much of the file was looked through (0 to 1); what it raises ends the opening."""
 
@@ -35,6 +36,9 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
     progress(0.0)
     recording = (opener or LocalOpener()).open(path, progress=told)
     try:
+        if len(recording.topics) > MAX_TOPICS:
+            said = _("it has {count} topics; at most {most} can be shown")
+            raise RecordingError(str(path), said.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
             raise RecordingError(str(path), _("it holds no message that can be read"))
         return OpenedRecording(recording, Bookmarks(recording), recording.figures())
