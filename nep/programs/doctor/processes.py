@@ -20,6 +20,8 @@ else:
 __all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
 
 _LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
+_TEXT_OF_A_PROGRAM = frozenset({"-c", "-e", "--eval", "-p", "--print"})
+"""Behind these options of Python and Node.js comes the text of a program, which is no name."""
 _NEAR = 20
 """A master's port is looked for so near to the usual one, when it listens on several."""
 
@@ -145,6 +147,8 @@ def _name(name: str, command: Sequence[str]) -> str:
     """What a person would call the program: of an interpreter, its script."""
     if PurePath(name).stem.lower().startswith(("python", "node", "java")):
         for word in command[1:]:
+            if word in _TEXT_OF_A_PROGRAM:
+                break
             if not word.startswith("-"):
                 return f"{name} {PurePath(word).name}"
     return name

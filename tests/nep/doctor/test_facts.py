@@ -238,3 +238,14 @@ def test_who_listens_at_another_address_of_a_port_does_not_hold_it_at_loopback()
             for ip, pid in (("127.0.0.1", 41), ("192.168.1.5", 77))
         ]
         assert processes.holders(sockets[::order]) == {7000: 41}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its python.exe may be a launcher of another process")
+def test_a_program_that_was_typed_into_the_command_line_is_not_named_by_its_text():
+    text = "import sys; print(flush=True); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as child:
+        child.stdout.readline()
+        assert "import" not in processes.describe(child.pid).name
+        child.stdin.close()
