@@ -35,8 +35,10 @@ def _imported(name: str) -> object:
         names = {each: public[each] for each in public if not each.startswith("_")}
         globals().update(names, __all__=[*sorted(names), "__version__"])
     if name not in globals():
-        hint = importlib.import_module("nep.nodes.original").original_hint(name)
-        if hint:  # without an object, so that Python doesn't suggest a similar name
+        original = None if name.startswith("_") else importlib.import_module("nep.nodes.original")
+        if original is not None and (
+            hint := original.original_hint(name)
+        ):  # without an object, so that Python doesn't suggest a similar name
             raise AttributeError(hint, name=name, obj=None)
         raise AttributeError(f"module 'nep' has no attribute '{name}'")
     return globals()[name]
