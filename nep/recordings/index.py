@@ -3,7 +3,7 @@
 A file that was closed properly but has no summary, no chunk index or no chunks is read as it is. Messages
 outside of chunks (ROS 2's preset "fastwrite") are grouped into runs of about 1 MB, which are read like
 uncompressed chunks. The package `mcap` is not used for this, because its reader takes offsets, lengths and
-counts of the file as they are (docs/adr/0033-reading-foreign-recordings.md).
+counts of the file as they are (docs/adr/0032-reading-foreign-recordings.md).
 """
 
 from __future__ import annotations
