@@ -15,6 +15,7 @@ SETTLE_LIMIT_S = 30.0
 """Real seconds after which a history is given up as deadlocked."""
 _END = float("inf")
 _SHORTEST_S = 1e-6
+_AFTER_END_S = 0.05  # real seconds, so that threads that are being closed do not spin
 
 
 def _never() -> bool:
@@ -63,7 +64,7 @@ class SimulatedClock:
         heapq.heappush(self._timers, _Timer(due, next(self._numbers), call))
 
     def end(self) -> None:
-        """End the history: from now on every wait returns at once, and every time limit is over."""
+        """End the history: from now on waits are short, and every time limit is over."""
         self._has_ended = True
         self._now += 1e6
         self.wake_all()
@@ -111,6 +112,8 @@ class SimulatedClock:
         if not is_held:
             condition.acquire()
         try:
+            if self._has_ended and not is_ready():
+                condition.wait(_AFTER_END_S)
             while not self._has_ended and (is_frozen() or not (is_ready() or self._now >= deadline)):
                 with self._lock:
                     self._waiters[id(waiter)] = waiter
