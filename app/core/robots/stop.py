@@ -81,13 +81,14 @@ class RobotStopper:
         self._lines: dict[str, StopLine] = {}
         self._asked: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
+        self._hearers: dict[str, frozenset[str]] = {}  # by command topic, of this view
         self._looked_s = 0.0
         self._senders = Senders()
 
     def see(self, view: GraphView) -> None:
         """Who is there now: whose answer counts, and who serves a robot's commands."""
         with self._changed:
-            self._view = view
+            self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
             self._senders.learn(view, {way.answer for target in targets for way in target.ways})
             late = [said for asked in self._asked.values() for said in self._judge_again(asked)]
@@ -322,7 +323,11 @@ class RobotStopper:
 
     def _is_connected(self, line: StopLine, way: StopWay) -> bool:
         """With the lock held."""
-        return way.is_connected(line.target, hearing(self._view or GraphView(0, 0), way.topic))
+        hearers = self._hearers.get(way.topic)
+        if hearers is None:
+            hearers = frozenset(hearing(self._view or GraphView(0, 0), way.topic))
+            self._hearers[way.topic] = hearers
+        return way.is_connected(line.target, hearers)
 
     def _deliver(self, asked: StopRequest) -> bool:
         """Send the command on ways that have become connected; whether nothing is left to deliver."""
