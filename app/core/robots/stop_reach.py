@@ -38,7 +38,18 @@ def targets_of(
             absent.append(target)
     names = {target.robot.name for target in here}
     others = [target for target in unlisted if target.robot.name not in names]
-    return (*here, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
+    unknown = [_unknown(topic) for topic in moved.names if "/" in topic]
+    return (*here, *unknown, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
+
+
+def _unknown(topic: str) -> StopTarget:
+    """Return a target for a command topic by which a robot was moved of which nothing else is known."""
+    home = topic.rpartition("/")[0]
+    return StopTarget(_bare(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
+
+
+def _bare(name: str, topics: RobotTopics) -> Robot:
+    return Robot(name, "", name, False, "native", (), (), (), _STOP, (), topics, {})
 
 
 def unlisted_targets(
@@ -64,9 +75,9 @@ def unlisted_targets(
         answer = answer if answer in answers or not answers else answers[0]
         ways = [RobotTopics(topic, command, answer) for command in commands]
         if ways:
-            robot = Robot(name, "", name, False, "native", (), (), (), _STOP, (), ways[0], {})
             identity = identity_of(view, node) if node else None
-            found.append(StopTarget(robot, identity, topics=tuple(ways[1:]), is_expected=is_expected))
+            others = tuple(ways[1:])
+            found.append(StopTarget(_bare(name, ways[0]), identity, topics=others, is_expected=is_expected))
     return tuple(found)
 
 

@@ -257,3 +257,17 @@ def test_a_stop_is_not_proven_by_what_another_program_sends(studio: SimulatedStu
     )
     studio.stop()
     assert studio.session.runs.view().state == "unanswered"
+
+
+def test_a_robot_of_which_only_the_command_topic_is_known_is_told_and_named(studio: SimulatedStudio) -> None:
+    unknown = studio.network.add("X")
+    studio.network.unlisted.add(unknown.node)  # it announces nothing
+    studio.session.fleet.moved.note(["/X/command"], "shelf")
+    studio.tick()
+    studio.stop()
+    assert unknown.stops() == 1
+    report = studio.session.runs.state.report
+    assert report is not None
+    assert report.silent == ("/X/command",)
+    studio.session.runs.confirm_still()
+    assert studio.session.runs.view().can_run
