@@ -38,6 +38,7 @@ class RecordingService:
         self._tell = tell
         self._files: dict[int, FileReader] = {}
         self._numbers = count(1)
+        self._told: dict[int, int] = {}
         self._cursors: OrderedDict[int, Iterator[RawMessage]] = OrderedDict()
         self._operations: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
             "open": self._open,
@@ -67,10 +68,18 @@ class RecordingService:
             return {"error": str(error), "path": path}
         except (TypeError, ValueError, KeyError, OSError) as error:
             return {"error": str(error) or type(error).__name__, "path": path}
-        file = self._files.get(request.get("file", answer.get("file", 0)))
-        if file is not None:
-            answer["damage"] = plain_damage(file.damage)
+        self._add_damage(answer, request.get("file", answer.get("file")))
         return answer
+
+    def _add_damage(self, answer: dict[str, object], number: object) -> None:
+        """Tell the damage of a file when there is more of it than was told."""
+        file = self._files.get(number) if isinstance(number, int) else None
+        if file is None or not isinstance(number, int):
+            return
+        damage = file.damage
+        if len(damage) != self._told.get(number, 0):
+            self._told[number] = len(damage)
+            answer["damage"] = plain_damage(damage)
 
     def _open(self, request: Mapping[str, Any]) -> Answer:
         path = Path(request["path"])

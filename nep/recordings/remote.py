@@ -221,7 +221,8 @@ class _RemoteFile:
             raise ClosedError(f"recording '{self._path.name}'")
         asked = {"op": op, "file": self._number, **request}
         answer = self._pipe.ask(self._path, asked, self._timeout_s)
-        self._damage = damage_of(answer.get("damage"))
+        if "damage" in answer:
+            self._damage = damage_of(answer["damage"])
         return answer
 
     def raw(

@@ -70,6 +70,7 @@ class RecordingExport:
         """Give it up and wait so long for its end."""
         self.cancel()
         self._thread.join(wait_s)
+        self._opener.close()
 
     def words(self) -> str:
         """What came of it, in a sentence without a full stop; "" while it goes on."""

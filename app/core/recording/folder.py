@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -21,6 +22,8 @@ SUFFIX = ".mcap"
 MOST_FILES = 2_000
 AT_ONCE = 50
 """So many files are opened before what is known so far is shown."""
+MOST_S = 2.0
+"""... and for so long: each of them may take some seconds."""
 MOST_TOPICS = 200
 CACHE_BYTES = 8_000_000
 """Of one recording that is open for a moment only."""
@@ -123,7 +126,7 @@ class RecordingFolder:
         there.sort(key=lambda each: (-each[1].st_mtime_ns, each[0].name))
         listed, left_out = there[:MOST_FILES], max(0, len(there) - MOST_FILES)
         self._known = {path: self._known[path] for path, _about in listed if path in self._known}
-        files, opened = [], 0
+        files, opened, until = [], 0, time.monotonic() + MOST_S
         for path, about in listed:
             mark = (about.st_mtime_ns, about.st_size)
             known = self._known.get(path)
@@ -131,7 +134,7 @@ class RecordingFolder:
                 files.append(known[1])
                 continue
             plain = RecordingFacts(path, about.st_size, about.st_mtime)
-            if path != being_written and opened < AT_ONCE:
+            if path != being_written and opened < AT_ONCE and (not opened or time.monotonic() < until):
                 opened += 1
                 plain = read_facts(plain, self._opener)
                 self._known[path] = (mark, plain)
