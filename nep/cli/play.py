@@ -37,8 +37,9 @@ from nep.text import quotable
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from nep.recordings import player, reader
+    from nep.recordings import damage, player, reader
 else:  # the other commands need not wait for it, nor have what it needs
+    damage = lazy_module("nep.recordings.damage")
     player = lazy_module("nep.recordings.player")
     reader = lazy_module("nep.recordings.reader")
 
@@ -84,7 +85,9 @@ def play(
         named = _named(recording, topics or (), publish_all=publish_all)
         chosen = list(recording.topics) if publish_all else named
         if not any(recording.topics[each].message_count for each in chosen):
-            raise NepError(_("nothing of '{file}' can be played: it has no such messages").format(file=file))
+            said = _("nothing of '{file}' can be played: it has no such messages").format(file=file)
+            words = damage.damage_words(recording.damage, recording.start_ns)
+            raise NepError(f"{said}; {words}" if words else said)
         if len(chosen) > _MAX_TOPICS:
             said = _("'{file}' has {count} such topics; name {most} of them at most")
             raise NepError(said.format(file=file, count=len(chosen), most=_MAX_TOPICS))
