@@ -37,7 +37,7 @@ from app.core.run.view import (
     result_words,
     view_of,
 )
-from app.core.run.wanted import Wanted
+from app.core.run.wanted import OpenBehaviours, Wanted
 from app.errors import AppError
 from nep.i18n import _
 
@@ -53,17 +53,6 @@ class RunNetwork(Protocol):
 
     address: str
     stopper: RobotStopper | None
-
-
-class OpenBehaviours(Protocol):
-    """What a run needs of the behaviours that are open."""
-
-    @property
-    def current(self) -> Document:
-        """The one that shows; Run runs it."""
-
-    def title(self, document: Document) -> str:
-        """What people call it."""
 
 
 class Runs:
@@ -442,8 +431,7 @@ class Runs:
             asked = wanted_by(program, used)
             if not self._fleet.permission.permits(asked, partial(self._begin_now, wanted)):
                 return  # a person is asked first; the question stands in the window
-            if wanted.stack is None:
-                self._fleet.to_start(program.robots)
+            self._fleet.to_start(program.robots if wanted.stack is None else ())
             runner = self._make_runner(self._post_event)
             robots = [link.robot.source for link in self._fleet.connected]
             owners = owners_of(self._fleet)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from app.blocks.compiler.stack import SHOW, Stack
 from app.blocks.model.program import Program
@@ -12,6 +13,17 @@ from app.core.documents.problems import CONNECT
 from app.robots.description.description import Robot
 from app.robots.description.inputs import pretty_unit
 from nep.i18n import _
+
+
+class OpenBehaviours(Protocol):
+    """What a run needs of the behaviours that are open."""
+
+    @property
+    def current(self) -> Document:
+        """The one that shows; Run runs it."""
+
+    def title(self, document: Document) -> str:
+        """What people call it."""
 
 
 @dataclass(frozen=True, slots=True)
