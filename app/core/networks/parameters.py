@@ -17,7 +17,7 @@ from app.core.network.nodes import NodeEntry
 from app.core.network.source import Job
 from app.core.network.topics import Topic, key_of
 from app.core.network.watches import Watching
-from app.core.typed_number import TypedNumberError, parse_number
+from app.robots.description.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message

@@ -1,4 +1,4 @@
-// Numbers as people type them: comma and point are both decimal separators. The same rules as app/core/typed_number.py,
+// Numbers as people type them: comma and point are both decimal separators. The same rules as app/robots/description/typed_number.py,
 // tested with the same examples (tests/data/typed_numbers.json).
 
 /** Why a text is rejected: it has several separators, or it is no number at all. */

@@ -14,7 +14,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from app.core.typed_number import TypedNumberError, parse_number
+from app.robots.description.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from string import Formatter
 from typing import Literal
 
-from app.core.typed_number import SEPARATORS, TypedNumberError, parse_number
+from app.robots.description.typed_number import SEPARATORS, TypedNumberError, parse_number
 from nep.i18n import _, lazy, pgettext, plazy
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
 from nep.programs.alarms.rule import KEEP_S, NEEDS_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.core.messages.picture import Picture
 from app.core.messages.picture_look import COLOUR_MAPS, MOST_CONTRAST, PLAIN, PictureLook
-from app.core.typed_number import parse_number
+from app.robots.description.typed_number import parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, NumberEdit, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
 
 from app.core.run.acting.json_text import value_typed
-from app.core.typed_number import TypedNumberError, parse_number
+from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
 from app.ui.widgets.menus import EditMenu

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from app.blocks.model.workspace import Placed, Workspace, parse_workspace
 from app.core.session import Session
-from app.core.typed_number import TypedNumberError, parse_number
+from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from nep.i18n import _, ngettext, pgettext

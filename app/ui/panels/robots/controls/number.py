@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.core.typed_number import parse_number
 from app.robots.description.description import Parameter
+from app.robots.description.typed_number import parse_number
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.base import VALUE_WIDTH, Control, Tell, connect
 from app.ui.theme.theme import Theme

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.typed_number import TypedNumberError, parse_number
+from app.robots.description.typed_number import TypedNumberError, parse_number
 
 EXAMPLES = json.loads((Path(__file__).parents[1] / "data" / "typed_numbers.json").read_text("utf-8"))
 
