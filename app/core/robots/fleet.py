@@ -16,6 +16,7 @@ from app.core.robots.known import KnownRobots
 from app.core.robots.motion_gate import MotionGate, MovableRobots
 from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
 from app.core.robots.moved_robots import MovedRobots
+from app.core.robots.own_messages import OwnMessages, mapping_of
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop_lines import MOST_TOPICS, StopTarget
 from app.core.robots.stop_reach import targets_of, unlisted_targets
@@ -28,13 +29,11 @@ from app.robots.description.description import Robot, topic_of
 from app.robots.heartbeat import Heartbeat
 from app.robots.held_messages import HeldMessages
 from app.robots.identity import (
-    GATEWAY,
     AllVirtual,
     Identity,
     RobotProcesses,
     Senders,
     foreign_topic,
-    hearing,
     may_move,
     publishing,
     said,
@@ -75,6 +74,7 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else AllVirtual()
         self._senders = Senders()
+        self._own = OwnMessages(self._senders)
         self._announcements = Announcements(watches, self._senders, clock, self._is_proven)
         self._unlisted: tuple[StopTarget, ...] = ()
         self._settings = settings
@@ -294,9 +294,9 @@ class Fleet:
     def update(self, view: GraphView) -> None:
         """Take over a new graph: robots come and go."""
         self._told = True
-        self._view = self._movable.view = view
+        self._view = self._movable.view = self._own.view = view
         self._announcements.update(view)
-        topics = (self._topics_that_count(link.robot) for link in self._links.values())
+        topics = (self._own.topics(link.robot) for link in self._links.values())
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))
         self._follow_announced()
         known = self._announcements
@@ -309,7 +309,7 @@ class Fleet:
         for name, messages in held.items():
             link = self._links.get(name)
             for message in messages.take() if link is not None else ():
-                if link is not None and self._is_from(link, message):
+                if link is not None and self._own.is_from(link, message):
                     self._answer(link, message)
         for link in self._links.values():
             if link.connected and link.publisher is None:
@@ -321,7 +321,7 @@ class Fleet:
             self._follow_announced()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
-            name = rize.ready(_mapping(message))
+            name = rize.ready(mapping_of(message))
             if name is not None:
                 self._rize.tell(name)
         for link in self._links.values():
@@ -462,7 +462,7 @@ class Fleet:
             self._leave_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])
-        self._senders.learn(self._view, self._topics_that_count(robot))
+        self._senders.learn(self._view, self._own.topics(robot))
         self._open_publisher(link)
         self.known.saw([robot])
         self.revision += 1
@@ -548,39 +548,10 @@ class Fleet:
             return False
         return True
 
-    def _topics_that_count(self, robot: Robot) -> set[str]:
-        """Where what a robot tells comes from its own program only, if that publishes there."""
-        return {robot.topics.answer, *topics_of(robot)}
-
-    def _is_from(self, link: RobotLink, message: Message) -> bool | None:
-        """Whether the robot's own program sent a message; None while that is not known.
-
-        Robots of RIZE can't be told apart: for them it is who hears their commands, or the gateway.
-        """
-        if link.identity is None and link.robot.dialect == "native":
-            return True
-        node = self._senders.node_of(message)
-        if link.robot.dialect != "native":
-            known = self._view.nodes.get(node or "")
-            is_gateway = known is None or known.generation == GATEWAY
-            return is_gateway or node in hearing(self._view, link.robot.topics.command)
-        return None if node is None or link.identity is None else node == link.identity.node_id
-
-    def _newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
-        """The newest message that counts: from the robot's own program, if that publishes the topic."""
-        if batch is None or not batch.messages:
-            return None
-        own = link.identity.node_id if link.identity is not None else ""
-        if own not in publishing(self._view, topic):
-            return _mapping(batch.messages[-1])
-        found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
-        newest = next(found, None)
-        return None if newest is None else _mapping(newest)
-
     def _read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
         answers = batches.get(link.robot.topics.answer)
         for message in answers.messages if answers is not None else ():
-            is_own = self._is_from(link, message)
+            is_own = self._own.is_from(link, message)
             if is_own:
                 self._answer(link, message)
             elif is_own is None:
@@ -588,14 +559,14 @@ class Fleet:
         for sensor in link.robot.sensors:
             if sensor.is_image:
                 continue
-            value = self._newest(link, batches.get(sensor.topic), sensor.topic)
+            value = self._own.newest(link, batches.get(sensor.topic), sensor.topic)
             if value is not None:
                 link.values[sensor.name] = value.get("value", value)
         topic = link.robot.topics.state or ""
-        link.drawing = self._newest(link, batches.get(topic), topic) or link.drawing
+        link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
 
     def _answer(self, link: RobotLink, message: Message) -> None:
-        answer = _mapping(message)
+        answer = mapping_of(message)
         if answer is not None and link.robot.dialect == "rize":
             answer = rize.from_answer(answer)
         if answer is not None:
@@ -608,11 +579,9 @@ class Fleet:
     def _take_end(self, link: RobotLink, answer: Payload) -> None:
         """Take a final answer: it ends a motion, unless the robot says that it may still move."""
         state = answer.get("state")
-        if (
-            not isinstance(state, str)
-            or state not in FINAL_STATES
-            or answer.get("op") not in (None, "invoke")
-        ):
+        if not isinstance(state, str) or state not in FINAL_STATES:
+            return
+        if answer.get("op") not in (None, "invoke"):
             return
         id, error = answer.get("id"), answer.get("error")
         if isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
@@ -627,11 +596,3 @@ class Fleet:
             link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action has not ended"))
         elif before and link.not_stopped:
             self._settled[link.name] = None
-
-
-def _mapping(message: Message) -> Payload | None:
-    try:
-        value = message.payload
-    except NepError:
-        return None
-    return value if isinstance(value, Mapping) else None

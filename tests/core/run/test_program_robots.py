@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 
+from app.core.robots.moved_robots import MovedRobots
 from app.core.run.program_robots import ProgramRobots
 from nep.programs.robots import MovingTopics, RobotControls
 
@@ -24,6 +25,7 @@ class Program:
 def test_program_is_told_of_robots_that_cannot_be_read_and_of_nothing_twice() -> None:
     fleet = SimpleNamespace(
         connected=(),
+        moved=MovedRobots(),
         moving=MovingTopics(),
         revision=1,
         link=lambda _name: None,

@@ -15,6 +15,7 @@ SETTLE_LIMIT_S = 30.0
 """Real seconds after which a history is given up as deadlocked."""
 _END = float("inf")
 _SHORTEST_S = 1e-6
+_LOOK_S = 0.0005  # real seconds between two looks whether all threads rest
 _AFTER_END_S = 0.05  # real seconds, so that threads that are being closed do not spin
 
 
@@ -46,7 +47,7 @@ class SimulatedClock:
 
     def __init__(self) -> None:
         self._now = 1000.0
-        self._lock = threading.Lock()
+        self._changed = threading.Condition()
         self._waiters: dict[int, _Waiter] = {}
         self._timers: list[_Timer] = []
         self._numbers = itertools.count()
@@ -115,14 +116,15 @@ class SimulatedClock:
             if self._has_ended and not is_ready():
                 condition.wait(_AFTER_END_S)
             while not self._has_ended and (is_frozen() or not (is_ready() or self._now >= deadline)):
-                with self._lock:
+                with self._changed:
                     self._waiters[id(waiter)] = waiter
+                    self._changed.notify_all()
                 condition.wait()
-                with self._lock:
+                with self._changed:
                     self._waiters.pop(id(waiter), None)
             return is_ready()
         finally:
-            with self._lock:
+            with self._changed:
                 self._waiters.pop(id(waiter), None)
             if not is_held:
                 condition.release()
@@ -131,7 +133,7 @@ class SimulatedClock:
 
     def wake_all(self) -> None:
         """Let every thread look again: a process goes on."""
-        with self._lock:
+        with self._changed:
             waiters = list(self._waiters.values())
         for waiter in waiters:
             waiter.wake()
@@ -142,7 +144,8 @@ class SimulatedClock:
         while not self._is_settled():
             if time.monotonic() > limit:
                 raise AssertionError(f"threads do not come to rest: {self._where()}")
-            time.sleep(0)
+            with self._changed:
+                self._changed.wait(_LOOK_S)
 
     def _where(self) -> str:
         frames = sys._current_frames()
@@ -154,7 +157,7 @@ class SimulatedClock:
         return [thread for thread in threading.enumerate() if thread.name.startswith(prefixes)]
 
     def _is_settled(self) -> bool:
-        with self._lock:
+        with self._changed:
             waiters = list(self._waiters.values())
         awake = [each for each in waiters if not each.is_frozen()]
         if any(each.deadline <= self._now or each.is_ready() for each in awake):
@@ -164,14 +167,14 @@ class SimulatedClock:
 
     def next_due(self) -> float:
         """When the next thread or timer is due."""
-        with self._lock:
+        with self._changed:
             due = [each.deadline for each in self._waiters.values() if not each.is_frozen()]
         return min([*due, *(timer.due for timer in self._timers[:1])], default=_END)
 
     def move_to(self, now: float) -> None:
         """Let it be this time; wake the threads and call the timers that are due."""
         self._now = max(self._now, now)
-        with self._lock:
+        with self._changed:
             due = [each for each in self._waiters.values() if each.deadline <= self._now]
         for waiter in due:
             waiter.wake()

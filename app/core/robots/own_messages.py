@@ -1,0 +1,62 @@
+"""Which messages count as a robot's own: those that its own program sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from app.core.network.mailbox import Batch
+from app.core.robots.robot_link import Payload, RobotLink, topics_of
+from app.robots.description.description import Robot
+from app.robots.identity import GATEWAY, Senders, hearing, publishing
+from nep.errors import NepError
+from nep.messages.message import Message
+from nep.protocol.graph_view import GraphView
+
+
+class OwnMessages:
+    """Judges messages of robots by who sent them. One thread uses it (the window's)."""
+
+    def __init__(self, senders: Senders) -> None:
+        """``senders`` know the nodes of publishers."""
+        self._senders = senders
+        self.view = GraphView(0, 0)
+        """The newest graph."""
+
+    @staticmethod
+    def topics(robot: Robot) -> set[str]:
+        """Topics on which only the robot's own program counts, if it publishes there."""
+        return {robot.topics.answer, *topics_of(robot)}
+
+    def is_from(self, link: RobotLink, message: Message) -> bool | None:
+        """Return whether the robot's own program sent a message; None while that is not known.
+
+        Robots of RIZE can't be told apart: for them it is who hears their commands, or the gateway.
+        """
+        if link.identity is None and link.robot.dialect == "native":
+            return True
+        node = self._senders.node_of(message)
+        if link.robot.dialect != "native":
+            known = self.view.nodes.get(node or "")
+            is_gateway = known is None or known.generation == GATEWAY
+            return is_gateway or node in hearing(self.view, link.robot.topics.command)
+        return None if node is None or link.identity is None else node == link.identity.node_id
+
+    def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
+        """Return the newest message that counts: of the robot's own program, if that publishes the topic."""
+        if batch is None or not batch.messages:
+            return None
+        own = link.identity.node_id if link.identity is not None else ""
+        if own not in publishing(self.view, topic):
+            return mapping_of(batch.messages[-1])
+        found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
+        newest = next(found, None)
+        return None if newest is None else mapping_of(newest)
+
+
+def mapping_of(message: Message) -> Payload | None:
+    """Return the payload when it can be decoded and is a mapping, else None."""
+    try:
+        value = message.payload
+    except NepError:
+        return None
+    return value if isinstance(value, Mapping) else None
