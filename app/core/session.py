@@ -167,14 +167,7 @@ class Session:
         self.alarms, self.acting, self.recordings = (
             SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
             SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
-            SessionRecordings(
-                self.settings,
-                self.alerts,
-                self.address,
-                self._mailbox.post_event,
-                clock=clock,
-                reads_apart=start_processes,
-            ),
+            self._new_recordings(),
         )
         self._connect_parts()
         self.graph: GraphView | None = None
@@ -185,6 +178,10 @@ class Session:
         self._reachable: tuple[StopTarget, ...] = ()
         self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
         self._learning = MasterChange()
+
+    def _new_recordings(self) -> SessionRecordings:
+        given = self.settings, self.alerts, self.address, self._mailbox.post_event
+        return SessionRecordings(*given, clock=self._clock, reads_apart=self._start_processes)
 
     def _connect_parts(self) -> None:
         self.runs.coming, self.runs.also_stops = (lambda: self.coming), self.acting.disarm
@@ -228,15 +225,10 @@ class Session:
         live = self.live
         self._end_replay()
         self._live = live
-        opened = replay_module.Replay(
-            path,
-            self.settings,
-            self.alerts,
-            clock=self._clock,
-            acting=self.acting,
-            opener=self.recordings.new_opener(),
+        opener = self.recordings.new_opener()
+        opened = self.replay = replay_module.Replay(
+            path, self.settings, self.alerts, clock=self._clock, acting=self.acting, opener=opener
         )
-        self.replay = opened
         self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
         self.images, self.series, self.graph = opened.images, opened.series, None
         self.sources_shown += 1
