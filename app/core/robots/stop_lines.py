@@ -105,8 +105,10 @@ class StopWay:
         if self.subscriber is None or program is None:
             is_there = self.subscriber is None or self.publisher.subscribers > 0
         else:
-            is_expected = program.node_id in hearers and program.node not in self.publisher.missing
-            is_there = is_expected and self.publisher.subscribers > 0
+            # By name: one that hung and was started anew may still be missing, although all are connected.
+            connected, missing = self.publisher.subscribers, self.publisher.missing
+            is_complete = program.node not in missing or connected >= len(hearers)
+            is_there = program.node_id in hearers and connected > 0 and is_complete
         self.was_connected |= is_there
         return is_there
 

@@ -489,6 +489,7 @@ class NativePublisher(GreetedPublisher):
             own = self._subscriptions.note(event.bytes, self._count, partial(FarConnection.of, event))
             # First: whoever gets the echo may rely on being counted.
             self.subscribers = len(self._seen)
+            self._waited.difference_update(self._seen)  # whoever has connected may leave again
             self.is_heard = self._subscriptions.is_there
             self._batch.allow(reads_batches=self._subscriptions.reads_batches)
             if own is not None:

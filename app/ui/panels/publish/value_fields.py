@@ -64,11 +64,8 @@ class ValueFields(QWidget):
         field = QLineEdit()
         field.setMinimumWidth(round(self._theme.scaled(FIELD_PX)))
         field.setAccessibleName(_("Value of {name}").format(name=name))
-        field.setToolTip(
-            plain.tip(
-                _("A number such as 12.5 or 12,5, JSON such as true, or text. Quotes make a number text.")
-            )
-        )
+        hint = _("A number such as 12.5 or 12,5, JSON such as true, or text. Quotes make a number text.")
+        field.setToolTip(plain.tip(hint))
         field.setProperty("focusRadius", self._theme.radius("control"))
         EditMenu(self._theme, field)
         field.textEdited.connect(lambda text, name=name: self.typed.emit(name, text))
