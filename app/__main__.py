@@ -35,7 +35,7 @@ PROCESSES = (
     "app.ui.speaker",
     "nep",
     "nep.recordings.child",
-    "nep.recordings.reader_process",
+    "nep.recordings.apart.reader_process",
 )
 
 GRACE_S = 5.0

@@ -23,10 +23,10 @@ from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOTS, VirtualProcesses
-from app.core.robots.motion_permission import risky, wanted_by
-from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_lines import StopTarget
-from app.core.robots.stop_report import StopReport
+from app.core.robots.motion.permission import risky, wanted_by
+from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.report import StopReport
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner, RunnerEvent
 from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse

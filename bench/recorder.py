@@ -37,10 +37,10 @@ from mcap.writer import Writer
 
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.message import Message, arrived, kind_of
-from nep.recordings.destination import WriterLimits
-from nep.recordings.mcap_file import FileWriter
+from nep.recordings.formats.destination import WriterLimits
+from nep.recordings.formats.mcap_file import FileWriter
+from nep.recordings.formats.records import ChunkInfo
 from nep.recordings.reader import Recording
-from nep.recordings.records import ChunkInfo
 from nep.recordings.ring import FlightRecorder
 from nep.recordings.writer import RecordingWriter
 

@@ -1,8 +1,8 @@
 """How long Stop takes until every robot has answered: three robots in processes of their own, all moving.
 
 ``python bench/stop.py [--stops 60] [--robots 3]``: each round lets every robot move, presses Stop as Studio
-does (`app.core.robots.stop.RobotStopper`, one stop to all), and takes the time to the last answer. It means
-that the robot stands still: its stop method has returned and all its functions have ended. The row "sent and
+does (`app.core.robots.stop.stopper.RobotStopper`, one stop to all), and takes the time to the last answer. It
+means that the robot stands still: its stop method has returned and all its functions have ended. The row "sent and
 echoed" is the same way over the wire with an answer that costs nothing, in the same rounds.
 """
 
@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import nep
-from app.core.robots.stop import RobotStopper
+from app.core.robots.stop.stopper import RobotStopper
 from app.robots.description.description import Robot, parse
 
 ROOT = Path(__file__).resolve().parents[1]

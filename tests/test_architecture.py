@@ -40,7 +40,7 @@ SMALL_LINES = 60
 EARNED = {
     "app.core.graph.dot": "pure, and tested alone",
     "app.core.robots.awaited": "pure, and tested alone",
-    "app.core.robots.bridged_commands": "pure, and tested alone",
+    "app.core.robots.motion.bridged_commands": "pure, and tested alone",
     "nep.programs.alarms.losses": "pure, and tested alone",
     "nep.programs.blackboard.ages": "pure, and tested alone",
     "nep.cli.doctor": "one of a list: the commands of nep",

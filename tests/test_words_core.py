@@ -24,9 +24,9 @@ from app.core.network.topics import Topic, Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, Health
 from app.core.robots.health_facts import facts_of
-from app.core.robots.motion_permission import MayNotMoveError, Question
+from app.core.robots.motion.permission import MayNotMoveError, Question
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop_report import RobotStop, StopReport, not_reached
+from app.core.robots.stop.report import RobotStop, StopReport, not_reached
 from app.core.run.view import RunState, clock_words, stop_words, view_of
 from app.errors import DocumentError
 from app.robots import simulated

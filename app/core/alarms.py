@@ -15,8 +15,8 @@ from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
 from app.core.network.watches import Watch
 from app.core.robots.fleet import Fleet
-from app.core.robots.motion_permission import Question
-from app.core.robots.moved_robots import OnMoved, ignore_moved
+from app.core.robots.motion.permission import Question
+from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically

@@ -48,15 +48,15 @@ from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
 from app.core.recording.client import RecorderGone, RecorderSaid
 from app.core.recording.recordings import SessionRecordings
-from app.core.robots.bridged_commands import BridgedCommands
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import ASK_DOCTOR, Health
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
+from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.core.robots.room import SessionRoom
-from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_lines import StopTarget
-from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.robots.voices import RobotVoices
 from app.core.run.acting.acting import SessionActing
 from app.core.run.control import Runs

@@ -37,9 +37,10 @@ from nep.text import quotable
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from nep.recordings import damage, player, reader
+    from nep.recordings import player, reader
+    from nep.recordings.formats import damage
 else:  # the other commands need not wait for it, nor have what it needs
-    damage = lazy_module("nep.recordings.damage")
+    damage = lazy_module("nep.recordings.formats.damage")
     player = lazy_module("nep.recordings.player")
     reader = lazy_module("nep.recordings.reader")
 

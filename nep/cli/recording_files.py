@@ -20,9 +20,10 @@ from nep.system.lazy_import import lazy_module
 from nep.text import quotable
 
 if TYPE_CHECKING:
-    from nep.recordings import damage, reader
+    from nep.recordings import reader
+    from nep.recordings.formats import damage
 else:  # the other commands need not wait for it, nor have what it needs
-    damage = lazy_module("nep.recordings.damage")
+    damage = lazy_module("nep.recordings.formats.damage")
     reader = lazy_module("nep.recordings.reader")
 
 __all__ = [

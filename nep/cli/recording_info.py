@@ -17,7 +17,8 @@ from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
 
 if TYPE_CHECKING:
-    from nep.recordings import figures, file_reader, reader
+    from nep.recordings import file_reader, reader
+    from nep.recordings.formats import figures
 else:  # the other commands need not wait for it, nor have what it needs
     file_reader = lazy_module("nep.recordings.file_reader")
     reader = lazy_module("nep.recordings.reader")

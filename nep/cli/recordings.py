@@ -26,12 +26,13 @@ from nep.i18n import _, ngettext, number
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from nep.recordings import damage, reader
     from nep.recordings import export as exports
+    from nep.recordings import reader
     from nep.recordings import repair as repairs
+    from nep.recordings.formats import damage
 else:  # the other commands need not wait for it, nor have what it needs
     exports = lazy_module("nep.recordings.export")
-    damage = lazy_module("nep.recordings.damage")
+    damage = lazy_module("nep.recordings.formats.damage")
     reader = lazy_module("nep.recordings.reader")
     repairs = lazy_module("nep.recordings.repair")
 

@@ -16,7 +16,7 @@ import orjson
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.destination import disk_sentence
+from nep.recordings.formats.destination import disk_sentence
 from nep.recordings.reader import Recording
 from nep.system.replace_file import replace_file
 

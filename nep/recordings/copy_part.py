@@ -13,11 +13,11 @@ import orjson
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.channels import ChannelDecoder, encoding_of, own_channel
-from nep.recordings.figures import TopicCounter, changed
-from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.formats.channels import ChannelDecoder, encoding_of, own_channel
+from nep.recordings.formats.figures import TopicCounter, changed
+from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.formats.records import RawMessage
 from nep.recordings.reader import Recording
-from nep.recordings.records import RawMessage
 
 __all__ = ["copy_part"]
 

@@ -20,8 +20,8 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
-from nep.recordings.destination import disk_sentence
 from nep.recordings.film import Container, Film, container_there, frame_of
+from nep.recordings.formats.destination import disk_sentence
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.system.replace_file import replace_file
 

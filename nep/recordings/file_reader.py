@@ -1,7 +1,7 @@
 """FileReader: messages of a recording as they lie in it, from any time on, with bounded memory.
 
 It knows channels and bytes, not topics and messages (`nep.recordings.reader`), so it can run in another
-process (`nep.recordings.remote`).
+process (`nep.recordings.apart.remote`).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 from nep.errors import ClosedError
-from nep.recordings.channels import ChannelDefinition
-from nep.recordings.compression import check_packages
-from nep.recordings.destination import disk_sentence
-from nep.recordings.index import AttachedFile, Damage, FileIndex, read_chunk, read_entries, read_index
-from nep.recordings.limits import ReadBudget
-from nep.recordings.records import ChunkInfo, RawMessage, messages_in
+from nep.recordings.formats.channels import ChannelDefinition
+from nep.recordings.formats.compression import check_packages
+from nep.recordings.formats.destination import disk_sentence
+from nep.recordings.formats.index import AttachedFile, Damage, FileIndex, read_chunk, read_entries, read_index
+from nep.recordings.formats.limits import ReadBudget
+from nep.recordings.formats.records import ChunkInfo, RawMessage, messages_in
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import orjson
 
 from nep.messages.message import Message
-from nep.recordings.channels import ChannelDecoder, ChannelDefinition, Role
-from nep.recordings.figures import TopicFigures, read_figures
 from nep.recordings.file_reader import CACHE_BYTES, FileFacts, FileReader, RawFile
-from nep.recordings.index import Damage
-from nep.recordings.records import RawMessage
+from nep.recordings.formats.channels import ChannelDecoder, ChannelDefinition, Role
+from nep.recordings.formats.figures import TopicFigures, read_figures
+from nep.recordings.formats.index import Damage
+from nep.recordings.formats.records import RawMessage
 
 if TYPE_CHECKING:
     from typing_extensions import Self

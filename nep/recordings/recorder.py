@@ -17,7 +17,7 @@ from nep.programs.robots.moving import DESCRIPTION_TYPE
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_glob import glob_matches, is_glob, widened
 from nep.protocol.wire import check_topic
-from nep.recordings.channels import Role
+from nep.recordings.formats.channels import Role
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -19,13 +19,13 @@ import orjson
 
 from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
-from nep.recordings.channels import ChannelDecoder
-from nep.recordings.compression import check_packages, decompressed, decompressed_part
-from nep.recordings.destination import disk_sentence
-from nep.recordings.index import MOST_SMALL_BYTES, Definitions, RecordCounter, read_chunk, read_index
-from nep.recordings.limits import open_budget
-from nep.recordings.mcap_file import ChannelTable, FileWriter
-from nep.recordings.records import (
+from nep.recordings.formats.channels import ChannelDecoder
+from nep.recordings.formats.compression import check_packages, decompressed, decompressed_part
+from nep.recordings.formats.destination import disk_sentence
+from nep.recordings.formats.index import MOST_SMALL_BYTES, Definitions, RecordCounter, read_chunk, read_index
+from nep.recordings.formats.limits import open_budget
+from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
+from nep.recordings.formats.records import (
     CHUNK_HEAD_BYTES,
     HEAD_BYTES,
     MAGIC,
@@ -41,7 +41,7 @@ from nep.recordings.records import (
     read_message_index,
     read_record,
 )
-from nep.recordings.walk import Place
+from nep.recordings.formats.walk import Place
 from nep.system.replace_file import replace_file
 
 __all__ = ["RepairReport", "repair", "repaired_path"]

@@ -22,12 +22,12 @@ import psutil
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.messages.message import Message
-from nep.recordings.channels import Role
-from nep.recordings.compression import decompressed
-from nep.recordings.destination import USUAL_LIMITS, WriterLimits, disk_sentence
-from nep.recordings.figures import TopicFigures, read_figures
-from nep.recordings.mcap_file import ChannelTable, FileWriter
-from nep.recordings.records import (
+from nep.recordings.formats.channels import Role
+from nep.recordings.formats.compression import decompressed
+from nep.recordings.formats.destination import USUAL_LIMITS, WriterLimits, disk_sentence
+from nep.recordings.formats.figures import TopicFigures, read_figures
+from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
+from nep.recordings.formats.records import (
     HEAD_BYTES,
     ChunkInfo,
     Opcode,

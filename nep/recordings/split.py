@@ -6,8 +6,8 @@ from pathlib import Path
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_sentence
-from nep.recordings.mcap_file import ChannelTable, FileWriter
+from nep.recordings.formats.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_sentence
+from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 
 __all__ = ["MIN_PART_BYTES", "SplitFiles", "part_path"]
 

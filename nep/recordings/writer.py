@@ -23,16 +23,16 @@ import orjson
 from nep.errors import ClosedError, RecordingError
 from nep.i18n import _
 from nep.messages.message import Message, MessageKind
-from nep.recordings.channels import (
+from nep.recordings.formats.channels import (
     Encoding,
     Role,
     definition_of,
     encoding_of,
     own_channel,
 )
-from nep.recordings.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_sentence
-from nep.recordings.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
-from nep.recordings.mcap_file import CHUNK_BYTES, FileWriter
+from nep.recordings.formats.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_sentence
+from nep.recordings.formats.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
+from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -26,7 +26,7 @@ def session(master: Master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
     Robots have longer than a second to answer a stop: on a busy computer they may need it.
     """
-    monkeypatch.setattr("app.core.robots.stop.STOP_TIMEOUT_S", 3.0)
+    monkeypatch.setattr("app.core.robots.stop.stopper.STOP_TIMEOUT_S", 3.0)
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
     made = Session(
         Settings(tmp_path),

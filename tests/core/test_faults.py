@@ -15,7 +15,7 @@ import nep
 from app.core import faults
 from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_words
 from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound
-from app.core.robots.stop_report import StopDone, StopReport
+from app.core.robots.stop.report import StopDone, StopReport
 from app.core.run.runner import RunnerEvent
 from app.core.session import Session
 from app.core.storage.settings import Settings

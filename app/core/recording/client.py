@@ -23,7 +23,7 @@ from app.core.alerts import Alerts
 from app.core.own_process import module_command
 from nep.i18n import _, ngettext
 from nep.masters.process import NO_CONSOLE
-from nep.recordings.figures import TopicFigures, read_figures
+from nep.recordings.formats.figures import TopicFigures, read_figures
 
 LOW_DISK_BYTES = 1_000_000_000
 """With less of it free on the disk a person is warned; with 200 MB the recorder ends by itself."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import NepError
 from nep.i18n import _, ngettext
-from nep.recordings.damage import damage_words
 from nep.recordings.export import ALL_OF_IT, Exported, Part, export
+from nep.recordings.formats.damage import damage_words
 
 
 class _CancelledError(Exception):

@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Protocol
 
 from app.core.own_process import module_command
+from nep.recordings.apart.remote import ReaderProcess
 from nep.recordings.file_reader import CACHE_BYTES, FileReader
-from nep.recordings.limits import ReadBudget
+from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.reader import Recording
-from nep.recordings.remote import ReaderProcess
 
 __all__ = ["LocalOpener", "RecordingOpener", "process_opener"]
 
 
 class RecordingOpener(Protocol):
-    """Opens recordings. See `nep.recordings.remote.ReaderProcess`."""
+    """Opens recordings. See `nep.recordings.apart.remote.ReaderProcess`."""
 
     def open(
         self,
@@ -37,7 +37,7 @@ class RecordingOpener(Protocol):
 
 def process_opener() -> RecordingOpener:
     """Return what reads recordings in a process of its own, which is started with the first one."""
-    return ReaderProcess(module_command("nep.recordings.reader_process"))
+    return ReaderProcess(module_command("nep.recordings.apart.reader_process"))
 
 
 class LocalOpener:

@@ -13,14 +13,14 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.known import KnownRobots
-from app.core.robots.motion_gate import MotionGate, MovableRobots
-from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
-from app.core.robots.moved_robots import MovedRobots
+from app.core.robots.motion.gate import MotionGate, MovableRobots
+from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.robots.own_messages import OwnMessages, mapping_of
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
-from app.core.robots.stop_lines import MOST_TOPICS, StopTarget
-from app.core.robots.stop_reach import targets_of, unlisted_targets
-from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, StopReport
+from app.core.robots.stop.lines import MOST_TOPICS, StopTarget
+from app.core.robots.stop.moved_robots import MovedRobots
+from app.core.robots.stop.reach import targets_of, unlisted_targets
+from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, StopReport
 from app.core.robots.tries import Tries
 from app.core.storage.settings import Settings
 from app.errors import AppError, RobotInputError, RobotUnknownError

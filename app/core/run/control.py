@@ -18,10 +18,10 @@ from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.faults import log_errors
 from app.core.robots.fleet import Fleet
-from app.core.robots.motion_permission import wanted_by
-from app.core.robots.stop import STOP_TIMEOUT_S as STOP_TIMEOUT_S
-from app.core.robots.stop import RobotStopper, report_of
-from app.core.robots.stop_report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
+from app.core.robots.motion.permission import wanted_by
+from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
+from app.core.robots.stop.stopper import STOP_TIMEOUT_S as STOP_TIMEOUT_S
+from app.core.robots.stop.stopper import RobotStopper, report_of
 from app.core.run.asking import Asking
 from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun

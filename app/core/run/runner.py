@@ -198,7 +198,7 @@ class Runner:
     def stop(self) -> None:
         """End the program: it is asked, and killed if it has not ended at once. It is gone within 100 ms.
 
-        Works in every state and from any thread. Its robots are another matter: `app.core.robots.stop`.
+        Works in every state and from any thread. `app.core.robots.stop.stopper` stops its robots.
         """
         child = self._child
         if child is None:

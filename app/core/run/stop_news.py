@@ -7,7 +7,7 @@ import time
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.robots.fleet import Fleet
-from app.core.robots.stop_report import StopReport
+from app.core.robots.stop.report import StopReport
 from app.core.run.view import STOP_AGAIN, clock_words, result_words, stop_words, unanswered_words
 from nep.i18n import _
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop_report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport, StopStatus
+from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport, StopStatus
 from nep.i18n import _, lazy, listed, ngettext, number
 
 MOST_NAMED = 4

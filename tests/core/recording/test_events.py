@@ -9,7 +9,7 @@ import pytest
 
 from app.core.recording import events as events_module
 from app.core.recording.events import RecordedEvents
-from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState
 from app.core.session import Session
 from app.core.storage.settings import Settings

@@ -16,8 +16,8 @@ from app.core.recording.replay.replay import FAILED, Replay
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.errors import RecordingError, RecordingTooLargeError
+from nep.recordings.apart.remote import ReaderProcess
 from nep.recordings.reader import Recording
-from nep.recordings.remote import ReaderProcess
 from tests.nep.programs import eventually
 from tests.nep.recordings import hostile
 from tests.nep.recordings.messages import json_message, record

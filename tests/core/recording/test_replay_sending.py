@@ -9,8 +9,8 @@ import pytest
 import nep
 from app.core.recording.replay.sending import LATE_S, ReplayOutbox, ReplayRoute, sent_words
 from app.core.recording.replay.source import ReplaySource
-from app.core.robots.motion_gate import MotionGate
-from app.core.robots.motion_permission import MotionPermission
+from app.core.robots.motion.gate import MotionGate
+from app.core.robots.motion.permission import MotionPermission
 from app.core.run.acting.arming import MOST_NAMES, Arming, Target
 from app.core.session import Session
 from app.robots.description.description import parse

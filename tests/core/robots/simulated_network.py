@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from app.core.network.source import GraphSeen, Job, Sink
-from app.core.robots.stop import RobotStopper
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.identity import DESCRIPTION_TYPE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.robots.bridged_commands import BridgedCommands
+from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.robots.description.description import parse, td_for
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, PublisherInfo, TopicInfo
 from tests.core.robots.stop_model.robots import ROVER

@@ -10,8 +10,8 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.robots.motion_gate import MotionGate
-from app.core.robots.motion_permission import MotionPermission
+from app.core.robots.motion.gate import MotionGate
+from app.core.robots.motion.permission import MotionPermission
 from app.core.run.acting.sending import SendOrder
 from app.core.run.acting.shelf import KeptMessage
 from app.core.session import Session

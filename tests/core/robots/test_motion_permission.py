@@ -9,7 +9,7 @@ import pytest
 
 from app.blocks.compiler.compiler import asked_actions
 from app.blocks.model.program import Program
-from app.core.robots.motion_permission import MayNotMoveError, MotionPermission, risky, wanted_by
+from app.core.robots.motion.permission import MayNotMoveError, MotionPermission, risky, wanted_by
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.moved_robots import MAX_MOTIONS, MovedRobots
+from app.core.robots.stop.moved_robots import MAX_MOTIONS, MovedRobots
 from app.robots.identity import Identity
 
 OLD, NEW = Identity("old", "driver"), Identity("new", "driver")

@@ -10,9 +10,9 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_lines import StopTarget
-from app.core.robots.stop_report import RobotStop, StopReport, not_reached
+from app.core.robots.stop.lines import StopTarget
+from app.core.robots.stop.report import RobotStop, StopReport, not_reached
+from app.core.robots.stop.stopper import RobotStopper
 from app.robots.description.description import RobotTopics
 from app.robots.identity import first_to_announce, identity_of
 from nep.errors import AddressInUseError

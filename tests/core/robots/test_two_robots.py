@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 import nep
-from app.core.robots.motion_permission import MayNotMoveError
+from app.core.robots.motion.permission import MayNotMoveError
 from app.core.session import Session
 from app.robots import simulated, turtle
 from app.robots.driver.driver import Driver

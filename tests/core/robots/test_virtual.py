@@ -17,7 +17,7 @@ import pytest
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
 from app.core.robots.launcher import VirtualProcesses
-from app.core.robots.motion_permission import MayNotMoveError, MotionPermission
+from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.stop_report import StopReport
+from app.core.robots.stop.report import StopReport
 from app.core.robots.voices import LONGEST_S, MOST_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
 from app.core.storage.settings import Settings
 from app.robots.description.description import parse, td_for

@@ -8,8 +8,8 @@ from typing import cast
 
 import pytest
 
-from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_report import OneStopped, StopDone, StopReport
+from app.core.robots.stop.report import OneStopped, StopDone, StopReport
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
 from app.core.session import Session
 from app.core.storage.settings import Settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 
-from app.core.robots.moved_robots import MovedRobots
+from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.run.program_robots import ProgramRobots
 from nep.programs.robots import MovingTopics, RobotControls
 

@@ -7,8 +7,8 @@ import pytest
 
 import nep
 from app.blocks.compiler.compiler import compile_behaviour
-from app.core.robots.stop import RobotStopper
-from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.stop.report import RobotStop, StopReport
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
 from tests.blocks.fakes import until
 from tests.blocks.samples import block, number, say, started, workspace

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState, seconds, stop_words, view_of
 
 PEPPER = RobotStop("Pepper", True, 38.2)

@@ -12,7 +12,7 @@ import numpy as np
 
 from nep.messages import image_codec
 from nep.messages.message import Message
-from nep.recordings.destination import WriterLimits
+from nep.recordings.formats.destination import WriterLimits
 from nep.recordings.writer import RecordingWriter
 
 START_NS = 1_790_000_000_000_000_000

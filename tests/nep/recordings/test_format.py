@@ -16,11 +16,11 @@ from mcap.stream_reader import StreamReader
 
 from nep.geometry import PoseStamped
 from nep.messages.message import Message
-from nep.recordings.channels import ChannelDecoder, definition_of, encoding_of
-from nep.recordings.protobuf import SCHEMAS, descriptor_set, fields
+from nep.recordings.formats.channels import ChannelDecoder, definition_of, encoding_of
+from nep.recordings.formats.protobuf import SCHEMAS, descriptor_set, fields
+from nep.recordings.formats.records import RawMessage
+from nep.recordings.formats.schemas import ANY_OBJECT, json_schema, schema_of
 from nep.recordings.reader import Recording
-from nep.recordings.records import RawMessage
-from nep.recordings.schemas import ANY_OBJECT, json_schema, schema_of
 from tests.nep.recordings.mcap_doctor import McapDoctor
 from tests.nep.recordings.messages import START_NS, json_message, kept, odd_messages, picture, record
 

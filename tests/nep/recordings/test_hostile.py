@@ -12,11 +12,11 @@ import pytest
 
 from nep.errors import RecordingError, RecordingTooLargeError
 from nep.messages.message import Message
-from nep.recordings.damage import damage_words
 from nep.recordings.export import export
 from nep.recordings.file_reader import FileReader
-from nep.recordings.index import read_index
-from nep.recordings.limits import ReadBudget, open_budget
+from nep.recordings.formats.damage import damage_words
+from nep.recordings.formats.index import read_index
+from nep.recordings.formats.limits import ReadBudget, open_budget
 from nep.recordings.reader import Recording
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings import hostile

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.errors import ClosedError, RecordingError
-from nep.recordings.mcap_file import FileWriter
+from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from tests.nep.recordings.messages import START_NS, STEP_NS, json_message, kept, limits, picture, record
 

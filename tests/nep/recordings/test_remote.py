@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from nep.errors import ClosedError, RecordingError, RecordingTooLargeError
-from nep.recordings.frames import read_frame, write_frame
+from nep.recordings.apart.frames import read_frame, write_frame
+from nep.recordings.apart.reader_process import RecordingService
+from nep.recordings.apart.remote import ReaderProcess
 from nep.recordings.reader import Recording
-from nep.recordings.reader_process import RecordingService
-from nep.recordings.remote import ReaderProcess
 from tests.nep.recordings import hostile
 from tests.nep.recordings.messages import kept, odd_messages, record
 
-COMMAND = [sys.executable, "-m", "nep.recordings.reader_process"]
+COMMAND = [sys.executable, "-m", "nep.recordings.apart.reader_process"]
 DIES = [sys.executable, "-c", "import sys; sys.stdin.buffer.read(4)"]
 NEVER_ANSWERS = [sys.executable, "-c", "import time; time.sleep(600)"]
 

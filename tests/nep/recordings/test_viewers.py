@@ -21,11 +21,11 @@ from mcap.reader import make_reader
 from nep import geometry, sensor
 from nep.messages.message import Message
 from nep.recordings.export import export
-from nep.recordings.protobuf import fields
+from nep.recordings.formats.protobuf import fields
+from nep.recordings.formats.schemas import json_schema
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
 from nep.recordings.ring import FlightRecorder
-from nep.recordings.schemas import json_schema
 from tests.nep.recordings.messages import START_NS, TestClock, json_message, limits, odd_messages, record
 
 PLAIN = {"boolean", "string", "number", "integer"}

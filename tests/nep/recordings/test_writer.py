@@ -15,8 +15,8 @@ import pytest
 from nep.errors import RecordingError
 from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import Message, arrived, kind_of
-from nep.recordings.figures import MOST_LOST
-from nep.recordings.mcap_file import FileWriter
+from nep.recordings.formats.figures import MOST_LOST
+from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
 from nep.recordings.writer import RecordingWriter
@@ -217,7 +217,7 @@ def test_a_disk_that_is_really_full(tmp_path):
 def test_it_ends_by_itself_and_whole_before_the_disk_is_full(tmp_path, monkeypatch):
     path, free = tmp_path / "a.mcap", [1000]
     monkeypatch.setattr(
-        "nep.recordings.destination.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
+        "nep.recordings.formats.destination.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
     )
     writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=1000, figures_s=0.001))
     writer.post([json_message(1)])
@@ -271,7 +271,7 @@ def test_numbers_at_random_end_no_recording(tmp_path):
 
 
 def test_a_disk_that_is_full_from_the_beginning_has_no_empty_file(tmp_path, monkeypatch):
-    monkeypatch.setattr("nep.recordings.mcap_file.MAGIC", FailingBytes())
+    monkeypatch.setattr("nep.recordings.formats.mcap_file.MAGIC", FailingBytes())
     with pytest.raises(RecordingError, match="disk is full"):
         RecordingWriter(tmp_path / "a.mcap")
     assert not list(tmp_path.iterdir())
@@ -305,7 +305,7 @@ def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_p
 
 
 def test_with_too_many_channels_what_is_left_out_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr("nep.recordings.mcap_file.MOST_CHANNELS", 5)
+    monkeypatch.setattr("nep.recordings.formats.mcap_file.MOST_CHANNELS", 5)
     monkeypatch.setattr("nep.recordings.writer.MOST_ONES_CHANNELS", 2)
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:

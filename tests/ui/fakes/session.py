@@ -22,7 +22,7 @@ from app.core.network.master import MasterState
 from app.core.network.topics import Topic
 from app.core.robots.fleet import COMMAND_TYPE
 from app.core.robots.robot_link import RobotLink, topics_of
-from app.core.robots.stop_report import StopReport
+from app.core.robots.stop.report import StopReport
 from app.core.robots.voices import RobotVoices
 from app.core.run.control import Runs
 from app.core.run.runner import RunnerEvent

@@ -10,7 +10,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
-from app.core.robots.motion_permission import MotionPermission
+from app.core.robots.motion.permission import MotionPermission
 from app.core.storage.settings import Settings
 from app.robots.description.description import Robot, parse, td_for
 from app.robots.turtle import ROBOT

@@ -14,8 +14,8 @@ from app import resources
 from app.core.alerts import Alerts
 from app.core.messages import snapshots
 from app.core.network.remote_access import RemoteAccess
-from app.core.robots.motion_permission import MotionPermission
-from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.motion.permission import MotionPermission
+from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
 from app.core.storage.settings import Settings

@@ -27,8 +27,8 @@ from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.recordings.bookmarks import Bookmark
-from nep.recordings.damage import damage_words
-from nep.recordings.figures import TopicFigures
+from nep.recordings.formats.damage import damage_words
+from nep.recordings.formats.figures import TopicFigures
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 

@@ -15,7 +15,7 @@ from app.core.documents.background_worker import BackgroundWorker
 from app.core.faults import error_words
 from app.core.network.source import Job
 from app.core.recording.replay.opening import OpenedRecording
-from app.core.robots.motion_gate import MotionGate
+from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import MOST_NAMES, Arming, Target
 from nep.errors import BadTopicError, NepError

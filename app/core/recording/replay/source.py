@@ -21,7 +21,7 @@ from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError, RecordingError
 from nep.messages.message import Message, new_message
-from nep.recordings.index import Damage
+from nep.recordings.formats.index import Damage
 from nep.recordings.player import Due, Playback, PlayerStatus
 from nep.recordings.reader import Recording
 

@@ -18,7 +18,7 @@ from app.core.console import Console
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.network.source import Source
 from app.core.robots.fleet import Fleet
-from app.core.robots.moved_robots import OnMoved, ignore_moved
+from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.run.acting.arming import ARMED_S, Arming, Target
 from app.core.run.acting.calling import CallRecord, ServiceCalls
 from app.core.run.acting.json_text import read_json

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from app.core.faults import error_words
 from app.core.network.source import Job
-from app.core.robots.motion_gate import MotionGate
+from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.arming import Arming, Target
 from app.core.run.acting.json_text import pretty
 from app.core.run.acting.sent_log import KEPT_BYTES, Asker

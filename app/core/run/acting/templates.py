@@ -11,7 +11,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
-from nep.recordings.schemas import schema_of
+from nep.recordings.formats.schemas import schema_of
 
 WRITTEN = frozenset({"json", "msgpack", "string"})
 """The codecs whose messages can be written by hand."""

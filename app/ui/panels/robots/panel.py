@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.robots.motion_permission import MayNotMoveError
+from app.core.robots.motion.permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, InputProblem, RobotInputError
 from app.ui.panels.base import Panel, PanelContext

@@ -8,7 +8,7 @@ from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QFont, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.robots.stop_report import StopStatus
+from app.core.robots.stop.report import StopStatus
 from app.core.run.view import RESTART, RunView
 from app.ui.shell.actions.actions import Actions
 from app.ui.text import plain

@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QApplication, QGraphicsDropShadowEffect, QHBoxLayout, QVBoxLayout, QWidget
 from shiboken6 import isValid
 
-from app.core.robots.motion_permission import MotionPermission
+from app.core.robots.motion.permission import MotionPermission
 from app.errors import SettingsError
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon

@@ -11,7 +11,7 @@ import orjson
 
 from app.blocks.model.program import Program
 from app.core.network.source import GraphSeen, MasterFound
-from app.core.robots.stop import RobotStopper
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.acting.arming import Target
 from app.core.run.acting.shelf import KeptMessage
 from app.core.run.runner import RunnerEvent

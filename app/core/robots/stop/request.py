@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop_lines import StopLine
-from app.core.robots.stop_report import RobotStop
+from app.core.robots.stop.lines import StopLine
+from app.core.robots.stop.report import RobotStop
 from app.robots.description.description import RobotTopics
 from app.robots.held_messages import HeldMessages
 from nep.errors import NepError

@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from nep.recordings.channels import ChannelDefinition
-from nep.recordings.compression import check_packages, compressed
-from nep.recordings.records import (
+from nep.recordings.formats.channels import ChannelDefinition
+from nep.recordings.formats.compression import check_packages, compressed
+from nep.recordings.formats.records import (
     MAGIC,
     ChunkInfo,
     Opcode,

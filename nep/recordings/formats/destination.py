@@ -10,7 +10,7 @@ from typing import Protocol
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.mcap_file import FileWriter
+from nep.recordings.formats.mcap_file import FileWriter
 
 __all__ = ["USUAL_LIMITS", "Destination", "OneFile", "WriterLimits", "disk_sentence"]
 

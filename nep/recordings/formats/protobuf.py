@@ -10,7 +10,7 @@ bytes. JSON would need base64: a third more, and 0.8 ms for each picture. Four m
     nep.Bytes                   data 1 (bytes)
 
 Each may have the field 1000, unknown to others: a msgpack map of what a channel does not tell of it
-(`nep.recordings.channels`). It stands before the data.
+(`nep.recordings.formats.channels`). It stands before the data.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nep.i18n import _, ngettext, number
-from nep.recordings.index import Damage
+from nep.recordings.formats.index import Damage
 
 __all__ = ["damage_words"]
 

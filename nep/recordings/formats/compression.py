@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from nep.errors import RecordingsUnavailableError
-from nep.recordings.limits import max_chunk_bytes
+from nep.recordings.formats.limits import max_chunk_bytes
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     import lz4.frame as lz4_frame  # type: ignore[import-untyped]
     import zstandard
 
-    from nep.recordings.records import ChunkHead
+    from nep.recordings.formats.records import ChunkHead
 else:  # programs that record nothing need not have them
     lz4_frame = lazy_module("lz4.frame")
     zstandard = lazy_module("zstandard")

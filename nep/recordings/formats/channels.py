@@ -4,9 +4,8 @@ A channel has the messages of one publisher on one topic that are alike: its met
 in common (codec, type, publisher, whether it is latched), a message's record has its time of arrival (log
 time), its stamp (publish time) and the lower half of its number (sequence). JSON and msgpack lie there as
 they were received; pictures, text and bytes in a message of Protocol Buffers that has them in one piece
-(`nep.recordings.protobuf`). What does not fit, such as a number above 2^32 or bytes that are no JSON, is
-wrapped in one, too, and the rest of what is to be known stands in its field 1000. docs/recordings.md has the
-whole table.
+(`nep.recordings.formats.protobuf`). What does not fit, such as a number above 2^32 or bytes that are no JSON,
+is wrapped in one, too; the rest is in its field 1000. docs/recordings.md has the whole table.
 """
 
 from __future__ import annotations
@@ -21,9 +20,16 @@ from nep.errors import DecodeError
 from nep.messages.image_codec import picture_info, raw_layout
 from nep.messages.message import NOTHING, Message, MessageKind, arrived, kind_of
 from nep.messages.packing import pack, unpack
-from nep.recordings.protobuf import EXTRA, bytes_field, descriptor_set, fields, fixed_field, timestamp_field
-from nep.recordings.records import RawMessage
-from nep.recordings.schemas import schema_of
+from nep.recordings.formats.protobuf import (
+    EXTRA,
+    bytes_field,
+    descriptor_set,
+    fields,
+    fixed_field,
+    timestamp_field,
+)
+from nep.recordings.formats.records import RawMessage
+from nep.recordings.formats.schemas import schema_of
 
 __all__ = [
     "OWN_TOPICS",

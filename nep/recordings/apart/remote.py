@@ -1,4 +1,4 @@
-"""Recordings that are read in another process (`nep.recordings.reader_process`).
+"""Recordings that are read in another process (`nep.recordings.apart.reader_process`).
 
 A process that takes too long, needs too much memory or dies costs its files, and nobody else: reading them
 raises `RecordingError` with a sentence. The next file that is opened starts a new process.
@@ -17,11 +17,11 @@ from typing import IO, TYPE_CHECKING, Any
 from nep.errors import ClosedError, RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
+from nep.recordings.apart.frames import damage_of, facts_of, read_frame, write_frame
 from nep.recordings.file_reader import CACHE_BYTES, FileFacts
-from nep.recordings.frames import damage_of, facts_of, read_frame, write_frame
-from nep.recordings.index import Damage
+from nep.recordings.formats.index import Damage
+from nep.recordings.formats.records import RawMessage, messages_in
 from nep.recordings.reader import Recording
-from nep.recordings.records import RawMessage, messages_in
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -44,7 +44,7 @@ class ReaderProcess:
         """Nothing is started before a recording is opened.
 
         Args:
-            command: Starts `nep.recordings.reader_process`.
+            command: Starts `nep.recordings.apart.reader_process`.
             timeout_s: A request that is not answered for so long ends the process. Opening a file may take
                 longer, as long as it makes progress.
         """

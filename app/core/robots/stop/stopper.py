@@ -15,9 +15,9 @@ from contextlib import suppress
 from functools import partial
 
 from app.core.faults import error_words
-from app.core.robots.stop_lines import StopLine, StopNode, StopTarget, StopWay
-from app.core.robots.stop_report import RobotStop, StopReport
-from app.core.robots.stop_request import StopRequest
+from app.core.robots.stop.lines import StopLine, StopNode, StopTarget, StopWay
+from app.core.robots.stop.report import RobotStop, StopReport
+from app.core.robots.stop.request import StopRequest
 from app.robots import rize
 from app.robots.description.description import Robot, RobotTopics
 from app.robots.held_messages import HeldMessages

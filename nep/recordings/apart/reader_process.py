@@ -1,7 +1,7 @@
-"""Reads recordings for another program: `python -m nep.recordings.reader_process`.
+"""Reads recordings for another program: `python -m nep.recordings.apart.reader_process`.
 
 A recording may come from anywhere, so a program with a window reads it in this process, whose memory is
-limited, and which may be ended at any moment. Requests come as frames (`nep.recordings.frames`) on the
+limited, and which may be ended at any moment. Requests come as frames (`nep.recordings.apart.frames`) on the
 standard input, one at a time; each is answered by one frame, after any number of progress frames.
 """
 
@@ -18,10 +18,10 @@ from typing import IO, Any
 
 from nep.errors import NepError, RecordingError, RecordingTooLargeError
 from nep.i18n import _, begin
+from nep.recordings.apart.frames import packed_messages, plain_damage, plain_facts, read_frame, write_frame
 from nep.recordings.file_reader import FileReader
-from nep.recordings.frames import packed_messages, plain_damage, plain_facts, read_frame, write_frame
-from nep.recordings.limits import ReadBudget
-from nep.recordings.records import RawMessage
+from nep.recordings.formats.limits import ReadBudget
+from nep.recordings.formats.records import RawMessage
 
 __all__ = ["RecordingService", "main"]
 
@@ -166,7 +166,7 @@ def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Answer what comes on the standard input until it ends."""
-    parser = argparse.ArgumentParser(prog="nep.recordings.reader_process")
+    parser = argparse.ArgumentParser(prog="nep.recordings.apart.reader_process")
     parser.add_argument("--memory-mb", type=int, default=1024)
     _limit_memory(parser.parse_args(arguments).memory_mb)
     begin()

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from typing import IO
 
 from nep.messages.packing import pack, unpack
-from nep.recordings.channels import ChannelDefinition
 from nep.recordings.file_reader import FileFacts
-from nep.recordings.index import AttachedFile, Damage
-from nep.recordings.records import RawMessage, message_head
+from nep.recordings.formats.channels import ChannelDefinition
+from nep.recordings.formats.index import AttachedFile, Damage
+from nep.recordings.formats.records import RawMessage, message_head
 
 __all__ = [
     "damage_of",
@@ -52,7 +52,7 @@ def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
 
 
 def packed_messages(messages: Iterable[RawMessage]) -> bytes:
-    """Messages as records of MCAP, one behind the other; `nep.recordings.records.messages_in` reads them."""
+    """Return messages as consecutive MCAP records, which `messages_in` reads."""
     pieces: list[bytes | memoryview] = []
     for raw in messages:
         size = raw.data.nbytes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from app.core.robots.moved_robots import OnMoved
+from app.core.robots.stop.moved_robots import OnMoved
 from app.robots.description.description import Robot
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 

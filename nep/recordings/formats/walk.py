@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
-from nep.recordings.limits import RECORD_COST_BYTES, ReadBudget
-from nep.recordings.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
+from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget
+from nep.recordings.formats.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
 
 __all__ = ["Place", "walk"]
 

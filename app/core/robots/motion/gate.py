@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from app.core.robots.motion_permission import MotionPermission, risky
+from app.core.robots.motion.permission import MotionPermission, risky
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Robot
 from app.robots.identity import controls_of

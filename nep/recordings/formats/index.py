@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
-from nep.recordings.channels import ChannelDefinition
-from nep.recordings.compression import decompressed
-from nep.recordings.limits import RECORD_COST_BYTES, ReadBudget, open_budget
-from nep.recordings.records import (
+from nep.recordings.formats.channels import ChannelDefinition
+from nep.recordings.formats.compression import decompressed
+from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget, open_budget
+from nep.recordings.formats.records import (
     HEAD_BYTES,
     MAGIC,
     MESSAGE_REST_BYTES,
@@ -39,7 +39,7 @@ from nep.recordings.records import (
     read_message_index,
     read_record,
 )
-from nep.recordings.walk import Place, walk
+from nep.recordings.formats.walk import Place, walk
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
