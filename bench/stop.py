@@ -2,8 +2,8 @@
 
 ``python bench/stop.py [--stops 60] [--robots 3]``: each round lets every robot move, presses Stop as Studio
 does (`app.core.robots.stop.stopper.RobotStopper`, one stop to all), and takes the time to the last answer. It
-means that the robot stands still: its stop method has returned and all its functions have ended. The row "sent and
-echoed" is the same way over the wire with an answer that costs nothing, in the same rounds.
+means that the robot stands still: its stop method has returned and all its functions have ended. The row
+"sent and echoed" is the same way over the wire with an answer that costs nothing, in the same rounds.
 """
 
 from __future__ import annotations
