@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from app.robots.driver.call import Clock
 from app.robots.virtual.room import Other
@@ -43,10 +43,11 @@ class Neighbours:
         self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
-    def makes_way(self, x: float, y: float, radius: float) -> bool:
-        """Whether this robot stands where another one stood before it came."""
+    def makes_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
+        """Whether this robot stands where another one, that is not ``ignored``, stood before it came."""
         return any(
-            math.hypot(other.x - x, other.y - y) < other.radius + radius
+            other.name not in ignored
+            and math.hypot(other.x - x, other.y - y) < other.radius + radius
             and (began, other.name) < (self.began_ns, self._name)
             for other, _at, began in self._seen.values()
         )

@@ -49,6 +49,7 @@ class SharedRoom:
         self._is_new = body.room != Room()
         self._arrives_until_s = clock.now() + ARRIVES_S
         self._start = body.x, body.y
+        self._went_back_with: frozenset[str] = frozenset()
         self._tell_room = link.share(TOPIC, self._hear_room, latched=True)
         self._tell_robots = link.share(ROBOTS_TOPIC, self._hear_robot)
 
@@ -72,7 +73,7 @@ class SharedRoom:
             body.room = replace(body.room, others=others)
         if self._clock.now() < self._arrives_until_s and body.still:
             radius = self._like.radius
-            if self._neighbours.makes_way(body.x, body.y, radius):
+            if self._neighbours.makes_way(body.x, body.y, radius, self._went_back_with):
                 body.place(*body.room.nearest_free(body.x, body.y, radius))
                 self._start = body.x, body.y
 
@@ -93,7 +94,9 @@ class SharedRoom:
         that stands there is avoided.
         """
         self.take_over()
-        body, leaving = self._body, together if isinstance(together, list) else []
+        names = together if isinstance(together, list) else []
+        body, leaving = self._body, frozenset(name for name in names if isinstance(name, str))
+        self._went_back_with = leaving  # what is heard of them may still be where they stood before
         body.reset(body.room)
         staying = tuple(other for other in body.room.others if other.name not in leaving)
         room = replace(body.room, others=staying)
