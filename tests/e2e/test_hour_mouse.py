@@ -296,12 +296,12 @@ def carry_to_another_tab(hour: Hour) -> None:
 
 
 def come_back_after_a_crash(hour: Hour, start: Callable[..., Studio]) -> None:
-    before, names = blocks_of(hour.studio), tabs(hour.studio)
     journals = hour.studio.home / "journal"
     with hour.film.step("Everything is kept while it is built; then Studio is killed"):
         until(lambda: len(list(journals.glob("*.json"))) == 2, "both behaviours are kept")
         kept = lambda: "".join(each.read_text("utf-8") for each in journals.glob("*.json"))  # noqa: E731
         until(lambda: kept().count('"robot_pepper_do_walk"') == 2, "with the last edit")
+    before, names = blocks_of(hour.studio), tabs(hour.studio)
     hour.studio.kill()
     hour.follow(start(HOME=str(hour.home)))
     studio = hour.studio
@@ -309,7 +309,7 @@ def come_back_after_a_crash(hour: Hour, start: Callable[..., Studio]) -> None:
         studio.says("Put back the unsaved work?")
     with hour.film.step("One click: all is back, and the tab that was worked on shows"):
         studio.click("Put it back")
-        until(lambda: blocks_of(studio) == before, "every block is back")
+        until(lambda: blocks_of(studio) == before, lambda: f"{blocks_of(studio)} is not {before}")
         assert tabs(studio) == names
         studio.says("2 robots", 60)  # they come back, too
 
