@@ -26,12 +26,10 @@ from hypothesis.stateful import (
 )
 
 from app.core.faults import ALERT
-from app.errors import AppError
 from nep.messages.message import Message
-from tests.core.robots.stop_model.clock import SimulatedClock
-from tests.core.robots.stop_model.network import SimulatedNetwork
-from tests.core.robots.stop_model.robots import SimulatedRobot, Stranger
-from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedBridge, SimulatedStudio
+from tests.core.robots.stop_model.lab import SimulatedLab
+from tests.core.robots.stop_model.robots import SimulatedRobot
+from tests.core.robots.stop_model.studio import GRAPH_POLL_S, SimulatedBridge
 
 HISTORIES = int(os.environ.get("NEP_STOP_HISTORIES", "0"))
 FIXED_HISTORIES = 2000
@@ -51,14 +49,11 @@ class StopModel(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.clock = SimulatedClock()
-        for prefix in ("studio-stop", *(f"{name} " for name in NAMES)):
-            self.clock.follow(prefix)
-        self.network = SimulatedNetwork(self.clock.now)
         self.folder = tempfile.TemporaryDirectory(prefix="nep-stop-")
-        self.studio = SimulatedStudio(self.network, self.clock, Path(self.folder.name))
-        self.stranger, self.bridge = Stranger(self.network), SimulatedBridge(self.network)
-        self.robots: list[SimulatedRobot] = []
+        self.lab = lab = SimulatedLab(Path(self.folder.name))
+        self.clock, self.network, self.studio = lab.clock, lab.network, lab.studio
+        self.stranger, self.robots = lab.stranger, lab.robots
+        self.bridge = SimulatedBridge(self.network)
         self.told: dict[
             SimulatedRobot, dict[str, int]
         ] = {}  # ids of commands that moved it -> when it was sent
@@ -72,36 +67,9 @@ class StopModel(RuleBasedStateMachine):
         self.undisturbed: set[str] = set()  # robots that were reachable ever since Stop was pressed
         self._read_sent = self._read_delivered = 0
         self._seen_report: object = None
-        self._poll()
-        self._settle()
+        lab.before_delivery, lab.after_step = self._follow_network, self._check
 
-    # -- time
-
-    def _poll(self) -> None:
-        self.studio.see()
-        self.clock.call_at(self.clock.now() + GRAPH_POLL_S, self._poll)
-
-    def _settle(self) -> None:
-        """Let everything happen that happens at this moment; Studio looks once the network is quiet."""
-        before = None
-        while True:
-            self.clock.settle()
-            self.network.connect()
-            self._follow_network()
-            if self.network.deliver():
-                continue
-            now = len(self.network.sent), self.network.revision
-            if now == before:
-                return
-            before = now
-            self.studio.tick()
-
-    def _advance(self, seconds: float) -> None:
-        until = self.clock.now() + seconds
-        while self.clock.now() < until:
-            self.clock.move_to(min(until, self.clock.next_due()))
-            self._settle()
-            self._check()
+    # -- what is on the network
 
     def _follow_network(self) -> None:
         """Read off the network who was told to move, who was asked to stop and whose answers arrived."""
@@ -151,15 +119,15 @@ class StopModel(RuleBasedStateMachine):
     @initialize(both=st.booleans())
     def start(self, both: bool) -> None:
         for name in NAMES[: 1 + both]:
-            self.robots.append(SimulatedRobot(self.network, self.clock, name, connects_late=False))
-        self._settle()
-        self._advance(GRAPH_POLL_S)
+            self.lab.start_robot(name)
+        self.lab.settle()
+        self.lab.advance(GRAPH_POLL_S)
 
     @rule(name=names, late=st.booleans())
     def start_robot(self, name: str, late: bool) -> None:
         if len([each for each in self.robots if each.name == name]) < 3:
-            self.robots.append(SimulatedRobot(self.network, self.clock, name, connects_late=late))
-            self._settle()
+            self.lab.start_robot(name, connects_late=late)
+            self.lab.settle()
 
     def _pick(self, pick: int, robots: Sequence[SimulatedRobot]) -> SimulatedRobot:
         return robots[pick % len(robots)]
@@ -169,7 +137,7 @@ class StopModel(RuleBasedStateMachine):
     def connect(self) -> None:
         for robot in self.robots:
             robot.node.is_connecting = False
-        self._settle()
+        self.lab.settle()
 
     @precondition(lambda self: any(each.node.is_running for each in self.robots))
     @rule(pick=picks, is_killed=st.booleans(), wait_s=waits)
@@ -178,13 +146,13 @@ class StopModel(RuleBasedStateMachine):
         robot = self._pick(pick, [each for each in self.robots if each.node.is_running])
         robot.node.halt(is_dead=is_killed)
         self.undisturbed.discard(robot.id)
-        self._advance(wait_s)
+        self.lab.advance(wait_s)
 
     @precondition(lambda self: any(each.node.is_frozen for each in self.robots))
     @rule(pick=picks)
     def thaw(self, pick: int) -> None:
         self._pick(pick, [each for each in self.robots if each.node.is_frozen]).thaw()
-        self._settle()
+        self.lab.settle()
 
     @precondition(lambda self: self.robots)
     @rule(pick=picks, how=st.sampled_from(["up", "held", "lost"]))
@@ -193,7 +161,7 @@ class StopModel(RuleBasedStateMachine):
         robot.node.is_held, robot.node.is_isolated = how == "held", how == "lost"
         if how != "up":
             self.undisturbed.discard(robot.id)
-        self._settle()
+        self.lab.settle()
 
     @precondition(lambda self: self.robots)
     @rule(pick=picks, fails=st.booleans())
@@ -207,19 +175,16 @@ class StopModel(RuleBasedStateMachine):
 
     @rule(name=names, action=st.sampled_from(["drive", "turn"]), wait_s=waits)
     def move_by_form(self, name: str, action: str, wait_s: float) -> None:
-        try:
-            self.studio.session.fleet.invoke(name, action, {})
-        except AppError:
-            self.studio.allow()
-        self._settle()
-        self._advance(wait_s)
+        self.studio.move(name, action)
+        self.lab.settle()
+        self.lab.advance(wait_s)
 
     @rule(robots=st.sets(names, min_size=1), wait_s=waits)
     def move_by_behaviour(self, robots: set[str], wait_s: float) -> None:
         there = {link.name for link in self.studio.session.fleet.connected}
         self.studio.run(sorted(robots & there))
-        self._settle()
-        self._advance(wait_s)
+        self.lab.settle()
+        self.lab.advance(wait_s)
 
     @rule(name=names, way=st.sampled_from(["shelf", "alarm", "replay", "bridge"]), wait_s=waits)
     def move_by_message(self, name: str, way: str, wait_s: float) -> None:
@@ -234,17 +199,17 @@ class StopModel(RuleBasedStateMachine):
                 self.studio.replay(name)
             case _:
                 self.bridge.carry(name)
-                self._settle()
+                self.lab.settle()
                 self.studio.see()  # the bridge renewed its lease, with its counts
-        self._settle()
-        self._advance(wait_s)
+        self.lab.settle()
+        self.lab.advance(wait_s)
 
     # -- strangers
 
     @rule(name=names, times=st.sampled_from([1, 40]))
     def forge_answers(self, name: str, times: int) -> None:
         self.stranger.answer(name, list(self.stops)[-4:], times=times)
-        self._settle()
+        self.lab.settle()
 
     @rule(
         name=names,
@@ -253,12 +218,12 @@ class StopModel(RuleBasedStateMachine):
     )
     def send_deep_value(self, name: str, leaf: str, depth: int) -> None:
         self.stranger.send_deep(f"/{name}/{leaf}", depth)
-        self._settle()
+        self.lab.settle()
 
     @rule(name=names)
     def send_many_keys(self, name: str) -> None:
         self.stranger.send_many_keys(f"/{name}/command", 300)
-        self._settle()
+        self.lab.settle()
 
     # -- Stop
 
@@ -269,15 +234,15 @@ class StopModel(RuleBasedStateMachine):
         self.pressed_s = self.clock.now()
         self._undisturbed_now()
         self.studio.session.runs.stop()
-        self._settle()
-        self._advance(wait_s)
+        self.lab.settle()
+        self.lab.advance(wait_s)
 
     @rule(name=names, wait_s=waits)
     def stop_one_robot(self, name: str, wait_s: float) -> None:
         self.press += 1
         self.studio.session.runs.stop_robot(name)
-        self._settle()
-        self._advance(wait_s)
+        self.lab.settle()
+        self.lab.advance(wait_s)
 
     def _undisturbed_now(self) -> None:
         links = {
@@ -300,11 +265,11 @@ class StopModel(RuleBasedStateMachine):
         for robot in [each for each in self.told if each.name in report.silent]:
             del self.told[robot]
         self.studio.session.runs.confirm_still()
-        self._settle()
+        self.lab.settle()
 
     @rule(seconds=waits)
     def let_time_pass(self, seconds: float) -> None:
-        self._advance(seconds)
+        self.lab.advance(seconds)
 
     # -- what must hold
 
@@ -349,12 +314,7 @@ class StopModel(RuleBasedStateMachine):
         assert not wrong, wrong
 
     def teardown(self) -> None:
-        self.clock.end()
-        for robot in self.robots:
-            robot.node.is_frozen = robot.node.is_dead = False
-            robot.driver.close()
-        self.studio.close()
-        self.clock.join()
+        self.lab.close()
         self.folder.cleanup()
 
 

@@ -2,272 +2,269 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from app.core.robots.announcements import MOST_ROBOTS
-from app.core.robots.fleet import Fleet
-from app.core.robots.robot_link import RobotLink
+from app.core.session import CHECK_S
 from nep.messages.message import Message
-from tests.core.robots.simulated_network import FakeRobot, SimulatedStudio, publisher_of
+from tests.core.robots.stop_model.lab import SimulatedLab
+from tests.core.robots.stop_model.network import LEASE_S
+from tests.core.robots.stop_model.robots import TURN_S, SimulatedRobot, Stranger
+from tests.core.robots.stop_model.studio import GRAPH_POLL_S
+
+FIRST_UNKNOWN_PUBLISHER = 1 << 20  # no node has one of this id
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[SimulatedStudio]:
-    made = SimulatedStudio(tmp_path)
-    yield made
-    made.close()
+def lab(tmp_path: Path) -> Iterator[SimulatedLab]:
+    lab = SimulatedLab(tmp_path)
+    yield lab
+    lab.close()
 
 
-def the_link(studio: SimulatedStudio, name: str = "Pepper") -> RobotLink:
-    studio.tick()
-    link = studio.session.fleet.link(name)
-    assert link is not None
-    assert link.connected
-    assert not link.virtual
-    return link
+def start_unreachable_robot(lab: SimulatedLab) -> SimulatedRobot:
+    """Start a robot that Studio sees and whose command subscriber is not connected yet."""
+    pepper = lab.start_robot("Pepper")
+    pepper.node.is_subscribing = True
+    lab.wait_for_link("Pepper")
+    return pepper
 
 
-def moved_by_a_form(studio: SimulatedStudio) -> None:
-    fleet: Fleet = studio.session.fleet
-    fleet.invoke("Pepper", "turn", {"direction": "left", "angle": 90})
-    studio.tick()
-    link = fleet.link("Pepper")
-    assert link is not None
-    assert link.running
+def connect(lab: SimulatedLab, robot: SimulatedRobot) -> None:
+    robot.node.is_subscribing = False
+    lab.advance(GRAPH_POLL_S)
 
 
-@pytest.mark.parametrize("how", ["frozen", "frozen and unlisted", "killed", "left", "another program"])
-def test_a_robot_that_is_gone_while_moving_is_named_until_it_answers(
-    studio: SimulatedStudio, how: str
+def silence(robot: SimulatedRobot, how: str) -> None:
+    match how:
+        case "hung":  # the thread that renews its lease goes on
+            robot.node.is_held = True
+        case "frozen":
+            robot.node.halt(is_dead=False)
+        case "left":
+            robot.node.close()
+        case _:
+            robot.node.halt(is_dead=True)
+
+
+def recover(robot: SimulatedRobot) -> None:
+    robot.node.is_held = False
+    robot.thaw()
+
+
+@pytest.mark.parametrize("how", ["hung", "frozen", "killed", "left", "replaced"])
+def test_robot_lost_while_moving_is_named_until_it_answers_or_a_person_confirms(
+    lab: SimulatedLab, how: str
 ) -> None:
-    pepper = studio.network.add("Pepper")
-    link = the_link(studio)
-    moved_by_a_form(studio)
-    pepper.is_frozen = True
-    if how == "frozen and unlisted":
-        studio.network.unlisted.add(pepper.node)
-    elif how != "frozen":
-        studio.network.remove(pepper)
-    studio.pass_time(5)
-    if how == "another program":
-        studio.network.add("Pepper", "thief")
-        studio.tick()
-        assert link.connected
-    elif how != "frozen":  # a frozen one that is listed is "busy": it has time for its action
+    pepper = lab.start_robot("Pepper")
+    link, runs, moved = lab.wait_for_link("Pepper"), lab.studio.session.runs, lab.studio.session.fleet.moved
+    lab.studio.move("Pepper", "turn")
+    lab.settle()
+    assert link.running
+    silence(pepper, how)
+    lab.advance(LEASE_S + CHECK_S)
+    if how == "replaced":
+        lab.start_robot("Pepper")
+        lab.wait_for_link("Pepper")
+    elif how != "hung":  # a hung one is listed: it is "busy" as long as its action may take
         assert link.state == "not stopped", "it stays red without any Stop"
     for _press in range(2):
-        studio.stop()
-        view, report = studio.session.runs.view(), studio.session.runs.state.report
+        lab.stop()
+        view, report = runs.view(), runs.state.report
         assert (view.state, view.result_status) == ("unanswered", "error")
         assert report is not None
         assert report.silent == ("Pepper",)
-        assert "form" in view.detail, "it is said what moved it"
+        assert "form" in view.detail, "what moved it is said"
         assert not view.can_run
         assert link.last_stop_status == "error"
-    if how.startswith("frozen"):
-        studio.network.unlisted.clear()
-        pepper.thaw()
-        studio.tick()
-        studio.stop()
-        assert (studio.session.runs.view().state, studio.session.runs.view().result_status) == (
-            "proven",
-            "ok",
-        )
+    if how in {"hung", "frozen"}:
+        recover(pepper)
+        lab.advance(GRAPH_POLL_S)
+        lab.stop()
+        assert (runs.view().state, runs.view().result_status) == ("proven", "ok")
     else:
-        studio.session.runs.confirm_still()
-    assert studio.session.fleet.moved.names == ()
-    studio.tick()
-    assert studio.session.runs.view().can_run
+        runs.confirm_still()
+    assert moved.names == ()
+    lab.advance(GRAPH_POLL_S)
+    assert runs.view().can_run
     assert link.state != "not stopped"
 
 
-def test_a_motion_whose_end_was_seen_is_named_no_more(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper", ends_actions=True)
-    link = the_link(studio)
-    studio.session.fleet.invoke("Pepper", "turn", {"direction": "left", "angle": 90})
-    assert "Pepper" in studio.session.fleet.moved
-    studio.tick()
-    assert "Pepper" not in studio.session.fleet.moved
-    studio.network.remove(pepper)
-    studio.tick()
+def test_robot_that_reported_the_end_of_its_motion_is_not_named(lab: SimulatedLab) -> None:
+    pepper = lab.start_robot("Pepper")
+    link, moved = lab.wait_for_link("Pepper"), lab.studio.session.fleet.moved
+    lab.studio.move("Pepper", "turn")
+    assert "Pepper" in moved
+    lab.advance(TURN_S + GRAPH_POLL_S)
+    assert "Pepper" not in moved
+    pepper.node.close()
+    lab.advance(GRAPH_POLL_S)
     assert link.state == "away"
 
 
 @pytest.mark.parametrize("by", ["shelf", "key", "alarm", "replay", "bridge", "behaviour", "anything"])
-def test_whatever_moved_it_is_said(studio: SimulatedStudio, by: str) -> None:
-    pepper = studio.network.add("Pepper")
-    the_link(studio)
-    studio.session.fleet.moved.note(["Pepper"], by)
-    studio.network.remove(pepper)
-    studio.tick(2)  # health is looked at once a second
-    motion = studio.session.fleet.moved.motion("Pepper")
+def test_stop_names_what_moved_a_robot(lab: SimulatedLab, by: str) -> None:
+    pepper, session = lab.start_robot("Pepper"), lab.studio.session
+    lab.wait_for_link("Pepper")
+    session.fleet.moved.note(["Pepper"], by)
+    pepper.node.close()
+    lab.advance(2 * CHECK_S)
+    motion = session.fleet.moved.motion("Pepper")
     assert motion is not None
-    assert studio.session.alerts.has("moving:Pepper")
-    studio.stop()
-    assert motion.sentence in studio.session.runs.view().detail
-    studio.session.runs.confirm_still()
+    assert session.alerts.has("moving:Pepper")
+    lab.stop()
+    assert motion.sentence in session.runs.view().detail
 
 
-def test_a_stop_without_robots_is_ready_and_proves_nothing(studio: SimulatedStudio) -> None:
-    studio.tick()
-    studio.stop()
-    view = studio.session.runs.view()
+def test_stop_without_robots_ends_ready_and_proves_nothing(lab: SimulatedLab) -> None:
+    lab.stop()
+    view = lab.studio.session.runs.view()
     assert (view.state, view.result_status, view.can_run) == ("ready", "off", True)
 
 
-def test_a_robot_is_ready_only_when_a_stop_would_arrive(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper", is_connected=False)
-    link = the_link(studio)
-    studio.tick()
+def test_robot_is_ready_only_when_a_stop_would_arrive(lab: SimulatedLab) -> None:
+    pepper = start_unreachable_robot(lab)
+    link = lab.wait_for_link("Pepper")
     assert link.state == "connecting"
-    pepper.is_connected = True
-    studio.tick()
+    connect(lab, pepper)
     assert link.state == "ready"
 
 
-def test_a_stop_before_the_connection_is_delivered_late_and_reported(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper", is_connected=False)
-    the_link(studio)
-    studio.stop()
-    view = studio.session.runs.view()
+def test_stop_pressed_before_the_connection_is_delivered_late_and_reported(lab: SimulatedLab) -> None:
+    pepper, runs = start_unreachable_robot(lab), lab.studio.session.runs
+    lab.stop()
+    view = runs.view()
     assert view.state == "unanswered"
     assert "not connected" in view.title
-    assert pepper.stops() == 0
-    pepper.is_connected = True
-    studio.tick()
-    studio.tick()
-    assert pepper.stops() == 1
-    assert studio.session.runs.view().state == "proven"
-    report = studio.session.runs.state.report
+    assert lab.stops_received(pepper) == 0
+    connect(lab, pepper)
+    assert lab.stops_received(pepper) == 1
+    assert runs.view().state == "proven"
+    report = runs.state.report
     assert report is not None
     assert report.robots[0].waited_ms
 
 
-def test_a_person_who_confirms_gets_no_late_stop(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper", is_connected=False)
-    the_link(studio)
-    studio.stop()
-    studio.session.runs.confirm_still()
-    pepper.is_connected = True
-    studio.tick()
-    studio.tick()
-    assert pepper.stops() == 0
-    assert studio.session.runs.view().can_run
+def test_stop_is_not_delivered_late_after_a_person_confirmed(lab: SimulatedLab) -> None:
+    pepper, runs = start_unreachable_robot(lab), lab.studio.session.runs
+    lab.stop()
+    runs.confirm_still()
+    connect(lab, pepper)
+    assert lab.stops_received(pepper) == 0
+    assert runs.view().can_run
 
 
 # ---- strangers -----------------------------------------------------------------------------------------
 
 
-def flood(robot: FakeRobot, messages: int) -> None:
-    """Thousands of answers of programs that are not the robot."""
+def flood(lab: SimulatedLab, topic: str) -> None:
+    """Let the stopper receive thousands of answers of programs that are not the robot."""
     deep = b'{"op":"stop","id":' + b"[" * 1000 + b"]" * 1000 + b',"state":"succeeded"}'
-    topic = "/Pepper/answer"
-    batch = [Message(topic, deep, "json", "json", publisher=number % 300) for number in range(messages)]
-    for wanted, sink in list(robot.network.sinks):
-        if wanted == topic:
-            sink(batch)
+    publishers = (FIRST_UNKNOWN_PUBLISHER + number % 300 for number in range(2000))
+    batch = [Message(topic, deep, "json", "json", publisher=publisher) for publisher in publishers]
+    lab.studio.hand_to_stopper(topic, batch)
 
 
-def test_a_flood_of_answers_does_not_displace_the_robots_own(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper")
-    the_link(studio)
-    hear = pepper.hear
-
-    def flooded(command: Mapping[str, object]) -> None:
-        flood(pepper, 2000)
-        hear(command)
-        flood(pepper, 2000)
-
-    pepper.hear = flooded  # type: ignore[method-assign]
-    studio.stop()
-    assert studio.session.runs.view().state == "proven"
+def test_flood_of_foreign_answers_does_not_displace_the_robots_answer(lab: SimulatedLab) -> None:
+    pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
+    topic = lab.wait_for_link("Pepper").robot.topics.answer
+    pepper.node.is_held = True
+    runs.stop()
+    lab.settle()
+    flood(lab, topic)
+    pepper.node.is_held = False
+    assert lab.network.deliver(), "Stop reaches the robot"
+    lab.clock.settle()
+    assert lab.network.deliver(), "its answer reaches Studio"
+    flood(lab, topic)
+    lab.settle()
+    assert runs.view().state == "proven"
 
 
 class Undecodable(Message):
-    """A message that nobody may look into."""
+    """A message that fails the test when it is decoded."""
 
     @property
     def payload(self) -> object:
         raise AssertionError("it was decoded")
 
 
-@pytest.mark.parametrize("sender", ["evil", "nobody"])
-def test_an_answer_of_a_stranger_is_not_decoded(studio: SimulatedStudio, sender: str) -> None:
-    pepper = studio.network.add("Pepper", is_connected=False)
-    studio.network.strangers.append(("evil", "/Pepper/answer"))
-    the_link(studio)
-    studio.stop()  # it goes on waiting for the robot
+@pytest.mark.parametrize("sender", ["known", "unknown"])
+def test_stopper_does_not_decode_the_answer_of_a_stranger(lab: SimulatedLab, sender: str) -> None:
     topic = "/Pepper/answer"
-    foreign = Undecodable(topic, b"{}", "json", "json", publisher=publisher_of(sender, topic))
-    for wanted, sink in list(studio.network.sinks):
-        if wanted == topic:
-            sink([foreign] * 100)
-    pepper.is_connected = True
-    studio.tick()
-    studio.tick()
-    assert studio.session.runs.view().state == "proven"
+    stranger = lab.stranger.node.new_pub(topic, "robot/answer")
+    pepper = start_unreachable_robot(lab)
+    lab.stop()  # it goes on waiting for the robot
+    publisher = stranger.id if sender == "known" else FIRST_UNKNOWN_PUBLISHER
+    foreign = Undecodable(topic, b"{}", "json", "json", publisher=publisher)
+    lab.studio.hand_to_stopper(topic, [foreign] * 100)
+    connect(lab, pepper)
+    assert lab.studio.session.runs.view().state == "proven"
 
 
 @pytest.mark.parametrize("announcing", ["one node", "many nodes"])
 @pytest.mark.parametrize("order", ["before", "after"])
-def test_invented_descriptions_keep_no_robot_from_a_stop(
-    studio: SimulatedStudio, order: str, announcing: str
+def test_invented_robots_do_not_keep_a_stop_from_a_real_one(
+    lab: SimulatedLab, order: str, announcing: str
 ) -> None:
-    invented = [
-        ("evil" if announcing == "one node" else f"evil {number}", f"/A{number}/description")
-        for number in range(MOST_ROBOTS + 20)
+    invented = [f"A{number}" for number in range(MOST_ROBOTS + 20)]
+    strangers = [
+        Stranger(lab.network) for _each in (invented if announcing == "many nodes" else invented[:1])
     ]
+
+    def announce() -> None:
+        for number, name in enumerate(invented):
+            strangers[number % len(strangers)].announce(name)
+        lab.advance(GRAPH_POLL_S)
+
     if order == "before":
-        studio.network.strangers += invented
-        studio.tick()
-    pepper = studio.network.add("Pepper")
-    studio.tick()
+        announce()
+    pepper = lab.start_robot("Pepper")
+    lab.advance(GRAPH_POLL_S)
     if order == "after":
-        studio.network.strangers += invented
-        studio.tick()
-    for _ in range(2):
-        studio.tick()
-    studio.stop()
-    assert pepper.stops() == 1
-    report = studio.session.runs.state.report
+        announce()
+    lab.stop()
+    assert lab.stops_received(pepper) == 1
+    report = lab.studio.session.runs.state.report
     assert report is not None
     assert "Pepper" in report.still
 
 
-def test_a_robot_that_went_away_after_it_had_answered_is_told_all_the_same(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper")
-    the_link(studio)
-    studio.stop()
-    studio.network.unlisted.add(pepper.node)  # its lease has ended, and it still hears
-    studio.tick()
-    studio.stop()
-    assert pepper.stops() == 2
-    assert studio.session.runs.view().state == "ready", "nobody waits for its answer"
+def test_robot_whose_lease_ended_after_it_answered_is_told_to_stop(lab: SimulatedLab) -> None:
+    pepper = lab.start_robot("Pepper")
+    lab.wait_for_link("Pepper")
+    lab.stop()
+    pepper.node.unlist()  # it still hears
+    lab.advance(GRAPH_POLL_S)
+    lab.stop()
+    assert lab.stops_received(pepper) == 2
+    assert lab.studio.session.runs.view().state == "ready", "nobody waits for its answer"
 
 
-def test_a_stop_is_not_proven_by_what_another_program_sends(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper")
-    the_link(studio)
-    pepper.hear = lambda command: studio.network.publish(  # type: ignore[method-assign]
-        "/Pepper/answer", json.loads(json.dumps({**command, "state": "succeeded"})), "evil"
-    )
-    studio.stop()
-    assert studio.session.runs.view().state == "unanswered"
+def test_answer_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> None:
+    pepper, runs = lab.start_robot("Pepper"), lab.studio.session.runs
+    lab.wait_for_link("Pepper")
+    pepper.node.is_held = True
+    runs.stop()
+    lab.settle()
+    assert lab.stop_ids
+    lab.stranger.answer("Pepper", lab.stop_ids, times=1)
+    lab.wait_for_report()
+    assert runs.view().state == "unanswered"
 
 
-def test_a_robot_of_which_only_the_command_topic_is_known_is_told_and_named(studio: SimulatedStudio) -> None:
-    unknown = studio.network.add("X")
-    studio.network.unlisted.add(unknown.node)  # it announces nothing
-    studio.session.fleet.moved.note(["/X/command"], "shelf")
-    studio.tick()
-    studio.stop()
-    assert unknown.stops() == 1
-    report = studio.session.runs.state.report
+def test_robot_of_which_only_the_command_topic_is_known_is_told_and_named(lab: SimulatedLab) -> None:
+    unknown, runs = lab.start_robot("X"), lab.studio.session.runs
+    unknown.node.unlist()  # it announces nothing
+    lab.studio.session.fleet.moved.note(["/X/command"], "shelf")
+    lab.advance(GRAPH_POLL_S)
+    lab.stop()
+    assert lab.stops_received(unknown) == 1
+    report = runs.state.report
     assert report is not None
     assert report.silent == ("/X/command",)
-    studio.session.runs.confirm_still()
-    assert studio.session.runs.view().can_run
+    runs.confirm_still()
+    assert runs.view().can_run

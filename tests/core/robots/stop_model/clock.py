@@ -58,7 +58,8 @@ class SimulatedClock:
         return self._now
 
     def follow(self, prefix: str) -> None:
-        self._prefixes.append(prefix)
+        if prefix not in self._prefixes:
+            self._prefixes.append(prefix)
 
     def call_at(self, due: float, call: Callable[[], None]) -> None:
         """Call something in the thread of `advance` once it is `due`."""

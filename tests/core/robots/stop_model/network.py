@@ -58,8 +58,7 @@ class SimulatedNetwork:
         """What the master lists: nodes whose lease is not over, also dead and frozen ones."""
         for node in list(self.nodes.values()):
             if not node.is_running and self.now() - node.halted_s >= LEASE_S and not node.is_unlisted:
-                node.is_unlisted = True
-                self.revision += 1
+                node.unlist()
         there = [node for node in self.nodes.values() if not node.is_unlisted]
         infos = {
             node.id: NodeInfo(node.id, node.name, node.host, node.pid, "python", "native", 0)
@@ -88,7 +87,10 @@ class SimulatedNetwork:
         """Let every subscriber of a running node connect to every publisher that it was told of."""
         wiring = (
             self.revision,
-            [(node.is_running, node.is_isolated, node.is_connecting) for node in self.nodes.values()],
+            [
+                (node.is_running, node.is_isolated, node.is_connecting, node.is_subscribing)
+                for node in self.nodes.values()
+            ],
         )
         if wiring == self._wiring:
             return
@@ -103,6 +105,8 @@ class SimulatedNetwork:
         if not (publisher.node.is_running and subscriber.node.is_running):
             return
         if any(each.is_isolated or each.is_connecting for each in (publisher.node, subscriber.node)):
+            return
+        if subscriber.node.is_subscribing:
             return
         publisher.connected.append(subscriber)
         if publisher.latched and publisher.kept is not None:
@@ -137,6 +141,8 @@ class SimulatedNode:
         self.is_frozen = self.is_dead = self.is_unlisted = False
         self.is_connecting = False
         """Its connections are not up yet; what is published meanwhile does not arrive."""
+        self.is_subscribing = False
+        """Its publishers are connected, its subscribers are not yet."""
         self.is_held = False
         """Messages to and from it wait."""
         self.is_isolated = False
@@ -171,10 +177,20 @@ class SimulatedNode:
         self.is_frozen, self.is_dead = not is_dead, is_dead
         self.halted_s = self.network.now()
 
+    def unlist(self) -> None:
+        """Let its lease end at the master; its connections stay up."""
+        self.is_unlisted = True
+        self.network.revision += 1
+
+    def register(self) -> None:
+        """Register at the master again after its lease has ended."""
+        self.is_unlisted = False
+        self.network.revision += 1
+
     def close(self) -> None:
         """Leave the network properly: the master drops it at once."""
-        self.is_dead, self.is_unlisted = True, True
-        self.network.revision += 1
+        self.is_dead = True
+        self.unlist()
 
 
 class SimulatedPublisher:
@@ -252,7 +268,7 @@ class SimulatedSource:
     ) -> None:
         self.address, self.sinks, self.post = address, tuple(sinks), post
         self.node: SimulatedNode | None = None
-        self._watched: dict[str, SimulatedSubscriber] = {}
+        self.watched: dict[str, SimulatedSubscriber] = {}
 
     def start(self) -> None:
         pass
@@ -262,11 +278,11 @@ class SimulatedSource:
             for sink in self.sinks:
                 sink(topic, messages)
 
-        if self.node is not None and topic not in self._watched:
-            self._watched[topic] = self.node.new_sub(topic, sink=hand_over)
+        if self.node is not None and topic not in self.watched:
+            self.watched[topic] = self.node.new_sub(topic, sink=hand_over)
 
     def unwatch(self, topic: str) -> None:
-        known = self._watched.pop(topic, None)
+        known = self.watched.pop(topic, None)
         if known is not None:
             known.close()
 

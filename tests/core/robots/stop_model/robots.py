@@ -7,6 +7,7 @@ from typing import Annotated, Any, cast
 
 import orjson
 
+from app.robots.identity import DESCRIPTION_TYPE
 from app.robots.kit import Call, Driver, Failed, Kind, Link, Range, action, safe_stop
 from tests.core.robots.stop_model.clock import SimulatedClock
 from tests.core.robots.stop_model.network import SimulatedNetwork, SimulatedNode
@@ -80,6 +81,7 @@ class SimulatedRobot:
         self, network: SimulatedNetwork, clock: SimulatedClock, name: str, *, connects_late: bool
     ) -> None:
         self.name, self.clock = name, clock
+        clock.follow(f"{name} ")
         self.node = network.node(f"{name} driver")
         self.node.is_connecting = connects_late
         self.driver = Driver(
@@ -104,7 +106,10 @@ class SimulatedRobot:
         return names >= {f"{self.name} commands", f"{self.name} stop"}
 
     def thaw(self) -> None:
+        """Let its process go on."""
         self.node.is_frozen = False
+        if self.node.is_unlisted:
+            self.node.register()
         self.clock.wake_all()
 
     def __repr__(self) -> str:
@@ -115,7 +120,7 @@ class SimulatedRobot:
 
 
 class Stranger:
-    """A hostile program: it forges answers, sends deep values and describes robots that are not there."""
+    """A hostile program: it forges answers, sends deep values and announces robots that are not there."""
 
     def __init__(self, network: SimulatedNetwork) -> None:
         self.network = network
@@ -124,9 +129,13 @@ class Stranger:
 
     def _publisher(self, topic: str, msg_type: str) -> Any:
         if topic not in self._made:
-            self._made[topic] = self.node.new_pub(topic, msg_type, latched=msg_type == "robot/description")
+            self._made[topic] = self.node.new_pub(topic, msg_type, latched=msg_type == DESCRIPTION_TYPE)
         self.network.connect()
         return self._made[topic]
+
+    def announce(self, name: str) -> None:
+        """Announce a robot that is not there; its description never comes."""
+        self.node.new_pub(f"/{name}/description", DESCRIPTION_TYPE, latched=True)
 
     def answer(self, name: str, ids: list[str], *, times: int) -> None:
         """Answer every stop in the name of a robot, many times."""
@@ -150,11 +159,3 @@ class Stranger:
             "input": {f"k{n}": n for n in range(count)},
         }
         self._publisher(topic, "robot/command").send(orjson.dumps(value))
-
-    def describe(self, names: list[str], like: SimulatedRobot) -> None:
-        """Announce robots that are not there."""
-        for name in names:
-            description = dict(like.driver.description)
-            text = orjson.dumps(description).replace(f"/{like.name}/".encode(), f"/{name}/".encode())
-            described = orjson.loads(text.replace(f'"{like.name}"'.encode(), f'"{name}"'.encode()))
-            self._publisher(f"/{name}/description", "robot/description").publish(described)

@@ -18,7 +18,9 @@ from app.core.run.runner import RunnerEvent
 from app.core.run.wanted import Wanted
 from app.core.session import Session
 from app.core.storage.settings import Settings
+from app.errors import AppError
 from app.robots.identity import program_of
+from nep.messages.message import Message
 from nep.programs.alarms.evaluator import AlarmEvent
 from nep.programs.alarms.rule import AlarmAction, AlarmCondition, AlarmRule
 from nep.protocol.graph_view import BRIDGES_TOPIC
@@ -161,12 +163,27 @@ class SimulatedStudio:
     def tick(self) -> None:
         self.session.tick()
 
+    def hand_to_stopper(self, topic: str, messages: Sequence[Message]) -> None:
+        """Deliver a batch to the stopper at once, and to nothing else in Studio."""
+        watched = self._source.watched.get(topic)
+        stopper = [each for each in self.node.subscribers if each.topic == topic and each is not watched]
+        assert stopper, f"the stopper does not subscribe to {topic}"
+        for subscriber in stopper:
+            subscriber.sink(messages)
+
     # -- what a person does
 
     def allow(self) -> None:
         """Answer the question whether robots may move with yes."""
         if self.session.fleet.permission.question is not None:
             self.session.fleet.permission.answer(let=True)
+
+    def move(self, name: str, action: str) -> None:
+        """Try an action with its form."""
+        try:
+            self.session.fleet.invoke(name, action, {})
+        except AppError:
+            self.allow()
 
     def run(self, robots: Sequence[str]) -> None:
         wanted = _Driving(self.session.documents.current)
