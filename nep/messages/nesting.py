@@ -2,25 +2,27 @@
 
 Readers walk payloads recursively; a message of 2 kB with 1000 levels would end them with `RecursionError`.
 The check of JSON reads the bytes before they are decoded: most messages have too few brackets to be deep, and
-seeing that takes less than a microsecond.
+seeing that takes less than a microsecond. msgpack is checked after decoding, with the garbage collector's
+traversal of lists and maps, which takes less than a fifth of the time of a loop in Python.
 """
 
 from __future__ import annotations
 
+import gc
 import re
-from itertools import chain
+from datetime import datetime
 
 from nep.i18n import _
 
 __all__ = ["MAX_LEVELS", "json_is_too_deep", "packed_is_too_deep", "too_deep"]
 
 MAX_LEVELS = 64
-_COUNTED_BYTES = 4_096  # below this, counting all brackets takes less time than looking for the first ones
-_SCANNED_BYTES = 65_536  # below this, counting the headers of lists and maps takes less time than a walk
+_COUNTED_BYTES = 4_096  # up to this size, all brackets or headers are counted in less than 3 µs
 _AS_LISTS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b'[]{}"')
 _NO_HEADERS = bytes(each for each in range(256) if not (0x80 <= each <= 0x9F or 0xDC <= each <= 0xDF))
-_LISTS, _CONTAINERS, _NUMBERS = (list, tuple), (list, tuple, dict), (int, float)
+_CONTAINERS = (list, tuple, dict)
+_PLAIN = frozenset((*_CONTAINERS, str, bytes, int, float, bool, datetime, type(None)))
 _TEXT = re.compile(rb'"[^"]*"')
 
 
@@ -79,33 +81,35 @@ def packed_is_too_deep(data: bytes | memoryview, value: object) -> bool:
     size = len(data)
     if size <= MAX_LEVELS:
         return False
-    if size <= _SCANNED_BYTES and len(bytes(data).translate(None, _NO_HEADERS)) <= MAX_LEVELS:
+    if size <= _COUNTED_BYTES and len(bytes(data).translate(None, _NO_HEADERS)) <= MAX_LEVELS:
         return False
-    return _value_is_too_deep(value)
+    return _may_be_too_deep(value) and _is_too_deep(value)
 
 
-def _value_is_too_deep(value: object) -> bool:
+def _may_be_too_deep(value: object) -> bool:
+    """Return False only for a value of plain types with 64 levels at most.
+
+    Keys count as values here, so that tuples as keys can give a wrong True. Anything but plain types ends the
+    traversal: from an instance of a class it would lead to the class, its module and the whole program.
+    """
     level: list[object] = [value]
-    for _level in range(MAX_LEVELS + 1):
-        if _is_numbers(level):
+    for _level in range(MAX_LEVELS):
+        inner = gc.get_referents(*level)
+        if not inner:
             return False
-        kinds = set(map(type, level))
-        if not any(issubclass(kind, _CONTAINERS) for kind in kinds):
-            return False
-        lists = [each for each in level if isinstance(each, _LISTS)]
-        maps = [each for each in level if isinstance(each, dict)]
-        level = list(chain.from_iterable(lists))
-        if maps:
-            level.extend(chain.from_iterable(map(dict.values, maps)))
+        if not _PLAIN.issuperset(map(type, level)):
+            return True
+        level = inner
     return True
 
 
-def _is_numbers(values: list[object]) -> bool:
-    """Whether all are numbers, at the speed of C: a list or a map can't be added to a number."""
-    if values and not isinstance(values[0], _NUMBERS):
-        return False
-    try:
-        sum(values)  # type: ignore[arg-type]
-    except TypeError:
-        return False
+def _is_too_deep(value: object) -> bool:
+    level: list[object] = [value]
+    for _level in range(MAX_LEVELS + 1):
+        containers = [each for each in level if isinstance(each, _CONTAINERS)]
+        if not containers:
+            return False
+        level = [
+            inner for each in containers for inner in (each.values() if isinstance(each, dict) else each)
+        ]
     return True

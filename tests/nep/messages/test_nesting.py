@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
+from collections import OrderedDict
+from datetime import datetime, timezone
 
 import msgpack
 import orjson
@@ -14,7 +16,8 @@ from hypothesis import strategies as st
 import nep
 from nep.errors import DecodeError, EncodeError
 from nep.messages.codecs import codec
-from nep.messages.nesting import MAX_LEVELS, json_is_too_deep
+from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep
+from nep.messages.packing import pack
 
 SENTENCE = "it has more than 64 levels of lists and maps"
 
@@ -79,7 +82,7 @@ JSON_VALUES = st.recursive(
 
 
 def levels_of(value: object) -> int:
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return 1 + max(map(levels_of, value), default=0)
     return 1 + max(map(levels_of, value.values()), default=0) if isinstance(value, dict) else 0
 
@@ -90,6 +93,44 @@ def test_check_of_the_bytes_agrees_with_the_value(value: object, around: int) ->
     for _level in range(around):
         value = [value, "]"]
     assert json_is_too_deep(orjson.dumps(value)) == (levels_of(value) > MAX_LEVELS)
+
+
+PACKED_VALUES = st.recursive(
+    st.none()
+    | st.integers(-5, 5)
+    | st.floats(0, 1)
+    | st.text(max_size=2)
+    | st.just(msgpack.ExtType(1, b"12"))
+    | st.just(datetime(2026, 1, 1, tzinfo=timezone.utc)),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.lists(inner, max_size=2).map(tuple)
+        | st.dictionaries(st.text(max_size=2) | st.just(((1, ((2,),)),)), inner, max_size=3)
+        | st.dictionaries(st.text(max_size=1), inner, max_size=2).map(OrderedDict)
+    ),
+    max_leaves=30,
+)
+
+
+@settings(max_examples=150)
+@given(PACKED_VALUES, st.integers(50, 70), st.sampled_from(["list", "tuple", "map"]))
+def test_check_of_the_decoded_value_agrees_with_its_levels(value: object, around: int, kind: str) -> None:
+    padding = [0.5] * 500  # too large for a count of the headers
+    for _level in range(around):
+        value = {"a": value} if kind == "map" else (value,) if kind == "tuple" else [value]
+    value = [value, padding]
+    data = pack(value)
+    assert packed_is_too_deep(data, value) == (levels_of(value) > MAX_LEVELS)
+
+
+@pytest.mark.parametrize("inner", [[], {}, [1], {"a": 1}, 1, "text"])
+@pytest.mark.parametrize("levels", [63, 64, 65])
+def test_empty_lists_and_maps_are_levels(levels: int, inner: object) -> None:
+    value = inner
+    for _level in range(levels - levels_of(inner)):
+        value = [value, *range(8)]
+    assert levels_of(value) == levels
+    assert packed_is_too_deep(pack(value) + bytes(4096), value) == (levels > MAX_LEVELS)
 
 
 def test_text_of_another_encoding_hides_no_levels() -> None:
