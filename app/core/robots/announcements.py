@@ -301,12 +301,13 @@ class RizeNames:
 
     def __init__(self) -> None:
         """Nobody has said a name."""
-        self._told: list[str] = []
+        self._told: dict[str, None] = {}
 
     def tell(self, name: str) -> None:
         """A robot said on ``rize_event`` that it is ready under this name."""
-        if name not in self._told:
-            self._told.append(name)
+        self._told.setdefault(name)
+        if len(self._told) > MOST_ROBOTS:
+            del self._told[next(iter(self._told))]
 
     def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
         """The names of the robots of RIZE in this graph.

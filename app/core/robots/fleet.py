@@ -6,12 +6,14 @@ Found by their description, watched by their sensors, tried out by their actions
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
+from app.core.robots.absent_robots import excess_absent
 from app.core.robots.announcements import Announcements, Claim, RizeNames
+from app.core.robots.command_publishers import CommandPublishers, Submit, close_publishers
 from app.core.robots.known import KnownRobots
 from app.core.robots.motion.gate import MotionGate, MovableRobots
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
@@ -42,8 +44,6 @@ from app.robots.identity import (
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
-from nep.nodes.node import Node
-from nep.programs.robots.moving import COMMAND_TYPE as COMMAND_TYPE
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.graph_view import GraphView
 
@@ -58,7 +58,7 @@ class Fleet:
     def __init__(
         self,
         watches: Watches,
-        submit: Callable[[str, Callable[[Node], None]], None],
+        submit: Submit,
         clock: Callable[[], float] = time.monotonic,
         settings: Settings | None = None,
         processes: RobotProcesses | None = None,
@@ -69,7 +69,7 @@ class Fleet:
         which robots are virtual; without them every robot is that says so.
         """
         self._watches = watches
-        self._submit = submit
+        self._publishers = CommandPublishers(submit)
         self._clock = clock
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else AllVirtual()
@@ -101,6 +101,8 @@ class Fleet:
         self.revision = 0
         self.stops = 0
         """How often robots were told to stop."""
+        self.used: Callable[[], Collection[str]] = tuple
+        """Returns the names of the robots that the running program uses."""
 
     @property
     def links(self) -> Sequence[RobotLink]:
@@ -313,12 +315,14 @@ class Fleet:
                     self._answer(link, message)
         for link in self._links.values():
             if link.connected and link.publisher is None:
-                self._open_publisher(link)
+                self._publishers.open(link)
+        self._forget_absent()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Take over what arrived: descriptions, answers, sensor values."""
         if self._announcements.add(batches):
             self._follow_announced()
+            self._forget_absent()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
             name = rize.ready(mapping_of(message))
@@ -348,9 +352,7 @@ class Fleet:
         self.known.saw([link.robot for link in self.connected])
         self._alive.close()
         for link in self._links.values():
-            for publisher in (link.publisher, link.world):
-                if publisher is not None:
-                    publisher.close()
+            close_publishers(link)
 
     def unwatched(self, topic: str) -> None:
         """Nobody looks at a topic any more: what a robot told there is not known from now on."""
@@ -463,7 +465,7 @@ class Fleet:
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])
         self._senders.learn(self._view, self._own.topics(robot))
-        self._open_publisher(link)
+        self._publishers.open(link)
         self.known.saw([robot])
         self.revision += 1
 
@@ -487,34 +489,7 @@ class Fleet:
         if link.watch is not None:
             link.watch.close()
             link.watch = None
-        old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
-        link.publisher = link.world = None
-
-        def close_them(_node: Node) -> None:
-            for publisher in old:
-                publisher.close()
-
-        if old:
-            self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
-
-    def _open_publisher(self, link: RobotLink) -> None:
-        topics = link.robot.topics
-        if link.publisher is not None or link.is_opening:
-            return
-        link.is_opening = True
-
-        def open_them(node: Node) -> None:
-            native = link.robot.dialect == "native"
-            try:
-                if link.robot.topics != topics:
-                    return  # it has changed meanwhile, and is reached by the next graph
-                world = node.new_pub(topics.world, "json") if topics.world is not None else None
-                link.world = world
-                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
-            finally:
-                link.is_opening = False
-
-        self._submit(_("reach {robot}").format(robot=link.name), open_them)
+        self._publishers.leave(link)
 
     def _keep_going(self, link: RobotLink, program: Identity | None) -> None:
         """Enter what the robot itself could not end: from here on nobody hears whether it has."""
@@ -538,6 +513,17 @@ class Fleet:
             link, "failed", _("{robot} has gone; check that it is on").format(robot=link.name)
         )
         self.revision += 1
+
+    def _forget_absent(self) -> None:
+        """Forget robots that are away, beyond a limit: strangers can announce any number of names."""
+        in_use = {self._chosen, *self.used(), *self.moved.names}
+        for link in excess_absent(self._links.values(), in_use):
+            del self._links[link.name]
+            for topic in [topic for topic, name in self._names.items() if name == link.name]:
+                del self._names[topic]
+            self._held.pop(link.name, None)
+            self._publishers.end(link)
+            self.revision += 1
 
     def _send(self, link: RobotLink, command: Payload) -> bool:
         if link.publisher is None or not link.connected:

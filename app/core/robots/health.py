@@ -23,6 +23,8 @@ ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 INSTALLATION = "installation"
 """The alert of Studio's own program; "program" is the behaviour's."""
+ROBOT_ALERTS = ("robot", "moving", "camera")
+"""Alerts of one robot; the name follows after a colon."""
 
 REAL = lazy("Check that it is on and in the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
@@ -49,6 +51,7 @@ class Health:
         self._unreachable: set[str] = set()
         self._bad: dict[str, _Bad] = {}
         self._away: dict[str, float] = {}
+        self._robots: set[str] = set()
 
     def look(self, found: Mapping[str, Checked]) -> None:
         """Tell which topics send what can't be read: one alert each, with the exact count.
@@ -83,6 +86,7 @@ class Health:
         for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
             self.forget(topic)
         self._check_claims()
+        self._forget_robots()
         for link in self._fleet.links:
             self._check_camera(link)
             self._check_motion(link)
@@ -243,6 +247,15 @@ class Health:
             action=f"connect:{link.name}" if link.virtual else "help.doctor",
             count=0,
         )
+
+    def _forget_robots(self) -> None:
+        """Resolve the alerts of robots that Studio has forgotten."""
+        names = {link.name for link in self._fleet.links}
+        for name in self._robots - names:
+            self._away.pop(name, None)
+            for kind in ROBOT_ALERTS:
+                self._alerts.resolve(f"{kind}:{name}")
+        self._robots = names
 
     def _check_claims(self) -> None:
         """Tell of programs that say that they are a robot and are not believed."""

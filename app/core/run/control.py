@@ -89,6 +89,7 @@ class Runs:
         self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
+        fleet.used = lambda: self.used
         self._news = StopNews(fleet, alerts, console)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None

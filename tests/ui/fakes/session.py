@@ -20,7 +20,6 @@ from app.core.documents.saved_tabs import KeptTabs
 from app.core.network import doctor as doctor_module
 from app.core.network.master import MasterState
 from app.core.network.topics import Topic
-from app.core.robots.fleet import COMMAND_TYPE
 from app.core.robots.robot_link import RobotLink, topics_of
 from app.core.robots.stop.report import StopReport
 from app.core.robots.voices import RobotVoices
@@ -30,6 +29,7 @@ from app.robots.description.model import Robot
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
 from nep.programs.doctor import Finding, Tell
+from nep.programs.robots.moving import COMMAND_TYPE
 from tests.ui import sample_data
 from tests.ui.fakes.images import Images
 from tests.ui.fakes.network import Network

@@ -1,0 +1,65 @@
+"""Publishers by which Studio commands robots, opened and closed in the thread of the message source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.core.robots.robot_link import RobotLink
+from nep.i18n import _
+from nep.nodes.node import Node
+from nep.programs.robots.moving import COMMAND_TYPE
+
+Submit = Callable[[str, Callable[[Node], None]], None]
+"""Runs a job with the node in the source's thread, in order. The text says what the job does."""
+
+
+class CommandPublishers:
+    """Opens and closes the publishers of robots. Used by the window's thread."""
+
+    def __init__(self, submit: Submit) -> None:
+        self._submit = submit
+
+    def open(self, link: RobotLink) -> None:
+        """Open the publishers of a robot's command and world topics, unless they are open or being opened."""
+        topics = link.robot.topics
+        if link.publisher is not None or link.is_opening:
+            return
+        link.is_opening = True
+
+        def open_them(node: Node) -> None:
+            native = link.robot.dialect == "native"
+            try:
+                if link.robot.topics != topics:
+                    return  # it has changed meanwhile, and is reached by the next graph
+                world = node.new_pub(topics.world, "json") if topics.world is not None else None
+                link.world = world
+                link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
+            finally:
+                link.is_opening = False
+
+        self._submit(_("reach {robot}").format(robot=link.name), open_them)
+
+    def leave(self, link: RobotLink) -> None:
+        """Close the publishers of topics that the robot's description does not name any more."""
+        old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
+        link.publisher = link.world = None
+
+        def close_them(_node: Node) -> None:
+            for publisher in old:
+                publisher.close()
+
+        if old:
+            self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
+
+    def end(self, link: RobotLink) -> None:
+        """Close the publishers of a robot that Studio forgets, also those that are being opened."""
+        if link.is_opening or link.publisher is not None or link.world is not None:
+            self._submit("", lambda _node: close_publishers(link))
+
+
+def close_publishers(link: RobotLink) -> None:
+    """Close the publishers of a robot now."""
+    for publisher in (link.publisher, link.world):
+        if publisher is not None:
+            publisher.close()
+    link.publisher = link.world = None

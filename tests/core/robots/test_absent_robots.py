@@ -1,0 +1,210 @@
+"""Robots that go away are forgotten beyond a limit, except those that a Stop must name."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from app.core.alerts import Alerts
+from app.core.network.topics import Topics
+from app.core.network.watches import Watches
+from app.core.robots.absent_robots import MAX_ABSENT
+from app.core.robots.announcements import RizeNames
+from app.core.robots.fleet import Fleet
+from app.core.robots.health import AWAY_S, Health
+from app.core.robots.robot_link import RobotLink
+from app.core.robots.stop_report import RobotStop, StopReport
+from app.robots.description.description import RobotTopics, topic_of
+from app.robots.identity import Identity
+from nep.nodes.node import Node
+from nep.protocol.graph_view import GraphView
+from tests.blocks.samples import robot
+from tests.core.robots.simulated_network import FakeClock, SimulatedStudio
+
+ANY = robot("Any")
+
+
+class CountingPublisher:
+    """Publisher that counts how many publishers of its topic are open."""
+
+    def __init__(self, open_topics: Counter[str], topic: str) -> None:
+        self._open, self._topic = open_topics, topic
+        open_topics[topic] += 1
+
+    def close(self) -> None:
+        self._open[self._topic] -= 1
+
+
+class Strangers:
+    """A fleet whose network is made of the robots that a test invents."""
+
+    def __init__(self) -> None:
+        self.clock, self.watched, self.published = FakeClock(), set[str](), Counter[str]()
+        self.jobs: list[Callable[[Node], None]] = []
+        self.fleet = Fleet(Watches(self.watched.add, self.watched.remove), self._submit, self.clock)
+        self._revision = 0
+
+    def _submit(self, _what: str, job: Callable[[Node], None]) -> None:
+        self.jobs.append(job)
+
+    def new_pub(self, topic: str, *_args: object, **_how: object) -> CountingPublisher:
+        return CountingPublisher(self.published, topic)
+
+    def run_jobs(self) -> None:
+        jobs, self.jobs = self.jobs, []
+        for job in jobs:
+            job(cast("Node", self))
+
+    def come(self, name: str) -> RobotLink:
+        """A robot of this name is announced."""
+        topics = RobotTopics(*(topic_of(name, leaf) for leaf in ("description", "command", "answer")))
+        made = replace(ANY, name=name, title=name, virtual=False, sensors=(), events=(), topics=topics)
+        self.fleet.join(made, topics.description, Identity(f"node of {name}", name, "elsewhere", 1))
+        link = self.fleet.link(name)
+        assert link is not None
+        return link
+
+    def leave(self) -> None:
+        """Everybody is gone."""
+        self.clock.now += 1
+        self._revision += 1
+        self.fleet.update(GraphView(1, self._revision))
+
+    def pass_by(self, count: int, *, runs_jobs: bool = True) -> None:
+        """So many robots under new names come, a hundred at a time, and go."""
+        for number in range(count):
+            self.come(f"Invented{self._revision}x{number}")
+            if number % 100 == 99:
+                if runs_jobs:
+                    self.run_jobs()
+                self.leave()
+        self.run_jobs()
+
+    @property
+    def names(self) -> set[str]:
+        return {link.name for link in self.fleet.links}
+
+    @property
+    def open_publishers(self) -> list[str]:
+        return sorted(topic for topic, count in self.published.items() if count)
+
+
+@pytest.fixture
+def strangers() -> Strangers:
+    return Strangers()
+
+
+def test_invented_robots_that_come_and_go_are_forgotten_and_everything_of_them_is_closed(
+    strangers: Strangers,
+) -> None:
+    strangers.pass_by(1000)
+    assert len(strangers.fleet.links) == MAX_ABSENT
+    assert len(strangers.fleet._names) == MAX_ABSENT
+    assert strangers.watched == set()
+    assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
+    strangers.pass_by(500)
+    assert len(strangers.fleet.links) == MAX_ABSENT
+
+
+def test_publishers_that_are_still_being_opened_are_closed_too(strangers: Strangers) -> None:
+    strangers.pass_by(400, runs_jobs=False)
+    assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
+
+
+def test_robot_that_was_moved_and_left_is_still_named_by_stop(strangers: Strangers) -> None:
+    strangers.come("Pepper")
+    strangers.fleet.moved.note(["Pepper"], "form")
+    strangers.leave()
+    strangers.pass_by(1000)
+    fleet = strangers.fleet
+    assert fleet.unheard == ("Pepper",)
+    assert "Pepper" in fleet.stoppable
+    (target,) = (each for each in fleet.stop_targets if each.robot.name == "Pepper")
+    assert target.is_expected
+    link = fleet.link("Pepper")
+    assert link is not None
+    fleet.add({})
+    assert link.state == "not stopped"
+
+
+@pytest.mark.parametrize("why", ["proven", "chosen", "used", "being stopped", "not stopped"])
+def test_robots_that_matter_are_not_forgotten(strangers: Strangers, why: str) -> None:
+    fleet = strangers.fleet
+    link = strangers.come("Pepper")
+    if why == "proven":
+        report = StopReport((RobotStop("Pepper", True, 41.0),), 41.0)
+        fleet.stopped({"Pepper": ("41 ms", "ok")}, report)
+        assert link.has_proven_stop
+    elif why == "chosen":
+        fleet.choose("Pepper")
+    elif why == "used":
+        fleet.used = lambda: ("Pepper",)
+    elif why == "being stopped":
+        fleet.told_to_stop(["Pepper"])
+    else:
+        link.not_stopped = "Pepper may still move"
+    strangers.leave()
+    strangers.pass_by(1000)
+    assert fleet.link("Pepper") is link
+    assert len(fleet.links) == MAX_ABSENT + 1
+
+
+def test_robots_that_have_answered_are_forgotten_last(strangers: Strangers) -> None:
+    strangers.come("Pepper").answered_s = 1.0
+    strangers.come("Silent")
+    strangers.leave()
+    strangers.pass_by(1000)
+    assert "Pepper" in strangers.names
+    assert "Silent" not in strangers.names
+
+
+def test_forgotten_robot_that_comes_back_is_a_new_one(strangers: Strangers) -> None:
+    before = strangers.come("Rover")
+    strangers.leave()
+    strangers.pass_by(300)
+    assert strangers.fleet.link("Rover") is None
+    after = strangers.come("Rover")
+    strangers.run_jobs()
+    assert after is not before
+    assert after.publisher is not None
+    assert strangers.published["/Rover/command"] == 1
+
+
+def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
+    alerts = Alerts()
+    health = Health(Topics(), strangers.fleet, alerts, strangers.clock)
+    strangers.come("Rover")
+    strangers.leave()
+    health.check()
+    strangers.clock.now += AWAY_S
+    health.check()
+    assert alerts.has("robot:Rover")
+    strangers.pass_by(300)
+    health.check()
+    assert not alerts.has("robot:Rover")
+    assert len(health._away) == MAX_ABSENT
+
+
+def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) -> None:
+    studio = SimulatedStudio(tmp_path)
+    try:
+        runs, fleet = studio.session.runs, studio.session.fleet
+        runs._used = ("Pepper",)
+        assert fleet.used() == ()
+        runs._run = replace(runs.state, state="running")
+        assert fleet.used() == ("Pepper",)
+        runs._run = replace(runs.state, state="ready")
+    finally:
+        studio.close()
+
+
+def test_names_that_robots_of_rize_tell_are_bounded() -> None:
+    names = RizeNames()
+    for number in range(1000):
+        names.tell(f"Robot{number}")
+    assert len(names._told) <= MAX_ABSENT
