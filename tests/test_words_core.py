@@ -25,6 +25,7 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, Health
 from app.core.robots.health_facts import facts_of
 from app.core.robots.motion.permission import MayNotMoveError, Question
+from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.core.robots.stop.report import RobotStop, StopReport, not_reached
 from app.core.run.view import RunState, clock_words, stop_words, view_of
@@ -135,6 +136,7 @@ def test_the_facts_of_a_robot() -> None:
         replace(link, mute=True, answered_s=3.0),
         replace(link, answered_s=3.0, stopping=True, values={"battery": 4}),
         replace(link, values={"battery": 80}),
+        replace(link, rejected=ReportedCount(12, 8.0), errors=ReportedCount(1)),
     ]
     for each in links:
         for silent_s in (None, 99.0):
@@ -156,11 +158,18 @@ def test_alerts_of_health() -> None:
             virtual=robot.virtual,
             connected=on,
             goes_on="",
+            rejected=ReportedCount(12, now[0]),
+            errors=ReportedCount(1, now[0]),
             may_move="",
             not_stopped="",
             silent=None,
         )
-        for name, robot, on in (("Nao", real, False), ("Turtle", PEPPER, False), ("Pepper", real, False))
+        for name, robot, on in (
+            ("Nao", real, False),
+            ("Turtle", PEPPER, False),
+            ("Pepper", real, False),
+            ("Xx", real, True),
+        )
     ]
     fleet = cast("Fleet", SimpleNamespace(links=links, claims={}))
     health = Health(Topics(), fleet, alerts, lambda: now[0])

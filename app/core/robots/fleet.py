@@ -18,6 +18,7 @@ from app.core.robots.known import KnownRobots
 from app.core.robots.motion.gate import MotionGate, MovableRobots
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.robots.own_messages import OwnMessages, mapping_of
+from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
 from app.core.robots.stop.lines import MOST_TOPICS, StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
@@ -474,6 +475,7 @@ class Fleet:
         before, link.identity = link.identity, identity
         if before is None or identity is None or before.node_id == identity.node_id:
             return
+        link.rejected, link.errors = ReportedCount(), ReportedCount()
         self._notes.append(
             _("{robot} was started anew: it is {now} now, before {before}").format(
                 robot=link.name, now=identity.words, before=before.words
@@ -574,7 +576,10 @@ class Fleet:
             self.moved.ended(link.name, id)
 
     def _take_life(self, link: RobotLink, answer: Payload) -> None:
-        """Take a robot's sign of life, which names the actions that it could not end."""
+        """Take a robot's sign of life: counts, which are left out when zero, and actions that did not end."""
+        now_s = self._clock()
+        link.rejected.take(answer.get("rejected", 0), now_s)
+        link.errors.take(answer.get("errors", 0), now_s)
         if "not_ended" not in answer:
             return
         before, link.goes_on = link.goes_on, ""

@@ -23,7 +23,7 @@ ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 INSTALLATION = "installation"
 """The alert of Studio's own program; "program" is the behaviour's."""
-ROBOT_ALERTS = ("robot", "moving", "camera")
+ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
 """Alerts of one robot; the name follows after a colon."""
 
 REAL = lazy("Check that it is on and in the same Wi-Fi.")
@@ -90,6 +90,7 @@ class Health:
         for link in self._fleet.links:
             self._check_camera(link)
             self._check_motion(link)
+            self._check_driver(link, now)
             if link.connected:
                 self._away.pop(link.name, None)
                 self._alerts.resolve(f"robot:{link.name}")
@@ -294,6 +295,34 @@ class Health:
             action="run.stop",
             count=0,
         )
+
+    def _check_driver(self, link: RobotLink, now: float) -> None:
+        """Tell of a driver that rejects messages or catches exceptions, until it has not for a while."""
+        rejected, errors = link.rejected, link.errors
+        said = {
+            "rejected": (
+                rejected,
+                ngettext(
+                    "{robot} rejected {count} message.", "{robot} rejected {count} messages.", rejected.value
+                ),
+                _("They were too large, not readable or too many. Its log has the topics and reasons."),
+            ),
+            "errors": (
+                errors,
+                ngettext(
+                    "The driver of {robot} caught {count} exception.",
+                    "The driver of {robot} caught {count} exceptions.",
+                    errors.value,
+                ),
+                _("Its log has the traceback."),
+            ),
+        }
+        for kind, (count, title, detail) in said.items():
+            if link.connected and count.is_growing(now):
+                words = title.format(robot=link.name, count=count.value)
+                self._alerts.put(f"{kind}:{link.name}", "warn", words, detail, count=0, for_developers=True)
+            else:
+                self._alerts.resolve(f"{kind}:{link.name}")
 
     def _check_camera(self, link: RobotLink) -> None:
         id = f"camera:{link.name}"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.network.topics import Topic, Topics
+from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Sensor
 from app.robots.description.json_access import finite
@@ -23,6 +24,7 @@ WARM_C = 60
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
+REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver errors")
 LEFT_ALONE, SIGN_OF_LIFE = lazy("Left alone"), lazy("Sign of life")
 TOLD = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
@@ -57,6 +59,7 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
     facts.append(_stop(link))
     if link.connected:
         facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
+        facts += [*_count(REJECTED, link.rejected, now), *_count(ERRORS, link.errors, now)]
     facts += [_left_alone(link), *_life(link)]
     return tuple(sorted(facts, key=lambda fact: not fact.to_look_at))
 
@@ -206,6 +209,14 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
     if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
     return topic.silent_s > max(SILENT_S, MISSED / sensor.rate_hz)
+
+
+def _count(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]:
+    """What went wrong in the driver of a robot, if anything did."""
+    if count.is_growing(now):
+        yield HealthFact(title, "warn", _("{count} so far; see its log").format(count=count.value))
+    elif count.value:
+        yield HealthFact(title, "off", _("{count} since it started").format(count=count.value))
 
 
 def _left_alone(link: RobotLink) -> HealthFact:

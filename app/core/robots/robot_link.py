@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
+from app.core.robots.reported_count import ReportedCount
 from app.robots.description.description import Robot, RobotTopics
 from app.robots.identity import Identity, may_move
 from nep.i18n import _, lazy
@@ -89,6 +90,7 @@ class RobotLink:
     ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
     enough to be said. ``is_reached`` says that a stop would arrive now.
     ``identity`` is the program that it is, ``topics_before`` are the topics of its earlier descriptions.
+    ``rejected`` counts messages that its driver did not handle, ``errors`` exceptions that it survived.
     ``was_real`` says that it has not always been virtual, ``has_proven_stop`` that its program once did.
     """
 
@@ -116,6 +118,8 @@ class RobotLink:
     identity: Identity | None = None
     topics_before: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
+    rejected: ReportedCount = field(default_factory=ReportedCount)
+    errors: ReportedCount = field(default_factory=ReportedCount)
     was_real: bool = False
     publisher: Publisher | None = None
     world: Publisher | None = None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import cast
 
 import pytest
+from tests.core.robots.simulated_network import FakeClock, SimulatedStudio
 
 from app.core.alerts import Alerts
 from app.core.network.topics import Topics
@@ -18,13 +19,12 @@ from app.core.robots.announcements import RizeNames
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, Health
 from app.core.robots.robot_link import RobotLink
-from app.core.robots.stop_report import RobotStop, StopReport
+from app.core.robots.stop.report import RobotStop, StopReport
 from app.robots.description.description import RobotTopics, topic_of
 from app.robots.identity import Identity
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from tests.blocks.samples import robot
-from tests.core.robots.simulated_network import FakeClock, SimulatedStudio
 
 ANY = robot("Any")
 

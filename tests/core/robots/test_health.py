@@ -13,6 +13,7 @@ from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, CURE_S, Health
+from app.core.robots.reported_count import GROWING_S, ReportedCount
 from nep.messages.message import Message
 from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -122,6 +123,8 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
         silent=None,
         robot=shown,
         goes_on="",
+        rejected=ReportedCount(),
+        errors=ReportedCount(),
         may_move="",
         not_stopped="",
     )
@@ -158,6 +161,35 @@ def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case)
     alert = case.alert()
     assert alert is not None
     assert (alert.title, alert.action) == ("Rover does not answer.", "connect:Rover")
+
+
+@pytest.mark.parametrize("kind", ["rejected", "errors"])
+def test_driver_that_rejects_messages_or_catches_exceptions_is_an_alert_until_it_stops(
+    case: Case, kind: str
+) -> None:
+    link = robot(virtual=False, connected=True)
+    case.links.append(link)
+    count: ReportedCount = getattr(link, kind)
+    case.health.check()
+    assert case.alert() is None
+    for value in (1, 12):
+        count.take(value, case.now)
+        case.health.check()
+    alert = case.alert()
+    assert alert is not None
+    assert (alert.id, alert.severity, alert.for_developers) == (f"{kind}:Rover", "warn", True)
+    assert "Rover" in alert.title
+    assert "12" in alert.title
+    case.now += GROWING_S
+    count.take(12, case.now)
+    case.health.check()
+    assert case.alert() is None
+    count.take(13, case.now)
+    case.health.check()
+    assert case.alert() is not None
+    link.connected = False
+    case.health.check()
+    assert case.alert() is None
 
 
 def seeing(name: str) -> SimpleNamespace:

@@ -8,6 +8,7 @@ import pytest
 
 from app.core.network.topics import Topic
 from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
+from app.core.robots.reported_count import GROWING_S, ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
 from app.robots.description.description import DataField, Sensor, parse, td_for
@@ -93,6 +94,22 @@ def test_one_that_does_not_answer_says_since_when_and_what_to_do(case: Case) -> 
     case.link.answered_s = None
     case.link.robot = replace(PEPPER, virtual=False)
     assert case.says("Connection") == ("error", "does not answer; check that it is on")
+
+
+@pytest.mark.parametrize(("title", "kind"), [("Rejected messages", "rejected"), ("Driver errors", "errors")])
+def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
+    case: Case, title: str, kind: str
+) -> None:
+    assert title not in {fact.title for fact in case.facts()}
+    count: ReportedCount = getattr(case.link, kind)
+    count.take(12, NOW - 1)
+    status, words = case.says(title)
+    assert status == "warn"
+    assert "12" in words
+    count.grew_s = NOW - GROWING_S
+    status, words = case.says(title)
+    assert status == "off"
+    assert "12" in words
 
 
 def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
