@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
-from app.core.robots.absent_robots import excess_absent
 from app.core.robots.announcements import Announcements, Claim, RizeNames
 from app.core.robots.command_publishers import CommandPublishers, Submit, close_publishers
 from app.core.robots.known import KnownRobots
@@ -19,9 +18,16 @@ from app.core.robots.motion.gate import MotionGate, MovableRobots
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.robots.own_messages import OwnMessages, mapping_of
 from app.core.robots.reported_count import ReportedCount
-from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink, topics_of
+from app.core.robots.robot_link import (
+    FINAL_STATES,
+    SENDER,
+    Invocation,
+    Payload,
+    RobotLink,
+    excess_away,
+    topics_of,
+)
 from app.core.robots.stop.lines import MOST_TOPICS, StopTarget
-from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
 from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, StopReport
 from app.core.robots.tries import Tries
@@ -317,13 +323,13 @@ class Fleet:
         for link in self._links.values():
             if link.connected and link.publisher is None:
                 self._publishers.open(link)
-        self._forget_absent()
+        self._forget_away()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Take over what arrived: descriptions, answers, sensor values."""
         if self._announcements.add(batches):
             self._follow_announced()
-            self._forget_absent()
+            self._forget_away()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
             name = rize.ready(mapping_of(message))
@@ -516,10 +522,10 @@ class Fleet:
         )
         self.revision += 1
 
-    def _forget_absent(self) -> None:
+    def _forget_away(self) -> None:
         """Forget robots that are away, beyond a limit: strangers can announce any number of names."""
         in_use = {self._chosen, *self.used(), *self.moved.names}
-        for link in excess_absent(self._links.values(), in_use):
+        for link in excess_away(self._links.values(), in_use):
             del self._links[link.name]
             for topic in [topic for topic, name in self._names.items() if name == link.name]:
                 del self._names[topic]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from app.core.network.watches import Watch
@@ -17,6 +17,8 @@ from nep.nodes.publisher import Publisher
 SENDER = "studio"
 """Who the commands of try-outs are from."""
 TRIES_KEPT = 40
+MAX_AWAY = 200
+"""Robots that went away and are remembered: a whole room may go at once, when its access point fails."""
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
@@ -178,6 +180,22 @@ class RobotLink:
         """The words of its chip: ``virtual, ready``."""
         words = self.state_words
         return _("virtual, {state}").format(state=words) if self.virtual else words
+
+
+def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
+    """Return the robots to forget: those away beyond `MAX_AWAY`, as any program can invent new names.
+
+    Robots that never answered come first, then those that are away longest. Robots ``in_use``, robots that
+    have ever proven a Stop, and robots whose Stop is pending or failed are neither counted nor returned.
+    """
+    away = [
+        link
+        for link in links
+        if not (link.connected or link.has_proven_stop or link.not_stopped or link.name in in_use)
+        and link.stop_began_s is None
+    ]
+    excess = max(0, len(away) - MAX_AWAY)
+    return sorted(away, key=lambda link: (link.answered_s is not None, link.gone_s or 0.0))[:excess]
 
 
 def topics_of(robot: Robot) -> list[str]:

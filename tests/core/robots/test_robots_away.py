@@ -14,11 +14,10 @@ from tests.core.robots.simulated_network import FakeClock, SimulatedStudio
 from app.core.alerts import Alerts
 from app.core.network.topics import Topics
 from app.core.network.watches import Watches
-from app.core.robots.absent_robots import MAX_ABSENT
 from app.core.robots.announcements import RizeNames
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import AWAY_S, Health
-from app.core.robots.robot_link import RobotLink
+from app.core.robots.robot_link import MAX_AWAY, RobotLink
 from app.core.robots.stop.report import RobotStop, StopReport
 from app.robots.description.description import RobotTopics, topic_of
 from app.robots.identity import Identity
@@ -103,12 +102,12 @@ def test_invented_robots_that_come_and_go_are_forgotten_and_everything_of_them_i
     strangers: Strangers,
 ) -> None:
     strangers.pass_by(1000)
-    assert len(strangers.fleet.links) == MAX_ABSENT
-    assert len(strangers.fleet._names) == MAX_ABSENT
+    assert len(strangers.fleet.links) == MAX_AWAY
+    assert len(strangers.fleet._names) == MAX_AWAY
     assert strangers.watched == set()
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
     strangers.pass_by(500)
-    assert len(strangers.fleet.links) == MAX_ABSENT
+    assert len(strangers.fleet.links) == MAX_AWAY
 
 
 def test_publishers_that_are_still_being_opened_are_closed_too(strangers: Strangers) -> None:
@@ -151,7 +150,7 @@ def test_robots_that_matter_are_not_forgotten(strangers: Strangers, why: str) ->
     strangers.leave()
     strangers.pass_by(1000)
     assert fleet.link("Pepper") is link
-    assert len(fleet.links) == MAX_ABSENT + 1
+    assert len(fleet.links) == MAX_AWAY + 1
 
 
 def test_robots_that_have_answered_are_forgotten_last(strangers: Strangers) -> None:
@@ -187,7 +186,7 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     strangers.pass_by(300)
     health.check()
     assert not alerts.has("robot:Rover")
-    assert len(health._away) == MAX_ABSENT
+    assert len(health._away) == MAX_AWAY
 
 
 def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) -> None:
@@ -207,4 +206,4 @@ def test_names_that_robots_of_rize_tell_are_bounded() -> None:
     names = RizeNames()
     for number in range(1000):
         names.tell(f"Robot{number}")
-    assert len(names._told) <= MAX_ABSENT
+    assert len(names._told) <= MAX_AWAY
