@@ -3,13 +3,15 @@
 Readers walk payloads recursively; a message of 2 kB with 1000 levels would end them with `RecursionError`.
 The check of JSON reads the bytes before they are decoded: most messages have too few brackets to be deep, and
 seeing that takes less than a microsecond. msgpack is checked after decoding, with the garbage collector's
-traversal of lists and maps, which takes less than a fifth of the time of a loop in Python.
+traversal of lists and maps, which takes about a quarter of the time of a loop in Python.
 """
 
 from __future__ import annotations
 
 import gc
 import re
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
 from datetime import datetime
 
 from nep.i18n import _
@@ -106,10 +108,20 @@ def _may_be_too_deep(value: object) -> bool:
 def _is_too_deep(value: object) -> bool:
     level: list[object] = [value]
     for _level in range(MAX_LEVELS + 1):
-        containers = [each for each in level if isinstance(each, _CONTAINERS)]
-        if not containers:
+        kinds = {
+            kind for kind in set(map(type, level)) if issubclass(kind, _CONTAINERS) or is_dataclass(kind)
+        }
+        if not kinds:
             return False
-        level = [
-            inner for each in containers for inner in (each.values() if isinstance(each, dict) else each)
-        ]
+        level = [inner for each in level if type(each) in kinds for inner in _members(each)]
     return True
+
+
+def _members(value: object) -> Iterable[object]:
+    """Return what is directly in a list, a map, or a dataclass, without its private fields."""
+    if isinstance(value, dict):
+        return value.values()
+    if isinstance(value, (list, tuple)):
+        return value
+    names = [field.name for field in fields(value)]  # type: ignore[arg-type]
+    return [getattr(value, name) for name in names if not name.startswith("_")]

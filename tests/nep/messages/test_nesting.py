@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections import OrderedDict
+from dataclasses import dataclass
 from datetime import datetime, timezone
 
 import msgpack
@@ -137,6 +138,26 @@ def test_text_of_another_encoding_hides_no_levels() -> None:
     text = '["\u5d5d\u2222",' * 100 + "1" + "]" * 100
     with pytest.raises(DecodeError):
         codec("json").decode(text.encode("utf-16"), {})
+
+
+@dataclass
+class Linked:
+    """A dataclass, which is sent as a map."""
+
+    next: object
+    _previous: object = None
+
+
+@pytest.mark.parametrize("name", ["json", "msgpack"])
+def test_nested_dataclasses_are_levels(name: str) -> None:
+    value: object = "x" * 200
+    for _level in range(64):
+        before, value = value, Linked(value)
+        if isinstance(before, Linked):
+            before._previous = value  # a cycle, but private fields are not sent
+    assert codec(name).decode(codec(name).encode(value).data, {})
+    with pytest.raises(EncodeError, match=SENTENCE):
+        codec(name).encode(Linked(value))
 
 
 def test_publisher_refuses_and_counts_what_is_too_deep(caplog: pytest.LogCaptureFixture) -> None:
