@@ -28,6 +28,7 @@ from app.core.robots.robot_link import (
     topics_of,
 )
 from app.core.robots.stop.lines import MOST_TOPICS, StopTarget
+from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
 from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, StopReport
 from app.core.robots.tries import Tries
