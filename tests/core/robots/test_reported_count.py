@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.core.robots.simulated_network import SimulatedStudio, publisher_of
 
 from app.core.robots.reported_count import GROWING_S, MAX_COUNT, ReportedCount
+from tests.core.robots.stop_model.lab import SimulatedLab
+from tests.core.robots.stop_model.network import SimulatedNode
+from tests.core.robots.stop_model.studio import GRAPH_POLL_S
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[SimulatedStudio]:
-    made = SimulatedStudio(tmp_path)
-    yield made
-    made.close()
+def lab(tmp_path: Path) -> Iterator[SimulatedLab]:
+    lab = SimulatedLab(tmp_path)
+    yield lab
+    lab.close()
 
 
 @pytest.mark.parametrize(
@@ -42,35 +43,27 @@ def test_count_of_a_restarted_driver_begins_anew() -> None:
     assert not count.is_growing(3.0 + GROWING_S)
 
 
-def test_signs_of_life_bring_the_counts_of_the_robots_own_program(studio: SimulatedStudio) -> None:
-    pepper = studio.network.add("Pepper")
-    studio.tick()
+def test_signs_of_life_bring_the_counts_of_the_robots_own_program(lab: SimulatedLab) -> None:
+    pepper = lab.start_robot("Pepper")
+    link = lab.wait_for_link("Pepper")
 
-    def alive(node: str = pepper.node, **counts: object) -> None:
-        told: dict[str, object] = {
-            "op": "alive",
-            "id": "",
-            "action": "",
-            "state": "running",
-            "not_ended": [],
-            "error": None,
-        }
-        data = json.dumps({**told, **counts}).encode()
-        studio.network.publish_bytes("/Pepper/answer", data, publisher_of(node, "/Pepper/answer"))
-        studio.tick()
+    def send_alive(node: SimulatedNode = pepper.node, **counts: object) -> None:
+        alive = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": [], "error": None}
+        publisher = node.new_pub("/Pepper/answer", "robot/answer")
+        lab.advance(GRAPH_POLL_S)  # its publisher is listed and connected
+        publisher.publish({**alive, **counts})
+        lab.settle()
 
-    link = studio.session.fleet.link("Pepper")
-    assert link is not None
-    alive(rejected=12, errors=3)
+    send_alive(rejected=12, errors=3)
     assert (link.rejected.value, link.errors.value) == (12, 3)
-    alive(rejected="many", errors=[1])
-    alive("stranger", rejected=99, errors=99)
+    send_alive(rejected="many", errors=[1])
+    send_alive(lab.stranger.node, rejected=99, errors=99)
     assert (link.rejected.value, link.errors.value) == (12, 3)
-    assert link.rejected.is_growing(studio.clock.now)
-    alive()
+    assert link.rejected.is_growing(lab.clock.now())
+    send_alive()
     assert (link.rejected.value, link.errors.value) == (0, 0)
-    alive(rejected=5)
-    studio.network.remove(pepper)
-    studio.network.add("Pepper", "pepper-2")
-    studio.tick()
+    send_alive(rejected=5)
+    pepper.node.close()
+    lab.start_robot("Pepper")
+    lab.wait_for_link("Pepper")
     assert link.rejected.value == 0, "another program"

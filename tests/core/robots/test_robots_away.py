@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import cast
 
 import pytest
-from tests.core.robots.simulated_network import FakeClock, SimulatedStudio
 
 from app.core.alerts import Alerts
 from app.core.network.topics import Topics
@@ -24,6 +23,8 @@ from app.robots.identity import Identity
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from tests.blocks.samples import robot
+from tests.core.robots.stop_model.clock import SimulatedClock
+from tests.core.robots.stop_model.lab import SimulatedLab
 
 ANY = robot("Any")
 
@@ -43,9 +44,9 @@ class Strangers:
     """A fleet whose network is made of the robots that a test invents."""
 
     def __init__(self) -> None:
-        self.clock, self.watched, self.published = FakeClock(), set[str](), Counter[str]()
+        self.clock, self.watched, self.published = SimulatedClock(), set[str](), Counter[str]()
         self.jobs: list[Callable[[Node], None]] = []
-        self.fleet = Fleet(Watches(self.watched.add, self.watched.remove), self._submit, self.clock)
+        self.fleet = Fleet(Watches(self.watched.add, self.watched.remove), self._submit, self.clock.now)
         self._revision = 0
 
     def _submit(self, _what: str, job: Callable[[Node], None]) -> None:
@@ -70,7 +71,7 @@ class Strangers:
 
     def leave(self) -> None:
         """Everybody is gone."""
-        self.clock.now += 1
+        self.clock.move_to(self.clock.now() + 1)
         self._revision += 1
         self.fleet.update(GraphView(1, self._revision))
 
@@ -176,11 +177,11 @@ def test_forgotten_robot_that_comes_back_is_a_new_one(strangers: Strangers) -> N
 
 def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     alerts = Alerts()
-    health = Health(Topics(), strangers.fleet, alerts, strangers.clock)
+    health = Health(Topics(), strangers.fleet, alerts, strangers.clock.now)
     strangers.come("Rover")
     strangers.leave()
     health.check()
-    strangers.clock.now += AWAY_S
+    strangers.clock.move_to(strangers.clock.now() + AWAY_S)
     health.check()
     assert alerts.has("robot:Rover")
     strangers.pass_by(300)
@@ -190,16 +191,16 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
 
 
 def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) -> None:
-    studio = SimulatedStudio(tmp_path)
+    lab = SimulatedLab(tmp_path)
     try:
-        runs, fleet = studio.session.runs, studio.session.fleet
+        runs, fleet = lab.studio.session.runs, lab.studio.session.fleet
         runs._used = ("Pepper",)
         assert fleet.used() == ()
         runs._run = replace(runs.state, state="running")
         assert fleet.used() == ("Pepper",)
         runs._run = replace(runs.state, state="ready")
     finally:
-        studio.close()
+        lab.close()
 
 
 def test_names_that_robots_of_rize_tell_are_bounded() -> None:
