@@ -54,6 +54,7 @@ LONG_S = {
     "tests/nep/bridges/test_command.py": 40.0,
     "tests/nep/bridges/test_loops.py": 30.0,
     "tests/ui/shell/test_layout_orders.py": 50.0,
+    "tests/core/robots/test_stop_model.py": 60.0,
     "tests/core/robots/test_claims.py": 33.0,
     "tests/ui/theme/test_high_dpi.py": 32.0,
     "tests/core/test_session.py": 32.0,
