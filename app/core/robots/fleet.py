@@ -100,7 +100,8 @@ class Fleet:
         )
         self._movable = MovableRobots(self._links, self._names)
         self.gate = MotionGate(self.permission, self._movable)
-        self.moved = MovedRobots(self._identity_of, self._processes.has_ended, clock)
+        others = self._other_programs
+        self.moved = MovedRobots(self._identity_of, self._processes.has_ended, clock, others)
         """Which robots a Stop must name."""
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
@@ -375,6 +376,9 @@ class Fleet:
         link = self._links.get(name)
         return None if link is None else link.identity
 
+    def _other_programs(self, name: str) -> list[Identity]:
+        return self._own.other_programs(self._links.get(name))
+
     def _drop_ended(self, link: RobotLink) -> None:
         """A virtual robot is its program: what an ended one did moves no more."""
         if link.virtual and link.name in self.moved:
@@ -580,7 +584,7 @@ class Fleet:
             return
         id, error = answer.get("id"), answer.get("error")
         if isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
-            self.moved.ended(link.name, id)
+            self.moved.ended(link.name, id, link.identity)
 
     def _take_life(self, link: RobotLink, answer: Payload) -> None:
         """Take a robot's sign of life: counts, which are left out when zero, and actions that did not end."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from app.core.network.mailbox import Batch
 from app.core.robots.robot_link import Payload, RobotLink, topics_of
 from app.robots.description.description import Robot
-from app.robots.identity import GATEWAY, Senders, hearing, publishing
+from app.robots.identity import GATEWAY, Identity, Senders, hearing, identity_of, publishing
 from nep.errors import NepError
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
@@ -26,6 +26,15 @@ class OwnMessages:
     def topics(robot: Robot) -> set[str]:
         """Topics on which only the robot's own program counts, if it publishes there."""
         return {robot.topics.answer, *topics_of(robot)}
+
+    def other_programs(self, link: RobotLink | None) -> list[Identity]:
+        """Return the programs besides the robot's own that hear its commands and answer them."""
+        if link is None or link.robot.dialect != "native":
+            return []
+        own = link.identity.node_id if link.identity is not None else ""
+        answering = publishing(self.view, link.robot.topics.answer)
+        heard = hearing(self.view, link.robot.topics.command)
+        return [identity_of(self.view, node) for node in heard if node in answering and node != own]
 
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
         """Return whether the robot's own program sent a message; None while that is not known.

@@ -318,6 +318,41 @@ class StopModel(RuleBasedStateMachine):
         self.folder.cleanup()
 
 
+Step = tuple[str, dict[str, object]]
+BROKEN_HISTORIES: dict[str, list[Step]] = {
+    "nothing to stop is not proven": [("press_stop", {"wait_s": 0.0})],
+    "a robot froze while a form moved it": [
+        ("move_by_form", {"name": "Arm", "action": "turn", "wait_s": 0.05}),
+        ("halt", {"is_killed": False, "pick": 0, "wait_s": 1.7}),
+        ("press_stop", {"wait_s": 1.7}),
+    ],
+    "a second program of the name came right before Stop": [
+        ("start_robot", {"name": "Arm", "late": False}),
+        ("change_link", {"how": "held", "pick": 2}),
+        ("move_by_behaviour", {"robots": {"Arm"}, "wait_s": 0.0}),
+        ("press_stop", {"wait_s": 0.0}),
+    ],
+    "a second program ended the motion that the frozen one still has to do": [
+        ("halt", {"is_killed": False, "pick": 1, "wait_s": 0.6}),
+        ("start_robot", {"name": "Base", "late": False}),
+        ("move_by_form", {"name": "Base", "action": "turn", "wait_s": 1.7}),
+        ("press_stop", {"wait_s": 0.0}),
+    ],
+}
+
+
+@pytest.mark.parametrize("history", BROKEN_HISTORIES.values(), ids=BROKEN_HISTORIES)
+def test_history_that_broke_a_proof_before(history: list[Step]) -> None:
+    model = StopModel()
+    try:
+        model.start(both=True)
+        for name, arguments in history:
+            getattr(model, name)(**arguments)
+            model.check()
+    finally:
+        model.teardown()
+
+
 @pytest.mark.timeout(600 + HISTORIES)
 def test_a_proven_stop_is_true_in_every_history() -> None:
     count = HISTORIES or FIXED_HISTORIES

@@ -79,6 +79,7 @@ class MovedRobots:
         program_of: Callable[[str], Identity | None] = lambda _name: None,
         has_ended: Callable[[Identity], bool] = lambda _program: False,
         clock: Callable[[], float] = time.monotonic,
+        others_of: Callable[[str], Iterable[Identity]] = lambda _name: (),
     ) -> None:
         """Nothing has moved yet.
 
@@ -86,8 +87,10 @@ class MovedRobots:
             program_of: Returns the program that a robot is now.
             has_ended: Whether it is certain that a program does not run any more.
             clock: Monotonic seconds.
+            others_of: Returns other programs that hear a robot's commands now and answer them.
         """
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
+        self._others_of = others_of
         self._motions: dict[str, list[UnprovenMotion]] = {}
         self._count = 0
 
@@ -144,11 +147,26 @@ class MovedRobots:
                     each for each in found if each.id or (each.by, each.program) != (by, motion.program)
                 ]
             found.append(motion)
+            if program is None:
+                self._note_others(name, by, found)
 
-    def ended(self, name: str, id: str) -> None:
-        """The robot's own final answer to this invocation says that it has ended."""
+    def _note_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
+        """Enter other programs of the robot's name: one that is frozen may obey when it goes on."""
+        known = {motion.program for motion in found if not motion.id}
+        for other in self._others_of(name):
+            if other not in known and len(found) < MAX_MOTIONS:
+                found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
+
+    def ended(self, name: str, id: str, program: Identity | None = None) -> None:
+        """Take over the final answer of a robot's program to an invocation: for this program it has ended."""
+
+        def stays(motion: UnprovenMotion) -> bool:
+            if motion.id != id or program is None or motion.program is None:
+                return motion.id != id
+            return program.node_id != motion.program.node_id
+
         if id:
-            self._keep(name, lambda motion: motion.id != id)
+            self._keep(name, stays)
 
     def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
         """Programs of a robot, by node id, proved a Stop that began at ``mark``: it stands still.

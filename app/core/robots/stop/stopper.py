@@ -48,6 +48,8 @@ POLL_S = 0.02
 LOOK_S = 0.1
 """How often the master is asked at most while an answer of an unknown publisher waits."""
 GRAPH_S = 0.3
+_NOBODY = "nobody"
+"""Stands for the program of a robot while no master has told which it is."""
 
 STOP_TIMEOUT_S = 1.0
 """How long a robot may take to answer a stop, if its description does not say that it needs longer."""
@@ -210,8 +212,8 @@ class RobotStopper:
             if timeout_s is not None
             else patience_s((line.target.robot for line in lines), self._longest_s)
         )
-        if asked:  # a program that came since the last graph was told as well, and must answer
-            self._refresh_view()
+        if asked:
+            self._add_newcomers(asked)
         while True:
             self._look_for(asked)
             undelivered = [each for each in asked if not self._deliver(each)]
@@ -393,6 +395,14 @@ class RobotStopper:
                     each.serving |= self._serving(each)
                     self._judge_again(each)  # none of it is late: they are asked just now
 
+    def _add_newcomers(self, asked: Sequence[StopRequest]) -> None:
+        """Wait also for programs that came since the last graph: they were told as well."""
+        self._refresh_view()
+        with self._changed:
+            for each in asked:
+                known = {node: said for node, said in each.serving.items() if node != _NOBODY}
+                each.serving = self._serving(each) | known
+
     def _refresh_view(self) -> None:
         """Ask the master who is there; without an answer, what was known before counts."""
         with suppress(NepError):
@@ -408,7 +418,7 @@ class RobotStopper:
             # It never answers; one that could not even be told is none of those.
             return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
         identity = target.identity or first_to_announce(view, target.robot.topics.description)
-        own = identity.node_id if identity is not None else "nobody"
+        own = identity.node_id if identity is not None else _NOBODY
         found: dict[str, RobotStop | None] = {own: None}
         answering = {node for way in target.ways for node in publishing(view, way.answer)}
         heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
