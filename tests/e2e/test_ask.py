@@ -38,9 +38,9 @@ def asking(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     """Studio runs a behaviour that asks for a name."""
     script = started(asks("What is your name?", says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
+    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
-    studio.spot("[data-id=started]")
     studio.click("Run", kind="RunButton")
     studio.says("What is your name?", 40)
     return studio
@@ -72,9 +72,9 @@ def test_who_has_choices_chooses_by_key_and_by_mouse_also_in_the_large_room(
     last = chooses("Which colour?", ["red", "green", "a blue like the sky"], says_the_answer())
     first = chooses("Play?", ["yes", "no"], last)
     studio = start(str(write(tmp_path / "Mine.nepb", started(first))))
+    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
-    studio.spot("[data-id=started]")
     studio.click("Run", kind="RunButton")
     studio.find("yes", kind="ChoiceButton", within_s=40, focus=True)
     studio.screen.key("Right")
@@ -93,9 +93,9 @@ def test_who_has_choices_chooses_by_key_and_by_mouse_also_in_the_large_room(
 def test_stop_takes_choices_away(start: Callable[..., Studio], tmp_path: Path) -> None:
     script = started(chooses("Play?", ["yes", "no"], says_the_answer()))
     studio = start(str(write(tmp_path / "Mine.nepb", script)))
+    studio.spot("[data-id=started]")  # a menu that is open when the blocks come is closed by them
     studio.choose("Robots", "Use the virtual Pepper")
     studio.says("Pepper ready", 40)
-    studio.spot("[data-id=started]")
     studio.click("Run", kind="RunButton")
     studio.find("yes", kind="ChoiceButton", within_s=40, focus=True)
     studio.click("Stop", kind="StopButton")
