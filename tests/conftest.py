@@ -79,6 +79,7 @@ LONG_S = {
 }
 """... and files that take longer than so many tests would. Speed alone depends on it."""
 _GRACE_S = 20.0
+_PAST_TIMEOUT_S = 60.0
 _allowances = leftovers.Allowances()
 
 
@@ -196,6 +197,35 @@ def _nothing_is_left() -> Iterator[None]:
     refused = _allowances.refused(open_before, deadline)
     if refused:
         pytest.fail(f"descriptors are left behind: {refused}")
+
+
+def _end_if_stuck(item: pytest.Item) -> None:
+    """Dump all stacks and end this process if `item` goes on long after its timeout.
+
+    pytest-timeout raises an exception in the main thread, which does not reach a test that waits in C++, and
+    which Qt discards when it is raised in a slot. pytest-xdist then names the test and goes on without it.
+    """
+    marker = item.get_closest_marker("timeout")
+    timeout_s = float(marker.args[0] if marker else item.config.getini("timeout"))
+    file = item.config.stash[fault_handler_stderr_fd_key]
+    faulthandler.dump_traceback_later(timeout_s + _PAST_TIMEOUT_S, exit=True, file=file)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Watch over the test."""
+    _end_if_stuck(item)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """Watch over the end of the test: pytest stops a watch when a test has failed."""
+    _end_if_stuck(item)
+
+
+def pytest_runtest_logfinish() -> None:
+    """End the watch."""
+    faulthandler.cancel_dump_traceback_later()
 
 
 @pytest.fixture(autouse=True)
