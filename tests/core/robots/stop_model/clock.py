@@ -67,8 +67,9 @@ class SimulatedClock:
 
     def end(self) -> None:
         """End the history: from now on waits are short, and every time limit is over."""
-        self._has_ended = True
-        self._now += 1e6
+        with self._changed:
+            self._has_ended = True
+            self._now += 1e6
         self.wake_all()
 
     def join(self) -> None:
@@ -116,8 +117,12 @@ class SimulatedClock:
         try:
             if self._has_ended and not is_ready():
                 condition.wait(_AFTER_END_S)
-            while not self._has_ended and (is_frozen() or not (is_ready() or self._now >= deadline)):
-                with self._changed:
+            while True:
+                ready = is_ready()
+                with self._changed:  # what the test changes, it changes before it wakes who is registered
+                    is_over = not is_frozen() and (ready or self._now >= deadline)
+                    if self._has_ended or is_over:
+                        break
                     self._waiters[id(waiter)] = waiter
                     self._changed.notify_all()
                 condition.wait()
@@ -174,8 +179,8 @@ class SimulatedClock:
 
     def move_to(self, now: float) -> None:
         """Let it be this time; wake the threads and call the timers that are due."""
-        self._now = max(self._now, now)
         with self._changed:
+            self._now = max(self._now, now)
             due = [each for each in self._waiters.values() if each.deadline <= self._now]
         for waiter in due:
             waiter.wake()
