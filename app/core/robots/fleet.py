@@ -82,7 +82,7 @@ class Fleet:
         self._links: dict[str, RobotLink] = {}
         self._processes = processes if processes is not None else AllVirtual()
         self._senders = Senders()
-        self._own = OwnMessages(self._senders)
+        self._own = OwnMessages(self._senders, self._links)
         self._announcements = Announcements(watches, self._senders, clock, self._is_proven)
         self._unlisted: tuple[StopTarget, ...] = ()
         self._settings = settings
@@ -94,14 +94,13 @@ class Fleet:
         self._rize = RizeNames()
         self._rize_events: Watch | None = None
         self._alive = Heartbeat(SENDER, "studio-alive")
-        self.permission, self.known = (
-            MotionPermission(settings, self._identity_of),
-            KnownRobots(settings),
-        )
+        self.permission = MotionPermission(settings, self._identity_of)
+        self.known = KnownRobots(settings)
         self._movable = MovableRobots(self._links, self._names)
         self.gate = MotionGate(self.permission, self._movable)
-        others = self._other_programs
-        self.moved = MovedRobots(self._identity_of, self._processes.has_ended, clock, others)
+        self.moved = MovedRobots(
+            self._identity_of, self._processes.has_ended, clock, self._own.other_programs
+        )
         """Which robots a Stop must name."""
         self._tries = Tries(self._send, self._alive.rest, clock)
         self._chosen = ""
@@ -305,7 +304,8 @@ class Fleet:
     def update(self, view: GraphView) -> None:
         """Take over a new graph: robots come and go."""
         self._told = True
-        self._view = self._movable.view = self._own.view = view
+        before, self._view = self._view, view
+        self._movable.view = self._own.view = view
         self._announcements.update(view)
         topics = (self._own.topics(link.robot) for link in self._links.values())
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))
@@ -316,6 +316,8 @@ class Fleet:
             *unlisted_targets(view, known.unreadable, is_expected=False),
         )
         self._update_rize(view)
+        told = map(self._links.get, self.moved.sent_to)
+        self.moved.take_newcomers({link.name: self._own.newcomers(link, before) for link in told if link})
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = self._links.get(name)
@@ -375,9 +377,6 @@ class Fleet:
     def _identity_of(self, name: str) -> Identity | None:
         link = self._links.get(name)
         return None if link is None else link.identity
-
-    def _other_programs(self, name: str) -> list[Identity]:
-        return self._own.other_programs(self._links.get(name))
 
     def _drop_ended(self, link: RobotLink) -> None:
         """A virtual robot is its program: what an ended one did moves no more."""

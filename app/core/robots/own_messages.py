@@ -16,9 +16,9 @@ from nep.protocol.graph_view import GraphView
 class OwnMessages:
     """Judges messages of robots by who sent them. One thread uses it (the window's)."""
 
-    def __init__(self, senders: Senders) -> None:
-        """``senders`` know the nodes of publishers."""
-        self._senders = senders
+    def __init__(self, senders: Senders, links: Mapping[str, RobotLink]) -> None:
+        """``senders`` know the nodes of publishers, ``links`` are the robots by name."""
+        self._senders, self._links = senders, links
         self.view = GraphView(0, 0)
         """The newest graph."""
 
@@ -27,14 +27,27 @@ class OwnMessages:
         """Topics on which only the robot's own program counts, if it publishes there."""
         return {robot.topics.answer, *topics_of(robot)}
 
-    def other_programs(self, link: RobotLink | None) -> list[Identity]:
-        """Return the programs besides the robot's own that hear its commands and answer them."""
+    def other_programs(self, name: str) -> list[Identity]:
+        """Return the programs besides a robot's own that hear its commands and answer them."""
+        link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
             return []
         own = link.identity.node_id if link.identity is not None else ""
-        answering = publishing(self.view, link.robot.topics.answer)
-        heard = hearing(self.view, link.robot.topics.command)
-        return [identity_of(self.view, node) for node in heard if node in answering and node != own]
+        return [identity_of(self.view, node) for node in self._serving(link, self.view) if node != own]
+
+    def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
+        """Return the programs that hear the robot's commands and answer them now, and did not ``before``."""
+        if link.robot.dialect != "native":
+            return []
+        earlier = self._serving(link, before)
+        return [
+            identity_of(self.view, node) for node in self._serving(link, self.view) if node not in earlier
+        ]
+
+    @staticmethod
+    def _serving(link: RobotLink, view: GraphView) -> list[str]:
+        answering = publishing(view, link.robot.topics.answer)
+        return [node for node in hearing(view, link.robot.topics.command) if node in answering]
 
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
         """Return whether the robot's own program sent a message; None while that is not known.

@@ -338,6 +338,12 @@ BROKEN_HISTORIES: dict[str, list[Step]] = {
         ("move_by_form", {"name": "Base", "action": "turn", "wait_s": 1.7}),
         ("press_stop", {"wait_s": 0.0}),
     ],
+    "a second program was stopped while the frozen one still drives": [
+        ("start_robot", {"name": "Arm", "late": False}),
+        ("move_by_form", {"name": "Arm", "action": "drive", "wait_s": 0.0}),
+        ("halt", {"is_killed": False, "pick": 2, "wait_s": 1.7}),
+        ("press_stop", {"wait_s": 0.0}),
+    ],
 }
 
 

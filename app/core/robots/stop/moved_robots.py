@@ -9,7 +9,7 @@ dying, leaving the graph and coming back as another program do not remove it (do
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -93,6 +93,12 @@ class MovedRobots:
         self._others_of = others_of
         self._motions: dict[str, list[UnprovenMotion]] = {}
         self._count = 0
+        self._sent: dict[str, UnprovenMotion] = {}
+        """The newest command of each robot since the graph before the last one."""
+        self._proven: dict[str, int] = {}
+        """Marks of the Stops that programs proved since then, by node id."""
+        self._graph_mark = 0
+        """The `mark` when the newest graph came."""
 
     def __contains__(self, name: object) -> bool:
         return name in self._motions
@@ -106,6 +112,11 @@ class MovedRobots:
     def mark(self) -> int:
         """Number of the newest motion. A Stop that begins now proves nothing about later ones."""
         return self._count
+
+    @property
+    def sent_to(self) -> tuple[str, ...]:
+        """Robots that were told to move since the graph before the last one."""
+        return tuple(self._sent)
 
     def motion(self, name: str) -> UnprovenMotion | None:
         """The newest motion of a robot whose cause is known, or None when it is not in the ledger.
@@ -148,6 +159,7 @@ class MovedRobots:
                 ]
             found.append(motion)
             if program is None:
+                self._sent[name] = motion
                 self._note_others(name, by, found)
 
     def _note_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
@@ -156,6 +168,29 @@ class MovedRobots:
         for other in self._others_of(name):
             if other not in known and len(found) < MAX_MOTIONS:
                 found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
+
+    def take_newcomers(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
+        """Take over from a new graph which programs began to hear robots' commands since the graph before.
+
+        Each may have heard what was sent meanwhile, although its robot had no such program yet when it was
+        sent. Call it once for each graph. A graph is older than the moment when it is taken over, so commands
+        count from the graph before the last one on.
+
+        Args:
+            newcomers: The programs by robot; of robots in `sent_to` only.
+        """
+        for name, programs in newcomers.items():
+            sent, found = self._sent[name], self._motions.get(name, [])
+            known = {motion.program for motion in found if motion.number >= sent.number}
+            for program in programs:
+                is_still = self._proven.get(program.node_id, -1) >= sent.number
+                if program not in known and not is_still and len(found) < MAX_MOTIONS:
+                    found.append(replace(sent, program=program, id=""))
+            if found:
+                self._motions[name] = found
+        last, self._graph_mark = self._graph_mark, self._count
+        self._sent = {name: sent for name, sent in self._sent.items() if sent.number > last}
+        self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def ended(self, name: str, id: str, program: Identity | None = None) -> None:
         """Take over the final answer of a robot's program to an invocation: for this program it has ended."""
@@ -173,6 +208,7 @@ class MovedRobots:
 
         What a program was told that has not answered, and may still run, remains.
         """
+        self._proven |= dict.fromkeys(programs, mark)
         self._keep(
             name,
             lambda motion: (
@@ -196,11 +232,14 @@ class MovedRobots:
     def told(self, name: str, mark: int) -> None:
         """A robot that can't confirm (RIZE) was told to stop at ``mark``; nothing more can be known."""
         self._keep(name, lambda motion: motion.number > mark)
+        if name in self._sent and self._sent[name].number <= mark:
+            del self._sent[name]
 
     def confirm(self, names: Iterable[str]) -> None:
         """A person says that these robots stand still."""
         for name in names:
             self._motions.pop(name, None)
+            self._sent.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
         """Forget what ended programs were told: a virtual robot is its program, and moves no more."""
