@@ -103,3 +103,40 @@ def test_motions_are_bounded_and_none_is_forgotten(ledger: Ledger) -> None:
         ledger.ended("Pepper", str(number))
     ledger.confirm(["Turtle"])
     assert "Pepper" in ledger
+
+
+def newcomer_after(ledger: Ledger, graphs: int) -> None:
+    """A robot is told something and ends it; a twin is first seen in the graph after `graphs` others."""
+    ledger.note(["Pepper"], "form", id="1")
+    ledger.ended("Pepper", "1", OLD)
+    for _ in range(graphs):
+        ledger.take_newcomers({})
+    ledger.take_newcomers({name: [NEW] for name in ledger.sent_to})
+
+
+@pytest.mark.parametrize("graphs", [0, 1])
+def test_a_twin_that_appears_right_after_a_command_may_have_heard_it(ledger: Ledger, graphs: int) -> None:
+    newcomer_after(ledger, graphs)
+    assert ledger.other_programs("Pepper", OLD) == (NEW,)
+    ledger.stood_still("Pepper", {"old"}, ledger.mark)
+    assert "Pepper" in ledger
+    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    assert "Pepper" not in ledger
+
+
+def test_a_twin_that_appears_later_has_not_heard_it(ledger: Ledger) -> None:
+    newcomer_after(ledger, 2)
+    assert "Pepper" not in ledger
+
+
+def test_a_twin_that_proved_a_stop_before_a_graph_shows_it_is_no_newcomer(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "form", id="1")
+    ledger.stood_still("Pepper", {"old", "new"}, ledger.mark)
+    ledger.take_newcomers({"Pepper": [NEW]})
+    assert "Pepper" not in ledger
+
+
+def test_a_person_who_confirms_means_newcomers_too(ledger: Ledger) -> None:
+    ledger.note(["Pepper"], "key")
+    ledger.confirm(["Pepper"])
+    assert ledger.sent_to == ()
