@@ -247,6 +247,7 @@ def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Docume
     stack = {"blocks": {"languageVersion": 0, "blocks": [block]}}
     document.edited(stack)
     assert document.workspace is stack
+    until(lambda: document.journal_error is not None)
     assert not document.is_kept
     assert document.journal_error is not None
     assert "divide it into several scripts" in document.journal_error
