@@ -414,9 +414,13 @@ class DecodeError(NepError, ValueError):
 
 
 class WireError(DecodeError):
-    """Parts or a request that break the native wire, for `reason`."""
+    """Parts or a request that break the native wire, for `reason`.
 
-    def __init__(self, reason: str, size_bytes: int = 0) -> None:
+    `code` is the same in every language and version: the table of codes is in docs/wire.md.
+    """
+
+    def __init__(self, reason: str, size_bytes: int = 0, *, code: str = "malformed") -> None:
+        self.code = code
         super().__init__("nep wire", size_bytes, reason)
 
 

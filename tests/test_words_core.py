@@ -328,9 +328,11 @@ def test_what_is_no_request_or_answer() -> None:
         packb({"do": "leave", "what": {"node_id": 3}}),
     ):  # fmt: skip
         request = decode_request(body).request
-        assert isinstance(request, str)
-        said(request, data=("xx", "Leave", "node_id", "str", "int", "list"))
-    assert str(decode_request(b"").request).startswith("[")  # what follows is said by msgpack
+        assert isinstance(request, nep_errors.WireError)
+        said(request.reason, data=("xx", "Leave", "node_id", "str", "int", "list"))
+    no_request = decode_request(b"").request
+    assert isinstance(no_request, nep_errors.WireError)
+    assert no_request.reason.startswith("[")  # what follows is said by msgpack
     with pytest.raises(nep_errors.WireError) as caught:
         decode_answer(packb({"is": "xx"}))
     said(caught.value.reason, data=("xx",))

@@ -154,12 +154,13 @@ class Graph:
                 self._admit(request, sender, out)
             if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:
                 if len(self._waiting) >= _WAITING_MAX:
-                    raise WireError(_("too many programs register while the master is starting; ask again"))
+                    reason = _("too many programs register while the master is starting; ask again")
+                    raise WireError(reason, code="busy")
                 self._waiting.append((request, call, sender, is_foreign))
                 return tuple(out)
             reply = self._carry_out(request, now, sender, out)
         except WireError as error:
-            reply = Refused(self.epoch, self.revision, error.reason)
+            reply = Refused(self.epoch, self.revision, error.reason, error.code)
         out.append(Outgoing(sender, reply, call))
         return tuple(out)
 
@@ -234,23 +235,27 @@ class Graph:
         node_id = node_of(request)
         member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
-            raise WireError(_("a node speaks for itself only"))
+            raise WireError(_("a node speaks for itself only"), code="speaker")
 
     def _admit_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
         if node.key and not is_proven(node):
-            raise WireError(_("the node's id '{id}' does not come from its key").format(id=node.id))
+            reason = _("the node's id '{id}' does not come from its key").format(id=node.id)
+            raise WireError(reason, code="node-key")
         if not node.key and sender != node.id:
             raise WireError(
-                _("a node needs a key that proves its id, or its id as its routing id; update nep")
+                _("a node needs a key that proves its id, or its id as its routing id; update nep"),
+                code="node-unproven",
             )
         other = self._registry.speaking.get(sender)
         if other is not None and other.node.id != node.id:
-            raise WireError(_("this connection speaks for the node '{id}' already").format(id=other.node.id))
+            reason = _("this connection speaks for the node '{id}' already").format(id=other.node.id)
+            raise WireError(reason, code="connection")
         known = self._registry.members.get(node.id)
         if known is None or known.route == sender:
             return
         if not node.key:
-            raise WireError(_("the node '{id}' is another program's").format(id=node.id))
+            reason = _("the node '{id}' is another program's").format(id=node.id)
+            raise WireError(reason, code="node-taken")
         if not is_proven(known.node):
             self._forget(known, out, is_closed=False)
 
@@ -261,7 +266,8 @@ class Graph:
             raise WireError(
                 _("the id {id} does not come from the node's key and the number {number}").format(
                     id=record.id, number=record.number
-                )
+                ),
+                code="record-key",
             )
         is_publisher = isinstance(record, PublisherRecord)
         owners = self._registry.publisher_owners if is_publisher else self._registry.subscriber_owners
@@ -271,7 +277,8 @@ class Graph:
         theirs = (owner.publishers if is_publisher else owner.subscribers)[record.id].record
         if not is_proven(node, record) or is_proven(owner.node, theirs):
             raise WireError(
-                _("the id {id} is that of another program's publisher or subscriber").format(id=record.id)
+                _("the id {id} is that of another program's publisher or subscriber").format(id=record.id),
+                code="record-taken",
             )
         if is_publisher:
             self._unlist_publisher(owner, record.id, out)
@@ -287,7 +294,8 @@ class Graph:
             raise WireError(
                 _("a node has {RECORDS_MAX} publishers and subscribers at most").format(
                     RECORDS_MAX=RECORDS_MAX
-                )
+                ),
+                code="limit",
             )
         self._admit_patterns(request)
         all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
@@ -295,7 +303,8 @@ class Graph:
             raise WireError(
                 _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
                     ALL_RECORDS_MAX=ALL_RECORDS_MAX
-                )
+                ),
+                code="limit",
             )
 
     def _admit_patterns(self, request: Join | AddPublisher | AddSubscriber) -> None:
@@ -313,7 +322,8 @@ class Graph:
                 _(
                     "a node has {PATTERNS_MAX} subscribers with wildcards at most, and all nodes together "
                     "{ALL_PATTERNS_MAX}"
-                ).format(PATTERNS_MAX=PATTERNS_MAX, ALL_PATTERNS_MAX=ALL_PATTERNS_MAX)
+                ).format(PATTERNS_MAX=PATTERNS_MAX, ALL_PATTERNS_MAX=ALL_PATTERNS_MAX),
+                code="limit",
             )
 
     # ---- requests

@@ -162,7 +162,9 @@ def renewed_body(
     clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
     """The body of a `Renewed` with which nothing has changed."""
-    what: dict[str, object] = {"epoch": epoch, "revision": revision, "last_seqs": last_seqs}
+    what: dict[str, object] = {"epoch": epoch, "revision": revision}
+    if last_seqs:
+        what["last_seqs"] = last_seqs
     if hosts:
         what["hosts"] = hosts
     if next_s != RENEW_S:

@@ -483,7 +483,7 @@ def check_request(request: Request) -> None:
         return
     _check_node(request.node)
     if isinstance(request, Join) and request.managed:
-        raise WireError(_("only what is attached to the master manages nodes"))
+        raise WireError(_("only what is attached to the master manages nodes"), code="managed")
     for record in records_of(request):
         _check_foreign(record)
 
@@ -502,34 +502,37 @@ def check_record(record: PublisherRecord | SubscriberRecord) -> None:
     try:
         check_topic(record.topic)
     except NepError as error:
-        raise WireError(str(error)) from error
+        raise WireError(str(error), code="topic") from error
 
 
 def _check_node(node: NodeRecord) -> None:
     if not _NODE_ID.fullmatch(node.id):
         raise WireError(
-            _("'{id}' is no id of a node; it has 16 hexadecimal digits").format(id=shortened(node.id, 40))
+            _("'{id}' is no id of a node; it has 16 hexadecimal digits").format(id=shortened(node.id, 40)),
+            code="node-id",
         )
     try:
         check_node_name(node.name)
     except NepError as error:
-        raise WireError(str(error)) from error
+        raise WireError(str(error), code="node-name") from error
     _check_word("host", node.host, 255)
     _check_word("language", node.language, 50)
     _check_word("generation", node.generation, 50)
     _check_word("key", node.key, 200)
     _check_word("computer", node.computer, 64)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
-        raise WireError(_("{pid} is no number of a process").format(pid=node.pid))
+        raise WireError(_("{pid} is no number of a process").format(pid=node.pid), code="pid")
     if not 0 <= node.since_ns <= COUNT_MAX:
-        raise WireError(_("{since_ns} is no time at which a node began").format(since_ns=node.since_ns))
+        reason = _("{since_ns} is no time at which a node began").format(since_ns=node.since_ns)
+        raise WireError(reason, code="since")
 
 
 def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
     if not 1 <= record.id <= COUNT_MAX:
         raise WireError(
-            _("{id} is no id of a publisher or subscriber; it is from 1 to 2^63-1").format(id=record.id)
+            _("{id} is no id of a publisher or subscriber; it is from 1 to 2^63-1").format(id=record.id),
+            code="record-id",
         )
     _check_word("type", record.msg_type, 200)
     if isinstance(record, PublisherRecord):
@@ -538,7 +541,8 @@ def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
             raise WireError(
                 _("a publisher has {count} endpoints; {most} are allowed").format(
                     count=len(record.endpoints), most=_ENDPOINTS_MAX
-                )
+                ),
+                code="endpoint-count",
             )
         for endpoint in record.endpoints:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
@@ -546,7 +550,8 @@ def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
                 raise WireError(
                     _("'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'").format(
                         said=said
-                    )
+                    ),
+                    code="endpoint",
                 )
 
 
@@ -561,5 +566,6 @@ def _check_word(what: str, word: str, most: int) -> None:
         raise WireError(
             _("'{word}' cannot be its {what}; {hint}").format(
                 word=escaped(shortened(word, 40)), what=what, hint=hint
-            )
+            ),
+            code="text",
         )

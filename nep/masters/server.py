@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import zmq
 
-from nep.errors import ClosedError, NepError, WaitTimeoutError
+from nep.errors import ClosedError, NepError, WaitTimeoutError, WireError
 from nep.i18n import _
 from nep.masters.bad_requests import BadRequests, who_sends
 from nep.masters.graph import Graph, Outgoing, with_hosts, without
@@ -292,7 +292,8 @@ class MasterServer:
     def _serve(self, sender: bytes, body: list[bytes], peer: str) -> None:
         asked = decode_request(body[-1] if len(body) == 1 else b"")
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
-            asked = ReceivedRequest(asked.call, _("who may connect is decided on the master's own computer"))
+            reason = _("who may connect is decided on the master's own computer")
+            asked = ReceivedRequest(asked.call, WireError(reason, code="listen"))
         name = _name_of(sender)
         reason = self._apply(asked, name)
         if reason:
@@ -304,7 +305,7 @@ class MasterServer:
         """Carry out a request, of this process when `sender` is empty; why it was refused, or ""."""
         request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:
-            if isinstance(request, str):
+            if isinstance(request, WireError):
                 outgoing = (Outgoing(sender, self._refused(request), asked.call),)
             elif isinstance(request, Listen):
                 outgoing = (Outgoing(sender, self._listen(request), asked.call),)
@@ -321,7 +322,7 @@ class MasterServer:
             self._failed(error, "a request")
             outgoing = (Outgoing(sender, self._refused(), asked.call),)
         self._send(outgoing)
-        return request if isinstance(request, str) else ""
+        return request.reason if isinstance(request, WireError) else ""
 
     def _timed(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
         """Answers to a renewal that came at this time of this computer's clock, with both times."""
@@ -336,7 +337,7 @@ class MasterServer:
         try:
             self._listening.serve(request.hosts)
         except NepError as error:
-            return Refused(self._graph.epoch, self._graph.revision, str(error))
+            return Refused(self._graph.epoch, self._graph.revision, str(error), "listen")
         self._report_lost_addresses()
         return Done(self._graph.epoch, self._graph.revision)
 
@@ -380,9 +381,11 @@ class MasterServer:
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
-    def _refused(self, reason: str = "") -> Refused:
-        reason = reason or _("the master could not carry this out; its log says why")
-        return Refused(self._graph.epoch, self._graph.revision, reason)
+    def _refused(self, error: WireError | None = None) -> Refused:
+        error = error or WireError(
+            _("the master could not carry this out; its log says why"), code="internal"
+        )
+        return Refused(self._graph.epoch, self._graph.revision, error.reason, error.code)
 
     def _tell_listeners(self, now: float) -> None:
         """With many nodes that come at once, not after each: telling shall not take most of the time."""

@@ -14,12 +14,22 @@ from typing import NamedTuple
 
 from nep.errors import WireError
 from nep.i18n import _
-from nep.protocol.wire import pack_quickly
+from nep.messages.codecs import codec_numbered
+from nep.protocol.wire import BATCH, Header, Parts, pack_quickly, split
 
-__all__ = ["BATCH", "BATCH_FORM", "BATCH_MAX", "BatchEntry", "batch_part", "entries", "table_of"]
+__all__ = [
+    "BATCH",
+    "BATCH_FORM",
+    "BATCH_MAX",
+    "BatchEntry",
+    "batch_part",
+    "check_batch",
+    "entries",
+    "read_parts",
+    "table_of",
+    "unknown_codec",
+]
 
-BATCH = 8
-"""Flag: the part holds several messages. Only those get it whose hello says that they read it."""
 BATCH_FORM = BATCH << 16
 """The flag in `form_of`."""
 BATCH_MAX = 256
@@ -65,16 +75,70 @@ def entries(body: bytes) -> list[BatchEntry]:
         raise WireError(
             _("a batch has 1 to {most} messages, this one {count}").format(most=BATCH_MAX, count=count),
             len(body),
+            code="batch-count",
         )
     table = table_of(count)
     if len(body) < table.size:
-        raise WireError(_("a batch ends within its table"), len(body))
+        raise WireError(_("a batch ends within its table"), len(body), code="batch-table")
     numbers = table.unpack_from(body)
     sizes, stamps = numbers[1 : count + 1], numbers[count + 1 :]
     if table.size + sum(sizes) != len(body):
-        raise WireError(_("the messages of a batch have other sizes than it tells"), len(body))
+        reason = _("the messages of a batch have other sizes than it tells")
+        raise WireError(reason, len(body), code="batch-sizes")
     made, at = [], table.size
     for number, (size, stamp_ns) in enumerate(zip(sizes, stamps, strict=True)):
         made.append(BatchEntry(number, stamp_ns, at, at + size))
         at += size
     return made
+
+
+def check_batch(header: Header, body: bytes) -> None:
+    """Raise `WireError` unless the header of one part is that of a batch with this body."""
+    if header.flags != BATCH:
+        raise WireError(_("a batch is one part and has no other flags"), len(body), code="batch-form")
+    if header.size != len(body):
+        raise WireError(
+            _("its header tells of {size} bytes, its payload has {payload}").format(
+                size=header.size, payload=len(body)
+            ),
+            len(body),
+            code="payload-size",
+        )
+
+
+def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
+    """Return the message in `parts`, or the messages of a batch: all that a reader may receive of a topic.
+
+    Raises:
+        WireError: for anything that the specification does not allow, in the order of checks of docs/wire.md.
+    """
+    one = split(parts)
+    found = [one] if not one.header.flags & BATCH else _messages_of(one)
+    if codec_numbered(one.header.codec) is None:
+        raise unknown_codec(one.header.codec)
+    return found
+
+
+def _messages_of(one: Parts) -> list[Parts]:
+    body = bytes(one.payload)
+    check_batch(one.header, body)
+    return [
+        one._replace(
+            header=one.header._replace(
+                flags=0,
+                seq=one.header.seq + each.number,
+                stamp_ns=each.stamp_ns,
+                size=each.end - each.begin,
+            ),
+            payload=body[each.begin : each.end],
+        )
+        for each in entries(body)
+    ]
+
+
+def unknown_codec(number: int) -> WireError:
+    """Return the error for a message with this codec, which no version of the wire knows so far."""
+    return WireError(
+        _("its codec has the number {codec}, which this nep does not know; update nep").format(codec=number),
+        code="codec",
+    )

@@ -104,10 +104,10 @@ _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
 
 
 class ReceivedRequest(NamedTuple):
-    """A request as it came in: the number to repeat, and the request or the sentence why it is none."""
+    """A request as it came in: the number to repeat, and the request, or the error why it is none."""
 
     call: int
-    request: Request | str
+    request: Request | WireError
 
 
 def encode_request(request: Request, call: int) -> bytes:
@@ -129,10 +129,10 @@ def decode_request(body: bytes) -> ReceivedRequest:
         name = envelope.get("do")
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:
-            raise WireError(_("'{name}' is no request of this version").format(name=name))
+            raise WireError(_("'{name}' is no request of this version").format(name=name), code="request")
         return ReceivedRequest(call, read(kind, envelope.get("what", {})))
     except WireError as error:
-        return ReceivedRequest(call, error.reason)
+        return ReceivedRequest(call, error)
 
 
 class AnswerEncoder:
@@ -233,7 +233,7 @@ def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _ANSWERS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
-        raise WireError(_("'{name}' is no answer of this version").format(name=name))
+        raise WireError(_("'{name}' is no answer of this version").format(name=name), code="answer")
     return call, read(kind, envelope.get("what", {}))
 
 
@@ -241,9 +241,10 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
     try:
         value = unpack_it(body)
     except ValueError as error:
-        raise WireError(_("the body is no msgpack: {error}").format(error=error), len(body)) from error
+        reason = _("the body is no msgpack: {error}").format(error=error)
+        raise WireError(reason, len(body), code="msgpack") from error
     if not isinstance(value, dict):
-        raise WireError(_("the body is no map"), len(body))
+        raise WireError(_("the body is no map"), len(body), code="map")
     return value
 
 
@@ -282,7 +283,10 @@ def write(value: object) -> object:
 
 @cache
 def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
-    return tuple((field.name, field.default) for field in fields(kind))
+    return tuple(
+        (field.name, field.default if field.default_factory is MISSING else field.default_factory())
+        for field in fields(kind)
+    )
 
 
 def read(kind: type[T], value: object) -> T:
@@ -295,7 +299,8 @@ def read(kind: type[T], value: object) -> T:
         return cast("T", _reader(hint)(value))
     except _MisfitError as misfit:
         where = ".".join((kind.__name__, *reversed(misfit.path)))
-        raise WireError(_(misfit.words).format(field=where, **misfit.values)) from None
+        code = "field-missing" if misfit.words == _MISSING else "field-type"
+        raise WireError(_(misfit.words).format(field=where, **misfit.values), code=code) from None
 
 
 class _MisfitError(Exception):

@@ -360,9 +360,13 @@ class Seen(_FromMaster):
 
 @dataclass(frozen=True)
 class Refused(_FromMaster):
-    """The request could not be carried out; `reason` is a sentence."""
+    """The request could not be carried out; `reason` is a sentence in the master's language.
+
+    `code` is the same in every language: see the table of codes in docs/wire.md. Empty from older masters.
+    """
 
     reason: str
+    code: str = ""
 
 
 Reply = Done | Added | Found | Renewed | Seen | Refused

@@ -131,7 +131,7 @@ class _Native:
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         kind, codec, limit_ms, number, data = _read(parts)
         if kind != CallKind.CALL:
-            raise WireError(_("it is no call of a service"))
+            raise WireError(_("it is no call of a service"), code="call-kind")
         return CallHeader(number, codec, limit_ms / 1000 if limit_ms else None, data)
 
     def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
@@ -140,17 +140,19 @@ class _Native:
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
         kind, codec, _limit, number, data = _read(parts)
         if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
-            raise WireError(_("it is no answer of a service"))
+            raise WireError(_("it is no answer of a service"), code="call-kind")
         return ReadAnswer(number, Reply(CallKind(kind), data, codec))
 
 
 def _read(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, bytes | memoryview]:
     if len(parts) != 2 or len(parts[0]) != _HEADER.size:
-        raise WireError(_("a call has two parts, the first of {size} bytes").format(size=_HEADER.size))
+        reason = _("a call has two parts, the first of {size} bytes").format(size=_HEADER.size)
+        raise WireError(reason, code="call-parts")
     version, kind, codec, limit_ms, number = _HEADER.unpack(parts[0])
     if version != _VERSION:
         raise WireError(
-            _("version {version} of services is not known here; update nep").format(version=version)
+            _("version {version} of services is not known here; update nep").format(version=version),
+            code="call-version",
         )
     return kind, codec, limit_ms, number, parts[1]
 
@@ -183,7 +185,7 @@ class _Original:
 
 def _only(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
     if len(parts) != 2 or len(parts[0]):
-        raise WireError(_("REQ and REP send an empty part and one with the payload"))
+        raise WireError(_("REQ and REP send an empty part and one with the payload"), code="call-parts")
     return parts[1]
 
 

@@ -21,6 +21,7 @@ from nep.messages.packing import pack, unpack
 from nep.text import control_in
 
 __all__ = [
+    "BATCH",
     "BYE",
     "EXTENSION",
     "HEADER_BYTES",
@@ -69,6 +70,8 @@ EXTENSION = 2
 """Flag: a fourth part follows, a msgpack map."""
 BYE = 4
 """Flag of a notice: the publisher is closing and has sent everything."""
+BATCH = 8
+"""Flag: one part holds several messages. Only subscribers get it whose hello says that they read batches."""
 SHARED = 16
 """Flag: the payload lies in memory that publisher and subscriber share; its part is the number, u64."""
 OFFER = 32
@@ -270,6 +273,7 @@ def read_header(part: bytes) -> Header:
         raise WireError(
             _("a header has {size} bytes, this one has {count}").format(size=HEADER_BYTES, count=len(part)),
             len(part),
+            code="header-size",
         )
     version, codec, flags, size, seq, stamp_ns, publisher = _HEADER.unpack(part)
     if version != VERSION:
@@ -278,6 +282,7 @@ def read_header(part: bytes) -> Header:
                 version=version, own=VERSION
             ),
             len(part),
+            code="version",
         )
     return Header(codec, flags, seq, stamp_ns, publisher, size)
 
@@ -287,7 +292,8 @@ def extension_part(extension: Mapping[str, object]) -> bytes:
     try:
         return pack(dict(extension))
     except ValueError as error:
-        raise WireError(_("an extension holds what msgpack cannot: {error}").format(error=error)) from error
+        reason = _("an extension holds what msgpack cannot: {error}").format(error=error)
+        raise WireError(reason, code="extension") from error
 
 
 def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
@@ -295,11 +301,12 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
     try:
         value = unpack(part)
     except ValueError as error:
-        raise WireError(_("the extension is no msgpack: {error}").format(error=error), len(part)) from error
+        reason = _("the extension is no msgpack: {error}").format(error=error)
+        raise WireError(reason, len(part), code="extension") from error
     if packed_is_too_deep(part, value):
-        raise WireError(too_deep(), len(part))
+        raise WireError(too_deep(), len(part), code="extension")
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise WireError(_("the extension is no map with names"), len(part))
+        raise WireError(_("the extension is no map with names"), len(part), code="extension")
     return value
 
 
@@ -320,7 +327,7 @@ def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
     """Topic, header and payload of a message in one part. Raises `WireError` when it is too short."""
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
-        raise WireError(_("a message has 3 or 4 parts, this one has 1"), len(part))
+        raise WireError(_("a message has 3 or 4 parts, this one has 1"), len(part), code="part-count")
     return part[:cut], part[cut : cut + HEADER_BYTES], part[cut + HEADER_BYTES :]
 
 
@@ -334,28 +341,40 @@ class Parts(NamedTuple):
 
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
-    """The message in `parts`. Raises `WireError` for anything that the specification does not allow."""
+    """Return the message in `parts`. The body of a batch is its payload: see `nep.protocol.batch.read_parts`.
+
+    Raises:
+        WireError: for anything that the specification does not allow, in the order of checks of docs/wire.md.
+    """
     if not parts:
-        raise WireError(_("a message has 3 or 4 parts, this one has none"))
+        raise WireError(_("a message has 3 or 4 parts, this one has none"), code="part-count")
     first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
-    header, payload, extension = split_rest(rest)
-    return Parts(_topic_in(bytes(first)), header, payload, extension)
+    topic = _topic_in(bytes(first))
+    header, payload, extension = split_rest(rest, is_one_part=len(parts) == 1)
+    return Parts(topic, header, payload, extension)
 
 
 def split_rest(
-    rest: Sequence[bytes | memoryview],
+    rest: Sequence[bytes | memoryview], *, is_one_part: bool = False
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
-    """Header, payload and extension of a message from what follows its first part. Raises `WireError`."""
+    """Header, payload and extension of a message from what follows its first part. Raises `WireError`.
+
+    `is_one_part`: they come from one part, which alone may hold a batch.
+    """
     if not rest:
-        raise WireError(_("a message has 3 or 4 parts, this one has 1"))
+        raise WireError(_("a message has 3 or 4 parts, this one has 1"), code="part-count")
     header = read_header(bytes(rest[0]))
     wanted, there = 4 if header.flags & EXTENSION else 3, len(rest) + 1
     if there not in {3, 4}:
-        raise WireError(_("a message has 3 or 4 parts, this one has {there}").format(there=there))
+        reason = _("a message has 3 or 4 parts, this one has {there}").format(there=there)
+        raise WireError(reason, code="part-count")
     if there != wanted:
         raise WireError(
-            _("its flags ask for {wanted} parts, there are {there}").format(wanted=wanted, there=there)
+            _("its flags ask for {wanted} parts, there are {there}").format(wanted=wanted, there=there),
+            code="part-count",
         )
+    if header.flags & BATCH and not (is_one_part and header.flags == BATCH):
+        raise WireError(_("a batch is one part and has no other flags"), code="batch-form")
     size = len(rest[1])
     if header.size and header.size != size:
         raise WireError(
@@ -363,6 +382,7 @@ def split_rest(
                 size=header.size, payload=size
             ),
             size,
+            code="payload-size",
         )
     return header, rest[1], read_extension(rest[2]) if header.flags & EXTENSION else {}
 
@@ -371,7 +391,9 @@ def _topic_in(part: bytes) -> str:
     """The topic in a first part."""
     try:
         if part[-1:] != b"\0":
-            raise WireError(_("its topic does not end with a zero byte"), len(part))
+            raise WireError(_("its topic does not end with a zero byte"), len(part), code="topic-end")
         return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
-        raise WireError(_("its topic is none: {error}").format(error=error), len(part)) from error
+        raise WireError(
+            _("its topic is none: {error}").format(error=error), len(part), code="topic"
+        ) from error

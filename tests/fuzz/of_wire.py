@@ -207,8 +207,8 @@ WORDS = tuple(
 def requests_of_nodes(data: bytes) -> None:
     received = encoding.decode_request(data)
     assert received.call >= 0
-    if isinstance(received.request, str):
-        assert len(received.request) < 2000
+    if isinstance(received.request, WireError):
+        assert len(received.request.reason) < 2000
         return
     again = encoding.decode_request(encoding.encode_request(received.request, received.call))
     # A number that msgpack has no form for cannot have come, a NaN is not equal to itself.
@@ -236,7 +236,7 @@ def a_master(data: bytes) -> None:
     encoder = encoding.AnswerEncoder()
     for number, body in enumerate(parts_of(data)[:20]):
         received = encoding.decode_request(body)
-        if not isinstance(received.request, str | Listen):
+        if not isinstance(received.request, WireError | Listen):
             for each in graph.apply(received.request, received.call, float(number), "a", is_foreign=True):
                 encoding.decode_answer(encoder.encode(each.answer, each.call or 0))
         graph.tick(float(number))

@@ -24,7 +24,7 @@ from nep.errors import DecodeError, WireError
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
 from nep.messages.message import NOTHING, UNDECODED, Message, MessageKind, arrived, kind_of, new_message
-from nep.protocol.batch import BATCH, BATCH_FORM, BATCH_MAX, entries, table_of
+from nep.protocol.batch import BATCH_FORM, BATCH_MAX, check_batch, entries, table_of, unknown_codec
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
     BYE,
@@ -99,23 +99,23 @@ class CarefulParser:
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
         """The message in these parts; None for a notice and for what was heard before. Raises `WireError`."""
         is_alone = first == self._hello
-        if not rest and first.startswith(self._topic):
+        is_one_part = not rest and first.startswith(self._topic)
+        if is_one_part:
             first, *rest = apart(first)
         if not is_alone and first != self._topic:
-            raise WireError(_("a message begins with something else than its topic"))
+            raise _other_topic()
         if is_alone and len(rest) == 1:
             self._notice(read_header(bytes(rest[0])))
             return None
-        return self._message(*split_rest(rest), is_alone=is_alone)
+        return self._message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
         """The messages of a batch. Raises `WireError` when it is none."""
         topic, head, body = apart(first)
         if topic != self._topic:
-            raise WireError(_("a message begins with something else than its topic"))
-        header = read_header(head)
-        if header.flags != BATCH or header.size != len(body):
-            raise WireError(_("a batch has no other flags, and tells its size"))
+            raise _other_topic()
+        header, _payload, _extension = split_rest((head, body), is_one_part=True)
+        check_batch(header, body)
         one = header._replace(flags=0)
         read = (
             self._message(
@@ -144,7 +144,8 @@ class CarefulParser:
             source.has_echoed = True
         if not is_possible:
             raise WireError(
-                _("its publisher's number leaps from {last} to {seq}").format(last=last, seq=header.seq)
+                _("its publisher's number leaps from {last} to {seq}").format(last=last, seq=header.seq),
+                code="seq-leap",
             )
 
     def _message(
@@ -152,11 +153,7 @@ class CarefulParser:
     ) -> Message | None:
         codec = codec_numbered(header.codec)
         if codec is None:
-            raise WireError(
-                _("its codec has the number {codec}, which this nep does not know; update nep").format(
-                    codec=header.codec
-                )
-            )
+            raise unknown_codec(header.codec)
         if not is_alone and self._sources.is_early(header.publisher):
             return None
         if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
@@ -164,7 +161,9 @@ class CarefulParser:
         shared: bytes | memoryview | None = None
         if header.flags & SHARED:
             if self._shared is None:
-                raise WireError(_("its payload lies in shared memory, which nobody offered"))
+                raise WireError(
+                    _("its payload lies in shared memory, which nobody offered"), code="shared-memory"
+                )
             shared = self._shared.take(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
                 self._sources.dropped(1)
@@ -192,6 +191,10 @@ class CarefulParser:
         is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
         return arrived(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
+
+
+def _other_topic() -> WireError:
+    return WireError(_("a message begins with something else than its topic"), code="first-part")
 
 
 class SubSocket:

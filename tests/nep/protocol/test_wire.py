@@ -69,15 +69,19 @@ def test_anything_else_is_refused_with_a_sentence(parts: list[bytes]) -> None:
 def test_the_shared_vectors(vector: dict[str, object]) -> None:
     parts = [bytes.fromhex(part) for part in vector["parts"]]  # type: ignore[attr-defined]
     if "error" in vector:
-        with pytest.raises(WireError, match=str(vector["error"])):
+        with pytest.raises(WireError) as refused:
             wire.split(parts)
+        assert refused.value.code == vector["error"]
         return
     read = wire.split(parts)
     said = vector["means"]
     assert isinstance(said, dict)
     assert read.topic == said["topic"]
     assert read.header == wire.Header(
-        said["codec"], said["flags"], said["seq"], said["stamp_ns"], said["publisher"], said.get("size", 0)
+        said["codec"],
+        said["flags"],
+        *(int(said[name]) for name in ("seq", "stamp_ns", "publisher")),
+        said.get("size", 0),
     )
     assert bytes(read.payload).hex() == said["payload"]
     assert read.extension == said["extension"]

@@ -63,8 +63,9 @@ def test_what_is_none_is_refused_with_its_reason(
 ) -> None:
     if "parts" in vector:
         for read in (NATIVE.read_call, NATIVE.read_answer):
-            with pytest.raises(WireError, match=vector["error"]):
+            with pytest.raises(WireError) as refused:
                 read(parts_of(vector))
+            assert refused.value.code == vector["error"]
         return
     ours, theirs = stream
     theirs.sendall(bytes.fromhex(vector["tcp"]))
@@ -73,8 +74,9 @@ def test_what_is_none_is_refused_with_its_reason(
         ours.read()
         if ours.is_over:
             break
-    with pytest.raises(WireError, match=vector["error"]):
+    with pytest.raises(WireError) as refused:
         ours.next()
+    assert refused.value.code == vector["error"]
     assert ours.next() is None
 
 

@@ -79,7 +79,8 @@ class TcpStream:
             self._forget_input()
             self.is_over = True
             self._break()
-            raise WireError(_("its size is {size} bytes; it is no call, or too large").format(size=size))
+            reason = _("its size is {size} bytes; it is no call, or too large").format(size=size)
+            raise WireError(reason, code="call-size")
         if there < _SIZE.size + size:
             self._check_end(there)
             return None
@@ -100,7 +101,7 @@ class TcpStream:
     def _check_end(self, there: int) -> None:
         if self.is_over and there:
             self._forget_input()
-            raise WireError(_("it ends in the middle"))
+            raise WireError(_("it ends in the middle"), code="call-end")
 
     def _forget_input(self) -> None:
         self._input = bytearray()

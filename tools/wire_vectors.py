@@ -1,0 +1,581 @@
+"""Write the generated test vectors of the native wire: tests/data/wire.
+
+    python tools/wire_vectors.py            write them anew
+    python tools/wire_vectors.py --check    1 when a file differs from what is generated
+
+`filters.json`, `notices.json`, `master.json` and `malformed.json` are made here; `messages.json`,
+`batches.json`, `ids.json` and `services.json` are kept by hand. tests/data/wire/README.md describes their
+form. The code of malformed parts comes from how they are made, not from the reader that the tests hold
+against them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import struct
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import msgpack  # type: ignore[import-untyped]
+
+from nep.masters.graph import Graph
+from nep.protocol import requests, wire
+from nep.protocol.encoding import AnswerEncoder, encode_request, write
+
+FOLDER = Path(__file__).resolve().parents[1] / "tests" / "data" / "wire"
+MALFORMED_COUNT = 1000
+EPOCH = 1234605616436508552
+KEY = "000102030405060708090a0b0c0d0e0f"
+OTHER_KEY = "f0f1f2f3f4f5f6f7f8f9fafbfcfdfeff"
+PUBLISHER, SUBSCRIBER = requests.id_from(KEY, 1), requests.id_from(KEY, 2)
+TOPIC = "example"
+STAMP_NS = 1700000000000000000
+PAYLOAD = b'{"message":"hello"}'
+
+
+def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
+    """Return `value` with every integer as decimal text, also those that are keys."""
+    if isinstance(value, bool) or value is None or isinstance(value, (str, float)):
+        return value
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {as_text(key): as_text(item) for key, item in value.items()}
+    return [as_text(item) for item in value]
+
+
+# ---- filters and notices
+
+
+def filters() -> list[dict[str, Any]]:
+    """Return what a subscriber subscribes to: hellos, and its answers to echoes and offers."""
+    made: list[dict[str, Any]] = [
+        {"name": "topic", "filter": wire.topic_part(TOPIC).hex(), "means": {"kind": "topic", "topic": TOPIC}},
+        {
+            "name": "topic beyond ASCII",
+            "filter": wire.topic_part("/größe").hex(),
+            "means": {"kind": "topic", "topic": "/größe"},
+        },
+    ]
+    levels: tuple[dict[str, bool], ...] = ({}, {"one_part": True}, {"tells": True}, {"batches": True})
+    for level, said in enumerate(levels):
+        for subscriber, topic in ((SUBSCRIBER, TOPIC), (1, "/a/b"), (2**63 - 1, "/größe")):
+            made.append(
+                {
+                    "name": f"hello of level {level} for {topic}",
+                    "filter": wire.hello_part(subscriber, topic, **said).hex(),
+                    "means": {
+                        "kind": "hello",
+                        "subscriber": str(subscriber),
+                        "topic": topic,
+                        "level": level,
+                    },
+                }
+            )
+    for seq, wanted in ((1, 24 * 2**20), (2**40, 192 * 2**20), (2**64 - 1, 2**64 - 1)):
+        read = wire.Read(SUBSCRIBER, PUBLISHER, seq, wanted)
+        made.append(
+            {
+                "name": f"read up to {seq}",
+                "filter": wire.read_part(read).hex(),
+                "means": {"kind": "read", **as_text(read._asdict())},
+            }
+        )
+    for generation in (1, 2**32 - 1):
+        shares = wire.Shares(SUBSCRIBER, PUBLISHER, generation)
+        made.append(
+            {
+                "name": f"reads shared memory of generation {generation}",
+                "filter": wire.shares_part(shares).hex(),
+                "means": {"kind": "shares", **as_text(shares._asdict())},
+            }
+        )
+    digits = b"%016x" % SUBSCRIBER
+    malformed = {
+        "hello without a topic": b"\xffhello/" + digits,
+        "hello with 15 digits": b"\xffhello/" + digits[1:] + b"/example",
+        "hello with 17 digits": b"\xffhello/0" + digits + b"/example",
+        "hello with a sign": b"\xffhello/+" + digits[1:] + b"/example",
+        "hello with an underscore": b"\xffhello/" + digits[:8] + b"_" + digits[9:] + b"/example",
+        "hello of level 4": b"\xffhello4/" + digits + b"/example",
+        "hello whose topic is no UTF-8": b"\xffhello/" + digits + b"/\xc3",
+        "read with three numbers": b"\xffread/" + b"/".join([digits] * 3),
+        "read with five numbers": b"\xffread/" + b"/".join([digits] * 5),
+        "read with a letter": b"\xffread/" + b"/".join([digits] * 3) + b"/000000000000000g",
+        "shares with two numbers": b"\xffshares/" + b"/".join([digits] * 2),
+        "an unknown word": b"\xffbonjour/" + digits + b"/example",
+        "ff alone": b"\xff",
+    }
+    made += [{"name": name, "filter": each.hex(), "error": "filter"} for name, each in malformed.items()]
+    return made
+
+
+def notices() -> list[dict[str, Any]]:
+    """Return what a publisher sends under a hello: each notice, and a message for one subscriber alone."""
+    hello = wire.hello_part(SUBSCRIBER, TOPIC, batches=True)
+    kinds: list[tuple[str, str, wire.Header, bytes | None]] = [
+        ("echo", "echo before the first message", wire.Header(1, 0, 0, STAMP_NS, PUBLISHER), None),
+        ("echo", "echo", wire.Header(1, 0, 41, STAMP_NS, PUBLISHER), None),
+        ("bye", "bye", wire.Header(1, wire.BYE, 42, STAMP_NS, PUBLISHER), None),
+        ("bye", "bye without a message", wire.Header(4, wire.BYE, 0, STAMP_NS, PUBLISHER), None),
+        ("offer", "offer", wire.Header(3, wire.OFFER, 42, STAMP_NS, PUBLISHER, 1), None),
+        (
+            "latched",
+            "latched",
+            wire.Header(1, wire.LATCHED, 41, STAMP_NS, PUBLISHER, len(PAYLOAD)),
+            PAYLOAD,
+        ),
+        ("alone", "alone", wire.Header(1, 0, 43, STAMP_NS, PUBLISHER, len(PAYLOAD)), PAYLOAD),
+    ]
+    made = []
+    for kind, name, header, payload in kinds:
+        means = {
+            "kind": kind,
+            "subscriber": str(SUBSCRIBER),
+            "topic": TOPIC,
+            "codec": header.codec,
+            "flags": header.flags,
+            "seq": str(header.seq),
+            "stamp_ns": str(header.stamp_ns),
+            "publisher": str(header.publisher),
+            **({"generation": header.size} if kind == "offer" else {}),
+            **({} if payload is None else {"payload": payload.hex()}),
+        }
+        parts = [hello, header.pack(), *([] if payload is None else [payload])]
+        made.append({"name": name, "parts": [each.hex() for each in parts], "means": means})
+    return made
+
+
+# ---- the master
+
+
+def node(key: str, name: str) -> requests.NodeRecord:
+    """Return the record of a node with this key."""
+    return requests.NodeRecord(requests.node_id_from(key), name, "here", 4711, key=key)
+
+
+TALKER, LISTENER = node(KEY, "talker"), node(OTHER_KEY, "listener")
+ODOM = requests.PublisherRecord(PUBLISHER, "/odom", "json", "json", ("tcp://127.0.0.1:40000",), number=1)
+HEARS = requests.SubscriberRecord(requests.id_from(OTHER_KEY, 1), "/odom", "json", number=1)
+ADDS, SUBSCRIBES = requests.AddPublisher(TALKER, ODOM), requests.AddSubscriber(LISTENER, HEARS)
+ALL = requests.PublisherRecord(
+    requests.id_from(KEY, 3), "/map", "json", "json", ("tcp://127.0.0.1:40001",), True, False, 3, 5
+)
+COUNTS = requests.PublisherCount(PUBLISHER, 12, 2**40, 12, STAMP_NS)
+HEARD = requests.SubscriberCount(HEARS.id, 11, 1)
+Asked = tuple[str, requests.Request]
+"""By which connection something is asked: that of the talker or the listener, and what."""
+
+ASKED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
+    ("ping", (), ("talker", requests.Ping())),
+    ("a publisher comes", (), ("talker", ADDS)),
+    ("the same publisher again", (("talker", ADDS),), ("talker", ADDS)),
+    ("a publisher comes that has a subscriber", (("listener", SUBSCRIBES),), ("talker", ADDS)),
+    ("a subscriber comes", (), ("listener", SUBSCRIBES)),
+    ("a subscriber comes that has a publisher", (("talker", ADDS),), ("listener", SUBSCRIBES)),
+    (
+        "a publisher goes",
+        (("talker", ADDS),),
+        ("talker", requests.RemovePublisher(TALKER.id, PUBLISHER, 2**53 + 1)),
+    ),
+    (
+        "a subscriber goes",
+        (("listener", SUBSCRIBES),),
+        ("listener", requests.RemoveSubscriber(LISTENER.id, HEARS.id)),
+    ),
+    ("a node leaves", (("talker", ADDS),), ("talker", requests.Leave(TALKER.id))),
+    (
+        "a node joins with all that it has",
+        (("listener", SUBSCRIBES),),
+        ("talker", requests.Join(TALKER, 77, (ODOM, ALL), ())),
+    ),
+    (
+        "a subscriber's node joins",
+        (("talker", ADDS),),
+        ("listener", requests.Join(LISTENER, 0, (), (HEARS,))),
+    ),
+    (
+        "a publisher's node renews",
+        (("talker", ADDS),),
+        ("talker", requests.Renew(TALKER.id, EPOCH, 3, (COUNTS,), (), 0.25)),
+    ),
+    (
+        "a subscriber's node renews and hears of last seqs",
+        (
+            ("talker", ADDS),
+            ("listener", SUBSCRIBES),
+            ("talker", requests.Renew(TALKER.id, EPOCH, 3, (COUNTS,))),
+        ),
+        ("listener", requests.Renew(LISTENER.id, EPOCH, 5, (), (HEARD,))),
+    ),
+    (
+        "a renewal with an old revision is told of the topic's publishers",
+        (("listener", SUBSCRIBES), ("talker", ADDS)),
+        ("listener", requests.Renew(LISTENER.id, EPOCH, 3, (), (HEARD,))),
+    ),
+    ("an unknown node renews and is to join again", (), ("talker", requests.Renew(TALKER.id, EPOCH, 0))),
+    (
+        "a renewal with another epoch is to join again",
+        (("talker", ADDS),),
+        ("talker", requests.Renew(TALKER.id, EPOCH - 1, 3, (COUNTS,))),
+    ),
+    (
+        "subscribers did not answer",
+        (("listener", SUBSCRIBES), ("talker", ADDS)),
+        ("talker", requests.ReportMissing(TALKER.id, PUBLISHER, (HEARS.id,))),
+    ),
+    (
+        "a topic that is none",
+        (),
+        ("talker", requests.AddPublisher(TALKER, requests.PublisherRecord(PUBLISHER, "a b", "json", "json"))),
+    ),
+    (
+        "an id that does not come from the key",
+        (),
+        (
+            "talker",
+            requests.AddPublisher(TALKER, requests.PublisherRecord(7, "/odom", "json", "json", (), number=1)),
+        ),
+    ),
+    ("another connection speaks for the node", (("talker", ADDS),), ("listener", requests.Leave(TALKER.id))),
+)
+PUSHED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
+    ("a publisher came", (("listener", SUBSCRIBES),), ("talker", ADDS)),
+    (
+        "a publisher has closed",
+        (("listener", SUBSCRIBES), ("talker", ADDS)),
+        ("talker", requests.RemovePublisher(TALKER.id, PUBLISHER, 2**53 + 1)),
+    ),
+    (
+        "a node left",
+        (
+            ("listener", SUBSCRIBES),
+            ("talker", ADDS),
+            ("talker", requests.Renew(TALKER.id, EPOCH, 3, (COUNTS,))),
+        ),
+        ("talker", requests.Leave(TALKER.id)),
+    ),
+)
+
+
+class _Master:
+    def __init__(self) -> None:
+        self._graph = Graph(EPOCH, 0.0, learn_s=0.0)
+        self._encoder = AnswerEncoder()
+        self._calls = {"talker": 0, "listener": 0}
+
+    def ask(self, asked: Asked) -> tuple[bytes, bytes, list[bytes]]:
+        """Return the request's body, the answer's, and those of pushes to others."""
+        who, request = asked
+        self._calls[who] += 1
+        call = self._calls[who]
+        said = self._graph.apply(request, call, 0.0, who, is_foreign=True)
+        reply = next(self._encoder.encode(each.answer, call) for each in said if each.call is not None)
+        pushes = [self._encoder.encode(each.answer) for each in said if each.call is None]
+        return encode_request(request, call), reply, pushes
+
+
+def master() -> dict[str, Any]:
+    """Return requests with their answers, and pushes."""
+    asked = []
+    for name, before, last in ASKED:
+        answers = _Master()
+        first = [{"from": each[0], "request": answers.ask(each)[0].hex()} for each in before]
+        request, reply, _pushes = answers.ask(last)
+        asked.append(
+            {
+                "name": name,
+                "before": first,
+                "from": last[0],
+                "request": request.hex(),
+                "means": as_text(msgpack.unpackb(request)),
+                "answer": reply.hex(),
+                "answer_means": as_text(msgpack.unpackb(reply, strict_map_key=False)),
+            }
+        )
+    pushed = []
+    for name, before, last in PUSHED:
+        answers = _Master()
+        first = [{"from": each[0], "request": answers.ask(each)[0].hex()} for each in before]
+        request, _reply, (push,) = answers.ask(last)
+        pushed.append(
+            {
+                "name": name,
+                "before": first,
+                "from": last[0],
+                "request": request.hex(),
+                "to": "listener",
+                "push": push.hex(),
+                "means": as_text(msgpack.unpackb(push, strict_map_key=False)),
+            }
+        )
+    ping = encode_request(requests.Ping(), 1)
+    done = msgpack.packb({"is": "done", "re": 1, "what": write(requests.Done(1, 0))})
+    return {
+        "epoch": str(EPOCH),
+        "asked": asked,
+        "pushed": pushed,
+        "ping": {"request": ping.hex(), "answer": done.hex()},
+    }
+
+
+# ---- malformed parts
+
+
+class _Bytes:
+    """Bytes that look random and are the same everywhere."""
+
+    def __init__(self, seed: str) -> None:
+        self._seed, self._count = seed, 0
+
+    def bytes(self, size: int) -> bytes:
+        found = b""
+        while len(found) < size:
+            self._count += 1
+            found += sha256(f"{self._seed}/{self._count}".encode()).digest()
+        return found[:size]
+
+    def below(self, limit: int) -> int:
+        return int.from_bytes(self.bytes(8), "little") % limit
+
+    def of(self, choices: Sequence[Any]) -> Any:  # noqa: ANN401 - one of them
+        return choices[self.below(len(choices))]
+
+
+Parts = list[bytes]
+_GOOD_TOPIC = wire.topic_part(TOPIC)
+_EXTENSION = msgpack.packb({"frame_id": "base"})
+_NO_TOPIC = (
+    *(chr(each) for each in (*range(1, 0x21), 0x7F, 0x80, 0x85, 0x9F, 0xA0)),
+    *"\u061c\u1680\u2000\u200a\u200b\u200e\u200f\u2028\u2029\u202a\u202e\u202f\u205f\u2060\u2066\u206f\u3000\ufeff\ufff9{",
+)
+_NO_UTF8 = (
+    b"\xff",
+    b"\xc3",
+    b"\xc0\xaf",
+    b"\xed\xa0\x80",
+    b"\xf5\x80\x80\x80",
+    b"\xe2\x82",
+    b"\x80",
+    b"\xfe",
+)
+
+
+def _header(some: _Bytes, codec: int = 1, flags: int = 0, size: int = 0, version: int = 1) -> bytes:
+    numbers = some.below(2**40) + 1, STAMP_NS + some.below(10**9), some.below(2**62) + 1
+    return struct.pack("<BBHIQQQ", version, codec, flags, size, *numbers)
+
+
+def _part_count(some: _Bytes) -> Parts:
+    head, payload = _header(some), some.bytes(some.below(20))
+    return [
+        *some.of(
+            (
+                [],
+                [_GOOD_TOPIC],
+                [_GOOD_TOPIC + head[: some.below(32)]],
+                [some.bytes(some.below(60)).replace(b"\0", b"a")],
+                [_GOOD_TOPIC, head],
+                [_GOOD_TOPIC, head, payload, _EXTENSION],
+                [_GOOD_TOPIC, head, payload, _EXTENSION, payload],
+                [_GOOD_TOPIC, _header(some, flags=wire.EXTENSION), payload],
+                [_GOOD_TOPIC + _header(some, flags=wire.EXTENSION) + payload],
+                [_GOOD_TOPIC, head, payload, payload, payload, payload],
+            )
+        )
+    ]
+
+
+def _topic_end(some: _Bytes) -> Parts:
+    first = some.of((b"", b"example", b"example\0a", b"\0example", "größe".encode(), b"a" * 201, b"\xff"))
+    return [first, _header(some), some.bytes(some.below(20))]
+
+
+def _topic(some: _Bytes) -> Parts:
+    letter = some.of(_NO_TOPIC).encode()
+    name = some.of((b"%sa", b"a%sb", b"/robot/%s")) % some.of((letter, letter, letter, some.of(_NO_UTF8)))
+    name = some.of((name, name, name, name, b"", b"x" * 201, "ü".encode() * 101, b"a\0b"))
+    tail = _header(some), some.bytes(some.below(20))
+    return [name + b"\0", *tail] if some.below(2) or b"\0" in name else [name + b"\0" + b"".join(tail)]
+
+
+def _header_size(some: _Bytes) -> Parts:
+    head = _header(some) + bytes(8)
+    size = some.of((0, 1, 4, 16, 24, 31, 33, 40))
+    tail: Parts = some.of(([], [b"{}"], [b"{}", _EXTENSION], [b""]))
+    return [_GOOD_TOPIC, head[:size], *tail]
+
+
+def _version(some: _Bytes) -> Parts:
+    number = some.of((0, 2, 3, 9, 128, 255))
+    payload = some.bytes(some.below(20))
+    head = _header(some, some.below(256), some.below(2**16), some.below(2**32), version=number)
+    return some.of(([_GOOD_TOPIC, head, payload], [_GOOD_TOPIC + head + payload], [_GOOD_TOPIC, head]))  # type: ignore[no-any-return]
+
+
+def _payload_size(some: _Bytes) -> Parts:
+    payload = some.bytes(some.below(40))
+    told = some.of((len(payload) + 1, len(payload) + 32, 2**31, 2**32 - 1, max(1, len(payload) - 1)))
+    told += told == len(payload)
+    head = _header(some, size=told)
+    extended = _header(some, flags=wire.EXTENSION, size=told)
+    return some.of(  # type: ignore[no-any-return]
+        (
+            [_GOOD_TOPIC, head, payload],
+            [_GOOD_TOPIC + head + payload],
+            [_GOOD_TOPIC, extended, payload, _EXTENSION],
+        )
+    )
+
+
+def _extension(some: _Bytes) -> Parts:
+    cut = 1 + some.below(len(_EXTENSION) - 1)
+    part = some.of(
+        (
+            b"",
+            _EXTENSION[:cut],
+            _EXTENSION + some.bytes(1 + some.below(5)),
+            msgpack.packb(some.of((None, True, 7, "text", [1, 2], 0.5))),
+            msgpack.packb({1 + some.below(100): "a"}),
+            b"\xc1",
+            b"\x81\xa1a" + b"\x91" * (64 + some.below(200)) + b"\xc0",
+            b"\x81\xa1a\xdd\xff\xff\xff\xff",
+            b"\xdf\xff\xff\xff\xff\xa1a\xc0",
+            b"\x81\xa1a\xdb\xff\xff\xff\xffabc",
+        )
+    )
+    return [_GOOD_TOPIC, _header(some, flags=wire.EXTENSION), some.bytes(some.below(20)), part]
+
+
+def _table(some: _Bytes, count: int, sizes: Sequence[int]) -> bytes:
+    stamps = [STAMP_NS + some.below(10**9) for _each in sizes]
+    return struct.pack(f"<I{len(sizes)}I{len(sizes)}Q", count, *sizes, *stamps)
+
+
+def _batch(some: _Bytes, body: bytes, flags: int = wire.BATCH, size: int | None = None) -> Parts:
+    head = _header(some, flags=flags, size=len(body) if size is None else size)
+    return [_GOOD_TOPIC + head + body]
+
+
+def _whole(some: _Bytes) -> bytes:
+    sizes = [some.below(12) for _each in range(1 + some.below(4))]
+    return _table(some, len(sizes), sizes) + some.bytes(sum(sizes))
+
+
+def _batch_form(some: _Bytes) -> Parts:
+    body = _whole(some)
+    other = some.of((wire.LATCHED, wire.BYE, wire.SHARED, wire.OFFER, 64, 2**15))
+    (one,) = _batch(some, body)
+    cut = len(_GOOD_TOPIC)
+    return some.of(  # type: ignore[no-any-return]
+        (
+            _batch(some, body, wire.BATCH | other),
+            _batch(some, body, wire.BATCH | other, size=len(body) + 1),
+            [one[:cut], one[cut : cut + 32], one[cut + 32 :]],
+            [_GOOD_TOPIC, _header(some, flags=wire.BATCH | wire.EXTENSION), body, _EXTENSION],
+        )
+    )
+
+
+def _batch_size(some: _Bytes) -> Parts:
+    body = _whole(some)
+    return _batch(some, body, size=some.of((0, len(body) - 1, len(body) + 1, 2**32 - 1)))
+
+
+def _batch_count(some: _Bytes) -> Parts:
+    count = some.of((0, 257, 258, 1000, 2**31, 2**32 - 1))
+    sizes = [some.below(5) for _each in range(some.below(4))]
+    body = _table(some, count, sizes) + some.bytes(sum(sizes))
+    return _batch(some, some.of((body, body, body, b"", body[: 1 + some.below(3)])))
+
+
+def _batch_table(some: _Bytes) -> Parts:
+    sizes = [some.below(5) for _each in range(1 + some.below(5))]
+    table = _table(some, len(sizes), sizes)
+    return _batch(some, some.of((table[: 4 + some.below(len(table) - 4)], struct.pack("<I", 256))))
+
+
+def _batch_sizes(some: _Bytes) -> Parts:
+    sizes = [some.below(9) for _each in range(1 + some.below(5))]
+    payloads = some.bytes(sum(sizes))
+    told = list(sizes)
+    told[some.below(len(told))] += some.of((1, 7, 2**31, 2**32 - 9))
+    short = _table(some, len(sizes), sizes) + payloads + some.bytes(1 + some.below(4))
+    return _batch(some, some.of((_table(some, len(told), told) + payloads, short)))
+
+
+def _codec(some: _Bytes) -> Parts:
+    number = some.of((0, 6, 7, 99, 128, 255))
+    payload = some.bytes(some.below(20))
+    head = _header(some, number, size=some.of((0, len(payload))))
+    batch = struct.pack("<IIQ", 1, len(payload), STAMP_NS) + payload
+    return some.of(  # type: ignore[no-any-return]
+        (
+            [_GOOD_TOPIC, head, payload],
+            [_GOOD_TOPIC + head + payload],
+            [_GOOD_TOPIC + _header(some, number, wire.BATCH, len(batch)) + batch],
+        )
+    )
+
+
+KINDS: tuple[tuple[str, Callable[[_Bytes], Parts]], ...] = (
+    ("part-count", _part_count),
+    ("topic-end", _topic_end),
+    ("topic", _topic),
+    ("header-size", _header_size),
+    ("version", _version),
+    ("payload-size", _payload_size),
+    ("extension", _extension),
+    ("batch-form", _batch_form),
+    ("payload-size", _batch_size),
+    ("batch-count", _batch_count),
+    ("batch-table", _batch_table),
+    ("batch-sizes", _batch_sizes),
+    ("codec", _codec),
+)
+
+
+def malformed() -> Iterator[list[str]]:
+    """Yield each malformed message: its code, and its parts as hexadecimal digits. No two are the same."""
+    seen: set[tuple[bytes, ...]] = set()
+    number = 0
+    while len(seen) < MALFORMED_COUNT:
+        code, make = KINDS[number % len(KINDS)]
+        parts = make(_Bytes(f"nep malformed {number}"))
+        number += 1
+        if tuple(parts) not in seen:
+            seen.add(tuple(parts))
+            yield [code, *(each.hex() for each in parts)]
+
+
+def files() -> dict[str, str]:
+    """Return the text of each generated file."""
+    whole: dict[str, Any] = {"filters": filters(), "notices": notices(), "master": master()}
+    texts = {f"{name}.json": json.dumps(value, indent=1) + "\n" for name, value in whole.items()}
+    lines = ",\n".join(json.dumps(each, separators=(",", ":")) for each in malformed())
+    return {**texts, "malformed.json": f"[\n{lines}\n]\n"}
+
+
+def main() -> int:
+    """Write the files, or compare them."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--check", action="store_true")
+    is_check = parser.parse_args().check
+    stale = 0
+    for name, text in files().items():
+        path = FOLDER / name
+        if is_check:
+            stale += not path.is_file() or path.read_text("utf-8") != text
+        else:
+            path.write_text(text, "utf-8", newline="\n")
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
