@@ -14,6 +14,7 @@ from nep.messages.packing import unpack
 from nep.protocol import wire
 from nep.protocol.batch import read_parts
 from nep.protocol.encoding import decode_answer, decode_request, encode_answer, encode_request
+from tests.nep.protocol import wire_tables
 from tools import wire_vectors
 
 ROOT = Path(__file__).parents[3]
@@ -120,3 +121,11 @@ def test_documentation_lists_every_code() -> None:
         each["error"] for each in FILTERS if "error" in each
     }
     assert raised | in_vectors <= listed
+
+
+@pytest.mark.parametrize("name", [name for name in wire_tables.TABLES if wire_tables.rows(name)])
+def test_documentation_has_types_and_defaults_of_all_fields(name: str) -> None:
+    page = (ROOT / "docs" / "wire.md").read_text("utf-8")
+    table = page.partition(f"\n#### `{name}`\n")[2].partition("\n#")[0]
+    found = re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|", table, re.MULTILINE)
+    assert found == wire_tables.rows(name)

@@ -1,0 +1,90 @@
+"""The tables of fields in docs/wire.md, made from the values that nep reads and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from nep.protocol import graph_view, requests
+
+TABLES: Mapping[str, type] = {
+    "node": requests.NodeRecord,
+    "publisher": requests.PublisherRecord,
+    "subscriber": requests.SubscriberRecord,
+    "remote publisher": requests.RemotePublisher,
+    "expected subscriber": requests.Expected,
+    "topic publishers": requests.TopicPublishers,
+    "publisher statistics": requests.PublisherCount,
+    "subscriber statistics": requests.SubscriberCount,
+    "publisher+": requests.AddPublisher,
+    "subscriber+": requests.AddSubscriber,
+    "join": requests.Join,
+    "publisher-": requests.RemovePublisher,
+    "subscriber-": requests.RemoveSubscriber,
+    "leave": requests.Leave,
+    "renew": requests.Renew,
+    "missing": requests.ReportMissing,
+    "listen": requests.Listen,
+    "added": requests.Added,
+    "found": requests.Found,
+    "renewed": requests.Renewed,
+    "refused": requests.Refused,
+    "push publisher+": requests.PublisherCame,
+    "push publisher-": requests.PublisherGone,
+    "seen": requests.Seen,
+    "view": graph_view.GraphView,
+    "node info": graph_view.NodeInfo,
+    "topic info": graph_view.TopicInfo,
+    "publisher info": graph_view.PublisherInfo,
+    "subscriber info": graph_view.SubscriberInfo,
+    "pattern info": graph_view.PatternInfo,
+    "service info": graph_view.ServiceInfo,
+    "server info": graph_view.ServerInfo,
+    "client info": graph_view.ClientInfo,
+    "alert": graph_view.Alert,
+}
+_NAMES = {kind: name for name, kind in TABLES.items()}
+_PLAIN = {str: "text", int: "integer", bool: "boolean", float: "number"}
+_OF_ALL = {"epoch", "revision"}
+
+
+def rows(name: str) -> list[tuple[str, str, str]]:
+    """Return field, type and default of each field; without `epoch` and `revision` of replies and pushes."""
+    kind = TABLES[name]
+    hints = get_type_hints(kind)
+    is_answer = {"epoch", "revision"} <= hints.keys() and name not in {"renew", "view"}
+    return [
+        (each.name, _type(hints[each.name]), _default(each))
+        for each in fields(kind)
+        if not (is_answer and each.name in _OF_ALL)
+    ]
+
+
+def _type(hint: Any) -> str:  # noqa: ANN401 - a type hint is any object
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    if hint in _NAMES:
+        return f"*{_NAMES[hint]}*"
+    origin, args = get_origin(hint), get_args(hint)
+    if origin in {UnionType, Union}:
+        (inner,) = (each for each in args if each is not NoneType)
+        return f"{_type(inner)} or nil"
+    if origin is tuple:
+        return f"list of {_type(args[0])}"
+    return f"map: {_type(args[0])} → {_type(args[1])}"
+
+
+def _default(field: Any) -> str:  # noqa: ANN401 - a field of any type
+    if field.default_factory is not MISSING:
+        return "empty"
+    if field.default is MISSING:
+        return "required"
+    if field.default is None:
+        return "nil"
+    if field.default in ("", ()):
+        return "empty"
+    if isinstance(field.default, bool):
+        return str(field.default).lower()
+    return f"{field.default:g}" if isinstance(field.default, float) else f"{field.default}"
