@@ -62,7 +62,7 @@ def rows(name: str) -> list[tuple[str, str, str]]:
     ]
 
 
-def _type(hint: Any) -> str:  # noqa: ANN401 - a type hint is any object
+def _type(hint: Any) -> str:
     if hint in _PLAIN:
         return _PLAIN[hint]
     if hint in _NAMES:
@@ -76,7 +76,7 @@ def _type(hint: Any) -> str:  # noqa: ANN401 - a type hint is any object
     return f"map: {_type(args[0])} → {_type(args[1])}"
 
 
-def _default(field: Any) -> str:  # noqa: ANN401 - a field of any type
+def _default(field: Any) -> str:
     if field.default_factory is not MISSING:
         return "empty"
     if field.default is MISSING:
