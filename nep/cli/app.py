@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         top,
         topics,
         watch,
+        wire,
     )
 else:  # each command line needs one of them
     blackboard, bridge = lazy_module("nep.cli.blackboard"), lazy_module("nep.cli.bridge")
@@ -46,6 +47,7 @@ else:  # each command line needs one of them
     record, recordings = lazy_module("nep.cli.record"), lazy_module("nep.cli.recordings")
     services, top = lazy_module("nep.cli.services"), lazy_module("nep.cli.top")
     topics, watch = lazy_module("nep.cli.topics"), lazy_module("nep.cli.watch")
+    wire = lazy_module("nep.cli.wire")
 
 _COMMANDS: Mapping[str, Callable[[], object]] = {
     "master": lambda: masters.master,
@@ -62,6 +64,7 @@ _COMMANDS: Mapping[str, Callable[[], object]] = {
     "param": lambda: parameters.app,
     "blackboard": lambda: blackboard.app,
     "recording": lambda: recordings.app,
+    "wire": lambda: wire.app,
 }
 """In the order of the help: what carries a command out, or the group that has more of them."""
 

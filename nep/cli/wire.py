@@ -1,0 +1,121 @@
+"""`nep wire`: whether a client in any language speaks the native wire."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nep.cli.options import JsonOption
+from nep.cli.screen import console, say, say_error, show_json, write
+from nep.cli.typer_words import TranslatedGroup
+from nep.i18n import _, ngettext
+from nep.system.lazy_import import lazy_module
+from nep.text import escaped
+
+if TYPE_CHECKING:
+    from nep.programs import conformance
+else:  # the other commands need not wait for it
+    conformance = lazy_module("nep.programs.conformance")
+
+app: typer.Typer = typer.Typer(
+    cls=TranslatedGroup, no_args_is_help=True, help=_("Test clients of the native wire, in any language.")
+)
+_STYLES = {"passed": "green", "failed": "bold red", "skipped": "dim"}
+_USAGE = 2
+
+
+@app.callback()
+def wire() -> None:
+    """Test clients of the native wire, in any language."""
+
+
+@app.command("check")
+def check(
+    command: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help=_("The command that starts the adapter, after '--'."),
+            metavar=_("COMMAND"),
+            show_default=False,
+        ),
+    ] = None,
+    rule: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--rule", metavar=_("ID"), help=_("Judge by this rule only; can be repeated."), show_default=False
+        ),
+    ] = None,
+    list_rules: Annotated[bool, typer.Option("--list", help=_("List the rules, and exit."))] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Judge a client of the native wire, rule by rule.
+
+    COMMAND starts an adapter: a small program that does with the client's library what it reads from its
+    standard input. NEP_MASTER tells it the address of the tester's own master. docs/wire-check.md says how to
+    write one.
+
+    Exits with 0 when no rule failed, 1 when one did, and 2 when the adapter can't be started.
+    """
+    try:
+        rules = conformance.chosen_rules(rule or ())
+    except KeyError as error:
+        raise typer.BadParameter(
+            _("no rule '{id}'; '--list' shows all").format(id=error.args[0]), param_hint="--rule"
+        ) from error
+    if list_rules:
+        _list(rules, as_json=as_json)
+        return
+    if not command:
+        raise typer.BadParameter(_("say how to start the adapter, after '--'"), param_hint="COMMAND")
+    outcomes = []
+    try:
+        for outcome in conformance.check(lambda master: conformance.AdapterProcess(command, master), rules):
+            outcomes.append(outcome)
+            if not as_json:
+                _show(outcome)
+    except conformance.AdapterError as error:
+        say_error(str(error))
+        raise typer.Exit(_USAGE) from error
+    failed = sum(each.status == "failed" for each in outcomes)
+    if as_json:
+        show_json([each.to_plain() for each in outcomes])
+    else:
+        _summarize(outcomes, failed)
+    raise typer.Exit(1 if failed else 0)
+
+
+def _list(rules: list[conformance.Rule], *, as_json: bool) -> None:
+    if as_json:
+        show_json(
+            [{"id": each.id, "requirement": _(each.requirement), "features": each.features} for each in rules]
+        )
+        return
+    width = max(len(each.id) for each in rules)
+    for each in rules:
+        write(f"{each.id:{width}}  {_(each.requirement)}\n")
+
+
+def _show(outcome: conformance.Outcome) -> None:
+    from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
+
+    words = {"passed": _("passed"), "failed": _("failed"), "skipped": _("skipped")}
+    out = console()
+    out.print(Text.assemble((words[outcome.status], _STYLES[outcome.status]), f"  {outcome.rule.id}"))
+    if outcome.status == "failed":
+        plain = outcome.to_plain()
+        for line in (plain["requirement"], outcome.seen, plain["section"]):
+            out.print(Text(f"    {escaped(str(line))}"))
+    elif outcome.status == "skipped":
+        out.print(Text(f"    {escaped(outcome.seen)}", "dim"))
+
+
+def _summarize(outcomes: list[conformance.Outcome], failed: int) -> None:
+    skipped = sum(each.status == "skipped" for each in outcomes)
+    passed = len(outcomes) - failed - skipped
+    parts = [ngettext("{count} rule passed", "{count} rules passed", passed).format(count=passed)]
+    if failed:
+        parts.append(ngettext("{count} failed", "{count} failed", failed).format(count=failed))
+    if skipped:
+        parts.append(ngettext("{count} skipped", "{count} skipped", skipped).format(count=skipped))
+    say(", ".join(parts))

@@ -1,0 +1,97 @@
+"""Judging: every rule against one adapter, which is started again after a rule that it broke."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.programs.conformance.adapter import AdapterError
+from nep.programs.conformance.bench import Bench, Start
+from nep.programs.conformance.rule import RULES, Rule
+
+__all__ = ["Outcome", "check", "chosen_rules"]
+
+_MODULES = ("registration", "handshake", "messages", "receiving", "losses", "closing", "lease", "limits")
+"""The order in which rules are judged: what a later one is about needs what the earlier ones ask for."""
+Status = Literal["passed", "failed", "skipped"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a rule has shown. `seen`: what was seen when it failed, or why it was skipped; else empty."""
+
+    rule: Rule
+    status: Status
+    seen: str = ""
+
+    def to_plain(self) -> dict[str, object]:
+        """Return it for `--json`."""
+        return {
+            "id": self.rule.id,
+            "status": self.status,
+            "requirement": _(self.rule.requirement),
+            "seen": self.seen,
+            "section": f"docs/wire.md#{self.rule.section.replace(' ', '-')}",
+        }
+
+
+def chosen_rules(ids: Iterable[str]) -> list[Rule]:
+    """Return the rules with these ids, all without any. Raises `KeyError` with an id that no rule has."""
+    wanted = list(ids)
+    for each in wanted:
+        if each not in RULES:
+            raise KeyError(each)
+    found = [each for each in RULES.values() if not wanted or each.id in wanted]
+    return sorted(found, key=lambda each: _MODULES.index(each.judge.__module__.rpartition(".")[2]))
+
+
+def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
+    """Judge an adapter by these rules, and yield each outcome.
+
+    Args:
+        start: starts an adapter that finds the master at the given address.
+        scale: shortens the times of the wire, for an adapter that shortens them as well.
+
+    Raises:
+        AdapterError: it can't be started, or does not know `features` and `node`.
+    """
+    bench: Bench | None = None
+    try:
+        for each in rules:
+            bench = bench or Bench(start, scale)
+            outcome = _judge(each, bench)
+            yield outcome
+            if outcome.status == "failed" or each.is_last or not _is_clear(bench):
+                bench.close()
+                bench = None
+    finally:
+        if bench is not None:
+            bench.close()
+
+
+def _judge(rule: Rule, bench: Bench) -> Outcome:
+    announced = bench.features.get("features", ())
+    lacking = [each for each in rule.features if each not in announced]
+    if lacking:
+        return Outcome(
+            rule, "skipped", _("the adapter does not announce '{feature}'").format(feature=lacking[0])
+        )
+    try:
+        rule.judge(bench)
+    except NepError as error:
+        return Outcome(rule, "failed", str(error))
+    except (KeyError, IndexError, TypeError, ValueError) as error:  # a field that a judge looks for
+        reason = f"{type(error).__name__}: {error}"
+        return Outcome(rule, "failed", _("what it said can't be read: {reason}").format(reason=reason))
+    return Outcome(rule, "passed")
+
+
+def _is_clear(bench: Bench) -> bool:
+    try:
+        bench.clear()
+    except AdapterError:
+        return False
+    return True

@@ -1,0 +1,75 @@
+"""Malformed messages of a topic, one for each way in which parts can be none. All begin as the topic does."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+
+import msgpack  # type: ignore[import-untyped]
+
+from nep.protocol.wire import BATCH, EXTENSION, LATCHED, Header, topic_part
+
+__all__ = ["malformed_parts"]
+
+_PUBLISHER = 7
+"""Nobody that the master lists: what is read all the same can be told from good messages."""
+
+
+def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
+    return Header(codec, flags, 1, 1, _PUBLISHER, size).pack()
+
+
+def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
+    """Yield the code and the parts of each."""
+    first, head, extension = topic_part(topic), _header(), msgpack.packb({"a": 1})
+    yield "part-count", [first]
+    yield "part-count", [first, head]
+    yield "part-count", [first, head, b"{}", extension]
+    yield "part-count", [first, head, b"{}", extension, b""]
+    yield "part-count", [first, _header(flags=EXTENSION), b"{}"]
+    yield "part-count", [first + head[:20]]
+    yield "part-count", [first + _header(flags=EXTENSION) + b"{}"]
+    yield "topic-end", [first + b"more", head, b"{}"]
+    yield "topic", [first + b"\0", head, b"{}"]
+    for size in (0, 1, 31, 33):
+        yield "header-size", [first, (head + b"\0")[:size], b"{}"]
+    for version in (0, 2, 255):
+        yield "version", [first, bytes((version,)) + head[1:], b"{}"]
+        yield "version", [first + bytes((version,)) + head[1:] + b"{}"]
+    for size in (1, 3, 2**32 - 1):
+        yield "payload-size", [first, _header(size=size), b"{}"]
+        yield "payload-size", [first + _header(size=size) + b"{}"]
+    for part in (
+        b"",
+        b"\xc1",
+        extension + b"\0",
+        msgpack.packb([1]),
+        msgpack.packb({1: 2}),
+        b"\xdf\xff\xff\xff\xff",
+    ):
+        yield "extension", [first, _header(flags=EXTENSION), b"{}", part]
+    yield "extension", [first, _header(flags=EXTENSION), b"{}", b"\x81\xa1a" + b"\x91" * 100 + b"\xc0"]
+    yield from _batches(first)
+    for codec in (0, 6, 99, 255):
+        yield "codec", [first, _header(codec), b"{}"]
+        yield "codec", [first + _header(codec) + b"{}"]
+
+
+def _batches(first: bytes) -> Iterator[tuple[str, list[bytes]]]:
+    good = struct.pack("<IIQ", 1, 2, 1) + b"{}"
+    yield "batch-form", [first, _header(flags=BATCH, size=len(good)), good]
+    yield "batch-form", [first + _header(flags=BATCH | LATCHED, size=len(good)) + good]
+    yield "payload-size", [first + _header(flags=BATCH) + good]
+    yield "payload-size", [first + _header(flags=BATCH, size=len(good) + 1) + good]
+    for code, body in (
+        ("batch-count", b""),
+        ("batch-count", struct.pack("<I", 0)),
+        ("batch-count", struct.pack("<I", 257) + bytes(20)),
+        ("batch-count", struct.pack("<I", 2**32 - 1) + bytes(20)),
+        ("batch-table", good[:10]),
+        ("batch-table", struct.pack("<I", 256) + bytes(100)),
+        ("batch-sizes", good + b"more"),
+        ("batch-sizes", struct.pack("<IIQ", 1, 2**32 - 1, 1) + b"{}"),
+        ("batch-sizes", struct.pack("<IIIQQ", 2, 2**32 - 1, 3, 1, 1) + b"{}"),
+    ):
+        yield code, [first + _header(flags=BATCH, size=len(body)) + body]

@@ -1,0 +1,210 @@
+"""Publishers and subscribers of the tester: plain sockets that send and see every part."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import zmq
+
+from nep.errors import WireError
+from nep.messages.codecs import codec_for
+from nep.protocol.batch import BATCH_FORM, batch_part, read_parts
+from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.wire import (
+    BYE,
+    HEADER_BYTES,
+    Header,
+    Hello,
+    Parts,
+    form_of,
+    hello_part,
+    parse_hello,
+    read_header,
+    topic_part,
+)
+
+__all__ = ["Notice", "ScriptedPublisher", "ScriptedSubscriber", "new_node"]
+
+
+def new_node(name: str) -> NodeRecord:
+    """Return the record of a node of the tester."""
+    return NodeRecord(secrets.token_hex(8), name, "tester", None, "tester")
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A subscription or its end, as an XPUB socket tells of it."""
+
+    at: float
+    is_added: bool
+    what: bytes
+
+
+@dataclass(frozen=True)
+class Notice:
+    """An echo or bye, or a message under a hello (with its payload)."""
+
+    at: float
+    hello: bytes
+    header: Header
+    payload: bytes | None
+
+
+class ScriptedPublisher:
+    """An XPUB socket that notes every filter, greets when it is told to, and sends any parts."""
+
+    def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
+        self.topic, self.echoes = topic, echoes
+        self.socket = context.socket(zmq.XPUB)
+        self.socket.linger, self.socket.sndhwm = 0, 0
+        self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        port = self.socket.bind_to_random_port("tcp://127.0.0.1")
+        self.codec = codec_for(msg_type)
+        self.node = new_node("tester_publisher")
+        self.record = PublisherRecord(
+            secrets.randbits(62) | 1, topic, msg_type, self.codec.name, (f"tcp://127.0.0.1:{port}",)
+        )
+        self.seq = 0
+        self.filters: list[Filter] = []
+        self.hellos: dict[bytes, Hello] = {}
+        """Hellos for its topic that are there now, by their filter."""
+        self.echoed_at: float | None = None
+
+    @property
+    def id(self) -> int:
+        """Its id."""
+        return self.record.id
+
+    def pump(self) -> None:
+        """Read filters, and echo hellos."""
+        while not self.socket.closed and self.socket.poll(0):
+            event = self.socket.recv()
+            now = time.monotonic()
+            noted = Filter(now, event[:1] == b"\1", event[1:])
+            self.filters.append(noted)
+            hello = parse_hello(noted.what)
+            if hello is None or hello.topic != self.topic:
+                continue
+            if noted.is_added:
+                self.hellos[noted.what] = hello
+                if self.echoes:
+                    self.echo(noted.what)
+            else:
+                self.hellos.pop(noted.what, None)
+
+    def echo(self, hello: bytes) -> None:
+        """Say that a subscriber is seen, and how many messages there were."""
+        self.notice(hello)
+        self.echoed_at = time.monotonic()
+
+    def notice(self, hello: bytes, flags: int = 0, seq: int | None = None) -> None:
+        """Send a notice under a hello."""
+        self.socket.send_multipart([hello, self._header(flags, b"", seq)])
+
+    def bye(self) -> None:
+        """Say to everybody that nothing comes any more."""
+        for hello in self.hellos:
+            self.notice(hello, BYE)
+
+    def send(self, payload: bytes, form: str = "parts", *, seq: int | None = None, flags: int = 0) -> None:
+        """Send the next message: in `parts`, as `one` part, or `alone` to everybody who said hello."""
+        self.seq = self.seq + 1 if seq is None else seq
+        header, topic = self._header(flags, payload), topic_part(self.topic)
+        if form == "one":
+            self.socket.send(topic + header + payload)
+        elif form == "alone":
+            for hello in self.hellos:
+                self.socket.send_multipart([hello, header, payload])
+        else:
+            self.socket.send_multipart([topic, header, payload])
+
+    def send_batch(self, payloads: Sequence[bytes]) -> None:
+        """Send the next messages as a batch."""
+        form = form_of(self.codec.number, 0) & ~BATCH_FORM
+        stamps = [time.time_ns()] * len(payloads)
+        part = batch_part(topic_part(self.topic), form, self.seq + 1, self.id, stamps, payloads)
+        self.seq += len(payloads)
+        self.socket.send(part)
+
+    def _header(self, flags: int, payload: bytes, seq: int | None = None) -> bytes:
+        number = self.seq if seq is None else seq
+        return Header(self.codec.number, flags, number, time.time_ns(), self.id, len(payload)).pack()
+
+
+class ScriptedSubscriber:
+    """A SUB socket that keeps all parts. `level` is that of its hello; None: it says none."""
+
+    def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, level: int | None) -> None:
+        self.topic, self.level = topic, level
+        self.node = new_node("tester_subscriber")
+        self.record = SubscriberRecord(secrets.randbits(62) | 1, topic, msg_type)
+        self.socket = context.socket(zmq.SUB)
+        self.socket.linger, self.socket.sndhwm, self.socket.rcvhwm = 0, 0, 0
+        self.socket.subscribe(topic_part(topic))
+        self.hello = hello_part(
+            self.record.id, topic, one_part=level == 1, tells=level == 2, batches=level == 3
+        )
+        if level is not None:
+            self.socket.subscribe(self.hello)
+        self.received: list[list[bytes]] = []
+        self.times: list[float] = []
+        self.endpoint = ""
+
+    def connect(self, endpoint: str) -> None:
+        """Connect, once."""
+        if not self.endpoint:
+            self.endpoint = endpoint
+            self.socket.connect(endpoint)
+
+    def disconnect(self) -> None:
+        """Leave the publisher."""
+        if self.endpoint and not self.socket.closed:
+            self.socket.disconnect(self.endpoint)
+            self.endpoint = ""
+
+    def pump(self) -> None:
+        """Take what has come."""
+        while not self.socket.closed and self.socket.poll(0):
+            self.received.append(self.socket.recv_multipart())
+            self.times.append(time.monotonic())
+
+    @property
+    def notices(self) -> list[Notice]:
+        """Echoes, byes and messages sent to it alone, so far; without what can't be one of them."""
+        found = []
+        for at, parts in zip(self.times, self.received, strict=True):
+            if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
+                try:
+                    header = read_header(parts[1])
+                except WireError:
+                    continue
+                found.append(Notice(at, parts[0], header, parts[2] if len(parts) > 2 else None))
+        return found
+
+    @property
+    def echoes(self) -> list[Notice]:
+        """Echoes so far."""
+        return [each for each in self.notices if each.payload is None and not each.header.flags]
+
+    @property
+    def byes(self) -> list[Notice]:
+        """Byes so far."""
+        return [each for each in self.notices if each.payload is None and each.header.flags == BYE]
+
+    @property
+    def raw(self) -> list[list[bytes]]:
+        """The parts of all messages that do not begin with the hello."""
+        return [parts for parts in self.received if parts[0] != self.hello]
+
+    @property
+    def messages(self) -> list[Parts]:
+        """All messages of its topic, those of batches one by one. Raises `WireError`."""
+        return [each for parts in self.raw for each in read_parts(parts)]
+
+    def note_alone(self) -> list[Notice]:
+        """Messages that came under the hello."""
+        return [each for each in self.notices if each.payload is not None]

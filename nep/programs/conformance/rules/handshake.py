@@ -1,0 +1,259 @@
+"""Rules about hello and echo: no message is lost at the start, and nobody waits for long."""
+
+from __future__ import annotations
+
+import time
+
+from nep.i18n import _, lazy
+from nep.programs.conformance.adapter import AdapterError
+from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.peers import ScriptedPublisher
+from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.protocol.wire import LATCHED, hello_part, topic_part
+
+_SECTION = "the-handshake"
+_MOST_WAIT_S = 5.0
+"""A tenth of it is allowed; a busy computer may take the rest."""
+
+
+def level_of(bench: Bench) -> int:
+    """Return the level of hello that the adapter announces."""
+    announced = bench.features.get("features", ())
+    return max((level for level in (1, 2, 3) if f"hello{level}" in announced), default=0)
+
+
+def _filters(publisher: ScriptedPublisher) -> list[bytes]:
+    return [each.what for each in publisher.filters if each.is_added]
+
+
+@rule(
+    "hello-after-topic",
+    lazy("A subscriber sets the filter of its topic, with the zero byte, and its hello behind it."),
+    "who-connects",
+)
+def hello_after_topic(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    publisher, _sub = bench.heard_publisher(topic)
+    filters = _filters(publisher)
+    if topic_part(topic) not in filters:
+        raise broken(
+            _("its filters are {seen}; {wanted} is not among them").format(
+                seen=shown(filters), wanted=shown(topic_part(topic))
+            )
+        )
+    hello = next(iter(publisher.hellos))
+    if filters.index(hello) < filters.index(topic_part(topic)):
+        raise broken(_("the hello came before the topic"))
+
+
+@rule(
+    "hello-form",
+    lazy("The hello has the subscriber's id in 16 small hexadecimal digits, and the level of what it reads."),
+    "who-connects",
+)
+def hello_form(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    publisher, _sub = bench.heard_publisher(topic)
+    level = level_of(bench)
+    wanted = hello_part(
+        int(bench.record("subscriber", topic)["id"]),
+        topic,
+        one_part=level == 1,
+        tells=level == 2,
+        batches=level == 3,
+    )
+    expect("hello", next(iter(publisher.hellos)), wanted)
+
+
+@rule(
+    "echo",
+    lazy("A publisher answers each hello with an echo under it, with the seq of its last message."),
+    "notices",
+)
+def echo(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=3)
+    record = bench.record("publisher", topic)
+    subscriber = bench.subscriber(topic, endpoint=record["endpoints"][0])
+    bench.need(lambda: bool(subscriber.echoes), "echo")
+    header = subscriber.echoes[0].header
+    expect("echo.seq", header.seq, 3)
+    expect("echo.publisher", header.publisher, record["id"])
+    expect("echo.size", header.size, 0)
+
+
+@rule(
+    "foreign-hello",
+    lazy("A publisher ignores hellos for another topic: they are for whoever had its port before."),
+    "who-connects",
+)
+def foreign_hello(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.new_pub(topic)
+    subscriber = bench.subscriber(topic, endpoint=bench.record("publisher", topic)["endpoints"][0])
+    other = hello_part(subscriber.record.id, f"{topic}/other", batches=True)
+    subscriber.socket.subscribe(other)
+    subscriber.socket.subscribe(hello_part(7, topic))
+    bench.need(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
+    if any(parts[0] == other for parts in subscriber.received):
+        raise broken(_("it answered the hello {hello}").format(hello=shown(other)))
+
+
+@rule(
+    "first-message",
+    lazy("The first message after 'new_pub' reaches subscribers that were registered before."),
+    _SECTION,
+)
+def first_message(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    subscriber = bench.subscriber(topic)
+    bench.connect_delay_s = 0.15
+    pub = bench.new_pub(topic)
+    bench.ask("publish", pub=pub, value={"n": 1})
+    bench.need(lambda: bool(subscriber.echoes), "echo")
+    bench.ask("publish", pub=pub, value={"n": 2})
+    bench.need(lambda: bool(subscriber.messages), "message")
+    expect("message.seq", subscriber.messages[0].header.seq, 1)
+
+
+@rule(
+    "new-pub-bounded",
+    lazy("'new_pub' waits 0.5 s at most for a subscriber that does not come."),
+    _SECTION,
+)
+def new_pub_bounded(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.subscriber(topic)
+    bench.connect_delay_s = None
+    began = time.monotonic()
+    try:
+        bench.new_pub(topic)
+    except AdapterError as error:
+        raise broken(str(error)) from error
+    took_s = time.monotonic() - began
+    if took_s > _MOST_WAIT_S:
+        raise broken(_("it took {seconds:.1f} s").format(seconds=took_s))
+
+
+@rule(
+    "missing",
+    lazy("Subscribers that did not say hello in time are named to the program and to the master."),
+    _SECTION,
+)
+def missing(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    subscriber = bench.subscriber(topic)
+    bench.connect_delay_s = None
+    reply = bench.ask("publisher", topic=topic, type="json")
+    expect("publisher.missing", reply.get("missing"), [subscriber.node.name])
+    bench.need(lambda: bool(bench.requests("missing")), "missing")
+    what = bench.requests("missing")[-1].what
+    expect("missing.publisher_id", what.get("publisher_id"), bench.record("publisher", topic)["id"])
+    expect("missing.subscriber_ids", list(what.get("subscriber_ids", ())), [subscriber.record.id])
+    bench.ask("close_publisher", pub=reply.get("pub"))
+
+
+@rule(
+    "new-sub-waits",
+    lazy("'new_sub' returns when all publishers that the master named have echoed."),
+    _SECTION,
+)
+def new_sub_waits(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    publisher = bench.publisher(topic, echoes=False)
+    number = bench.adapter.begin("subscriber", topic=topic, type="json")
+    bench.need(lambda: bool(publisher.hellos), "hello")
+    bench.wait(0.15)
+    has_returned = bench.adapter.reply(number) is not None
+    for hello in list(publisher.hellos):
+        publisher.echo(hello)
+    bench.close_sub(int(bench.finish(number, "subscriber")["sub"]))
+    if has_returned:
+        raise broken(_("it returned before the echo"))
+
+
+@rule(
+    "new-sub-bounded",
+    lazy("'new_sub' waits 0.5 s at most for a publisher that does not echo."),
+    _SECTION,
+)
+def new_sub_bounded(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.publisher(topic, echoes=False)
+    began = time.monotonic()
+    try:
+        bench.new_sub(topic)
+    except AdapterError as error:
+        raise broken(str(error)) from error
+    took_s = time.monotonic() - began
+    if took_s > _MOST_WAIT_S:
+        raise broken(_("it took {seconds:.1f} s").format(seconds=took_s))
+
+
+@rule(
+    "push-connects",
+    lazy("A subscriber connects to publishers that the master pushes."),
+    _SECTION,
+)
+def push_connects(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    sub = bench.new_sub(topic)
+    publisher = bench.publisher(topic)
+    bench.need(lambda: bool(publisher.hellos), "hello")
+    publisher.send(b'{"n":1}')
+    bench.need(lambda: bool(bench.events(sub)), "message")
+
+
+@rule(
+    "latched",
+    lazy(
+        "A latched publisher sends its last message before the echo, with its own seq and the flag LATCHED."
+    ),
+    "notices",
+    "latched",
+)
+def latched(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic, latched=True)
+    expect("publisher.latched", bench.record("publisher", topic).get("latched"), True)
+    bench.ask("publish", pub=pub, value={"n": 1})
+    bench.ask("publish", pub=pub, value={"n": 2})
+    subscriber = bench.subscriber(topic, endpoint=bench.record("publisher", topic)["endpoints"][0])
+    bench.need(lambda: bool(subscriber.echoes), "echo")
+    before = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
+    kept = before[0]
+    if kept.payload is None:
+        raise broken(_("nothing came before the echo"))
+    expect("latched.seq", kept.header.seq, 2)
+    expect("latched.flags", kept.header.flags, LATCHED)
+
+
+@rule(
+    "history",
+    lazy("A publisher with a history sends its last messages, the oldest first, and then the echo."),
+    "notices",
+    "history",
+)
+def history(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic, history=3, latched=True)
+    expect("publisher.history", bench.record("publisher", topic).get("history"), 3)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=5)
+    subscriber = bench.subscriber(topic, endpoint=bench.record("publisher", topic)["endpoints"][0])
+    bench.need(lambda: bool(subscriber.echoes), "echo")
+    count = next(place for place, each in enumerate(subscriber.notices) if each.payload is None)
+    seqs = [each.header.seq for each in subscriber.notices[:count] if each.payload is not None]
+    expect("history", seqs, [3, 4, 5])

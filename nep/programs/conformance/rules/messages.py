@@ -1,0 +1,205 @@
+"""Rules about the messages that a client sends."""
+
+from __future__ import annotations
+
+import base64
+import json
+import time
+from collections.abc import Mapping
+
+import msgpack  # type: ignore[import-untyped]
+
+from nep.errors import WireError
+from nep.i18n import _, lazy
+from nep.messages.codecs import codec_for
+from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.peers import ScriptedSubscriber
+from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.protocol.batch import read_parts
+from nep.protocol.wire import BATCH, Parts, topic_part, unpack_at
+
+_BURST = 200
+_STAMP_NS = 60_000_000_000
+_SENT: Mapping[str, tuple[dict[str, object], bytes]] = {
+    "json": ({"value": {"text": "größe", "n": 2**53 - 1}}, b""),
+    "string": ({"text": "größe\n機器人"}, "größe\n機器人".encode()),
+    "bytes": ({"bytes": base64.b64encode(bytes(range(256))).decode()}, bytes(range(256))),
+    "msgpack": ({"value": [1, "a", None, True, 0.5]}, msgpack.packb([1, "a", None, True, 0.5])),
+}
+
+
+def heard(bench: Bench, topic: str, level: int | None, msg_type: str = "json") -> ScriptedSubscriber:
+    """Return a subscriber of the tester that the adapter's publisher is connected to."""
+    endpoint = bench.record("publisher", topic)["endpoints"][0]
+    subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
+    if level is not None:
+        bench.need(lambda: bool(subscriber.echoes), "echo")
+    return subscriber
+
+
+def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
+    """Return all messages that have come. What is none breaks the rule."""
+    try:
+        return subscriber.messages
+    except WireError as error:
+        raise broken(
+            _("a message can't be read ({code}): {reason}").format(code=error.code, reason=error.reason)
+        ) from error
+
+
+def settle(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
+    """Return a subscriber without a hello that hears the adapter's publisher by now."""
+    subscriber = heard(bench, topic, None)
+    for _turn in range(200):
+        bench.ask("publish", pub=pub, value={"warm": True})
+        if bench.until(lambda: bool(subscriber.received), 0.05):
+            return subscriber
+    raise broken(_("'{what}' did not come within {seconds:g} s").format(what="message", seconds=10.0))
+
+
+@rule(
+    "three-parts",
+    lazy("A subscriber without a hello gets messages of three parts: topic, header of 32 bytes, payload."),
+    "messages",
+)
+def three_parts(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic)
+    other = heard(bench, topic, 3)
+    subscriber = settle(bench, topic, pub)
+    count = len(subscriber.received)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
+    bench.need(lambda: len(subscriber.received) >= count + _BURST, "message")
+    for parts in subscriber.raw:
+        if len(parts) != 3:
+            raise broken(_("a message came in {count} part(s)").format(count=len(parts)))
+        expect("topic", parts[0], topic_part(topic))
+    messages_of(subscriber)
+    bench.need(lambda: len(messages_of(other)) >= count + _BURST, "message")
+
+
+@rule(
+    "batches-to-readers",
+    lazy("Batches go only to subscribers whose hello says that they read them."),
+    "batches",
+)
+def batches_to_readers(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic)
+    subscriber = heard(bench, topic, 1)
+    heard(bench, topic, 3)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
+    bench.need(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
+    for parts in subscriber.raw:
+        if len(parts) == 1 and unpack_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
+            raise broken(_("a batch came to a subscriber that said 'hello1/'"))
+
+
+def _last_seq(subscriber: ScriptedSubscriber) -> int:
+    return messages_of(subscriber)[-1].header.seq
+
+
+@rule(
+    "forms",
+    lazy("Whatever form messages come in, each can be read and none is lost."),
+    "one-part",
+)
+def forms(bench: Bench) -> None:
+    """See the rule."""
+    for level in (0, 1, 2, 3):
+        topic = bench.new_topic()
+        pub = bench.new_pub(topic)
+        subscriber = heard(bench, topic, level)
+        bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
+        bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called at once
+        seqs = [each.header.seq for each in messages_of(subscriber)]
+        if seqs != list(range(1, _BURST + 1)):
+            raise broken(_("the seqs are {seen}").format(seen=shown(seqs)))
+        numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
+        if numbers != list(range(1, _BURST + 1)):
+            raise broken(_("the messages are not in order: {seen}").format(seen=shown(numbers)))
+
+
+@rule(
+    "header",
+    lazy("A header has version 1, the codec's number, no unknown flags, the size and the publisher's id."),
+    "messages",
+)
+def header(bench: Bench) -> None:
+    """See the rule."""
+    for msg_type, (members, _payload) in _SENT.items():
+        topic = bench.new_topic()
+        pub = bench.new_pub(topic, msg_type)
+        subscriber = heard(bench, topic, 0, msg_type)
+        bench.ask("publish", pub=pub, **members)
+        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called at once
+        found = messages_of(subscriber)[0].header
+        expect("header.codec", found.codec, codec_for(msg_type).number)
+        expect("header.flags", found.flags, 0)
+        expect("header.seq", found.seq, 1)
+        expect("header.publisher", found.publisher, bench.record("publisher", topic)["id"])
+
+
+@rule(
+    "payload",
+    lazy("A payload is what the codec says: JSON and text in UTF-8, bytes as they are, msgpack."),
+    "messages",
+)
+def payload(bench: Bench) -> None:
+    """See the rule."""
+    for msg_type, (members, wanted) in _SENT.items():
+        topic = bench.new_topic()
+        pub = bench.new_pub(topic, msg_type)
+        subscriber = heard(bench, topic, 0, msg_type)
+        bench.ask("publish", pub=pub, **members)
+        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called at once
+        data = bytes(read_parts(subscriber.raw[0])[0].payload)
+        try:
+            if msg_type == "json":
+                expect("payload", json.loads(data.decode()), members["value"])
+            elif msg_type == "msgpack":
+                expect("payload", msgpack.unpackb(data), members["value"])
+            else:
+                expect("payload", data, wanted)
+        except ValueError as error:
+            raise broken(
+                _("the payload {seen} is no {msg_type}").format(seen=shown(data), msg_type=msg_type)
+            ) from error
+
+
+@rule(
+    "seq-unheard",
+    lazy("Seqs also count messages that nobody was there to hear."),
+    "messages",
+)
+def seq_unheard(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=7)
+    subscriber = heard(bench, topic, 0)
+    bench.ask("publish", pub=pub, value={"a": 1})
+    bench.need(lambda: bool(subscriber.raw), "message")
+    expect("header.seq", messages_of(subscriber)[0].header.seq, 8)
+
+
+@rule(
+    "stamp",
+    lazy("Stamps are nanoseconds since 1970, and do not go back."),
+    "messages",
+)
+def stamp(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic)
+    subscriber = heard(bench, topic, 3)
+    bench.ask("publish", pub=pub, value={"a": 1}, count=20)
+    bench.need(lambda: len(messages_of(subscriber)) >= 20, "message")
+    stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
+    now = time.time_ns()
+    if any(abs(now - each) > _STAMP_NS for each in stamps):
+        raise broken(_("the stamp is {seen}; it is {now} now").format(seen=stamps[0], now=now))
+    if stamps != sorted(stamps):
+        raise broken(_("the stamps are {seen}").format(seen=shown(stamps)))

@@ -1,0 +1,154 @@
+"""Rules about the messages that a client receives."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+
+import msgpack  # type: ignore[import-untyped]
+
+from nep.i18n import _, lazy
+from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.protocol.wire import LATCHED, parse_read
+
+_SENT: Mapping[str, tuple[bytes, object]] = {
+    "json": ('{"text":"größe","n":[1,null,true]}'.encode(), {"text": "größe", "n": [1, None, True]}),
+    "string": ("größe\n機器人".encode(), "größe\n機器人"),
+    "bytes": (bytes(range(256)), None),
+    "msgpack": (msgpack.packb({"a": [1, "b"]}), {"a": [1, "b"]}),
+}
+
+
+def _told(bench: Bench, sub: int, count: int, first: int = 1) -> None:
+    """Wait for so many messages, and compare their seqs."""
+    bench.need(lambda: len(bench.events(sub)) >= count, "message")
+    bench.wait(0.05)
+    seqs = [each.get("seq") for each in bench.events(sub)]
+    expect("seq", seqs, [str(number) for number in range(first, first + count)])
+
+
+@rule("reads-parts", lazy("A subscriber reads messages of three parts, of every codec."), "messages")
+def reads_parts(bench: Bench) -> None:
+    """See the rule."""
+    for msg_type, (payload, value) in _SENT.items():
+        publisher, sub = bench.heard_publisher(bench.new_topic(), msg_type)
+        publisher.send(payload)
+        _told(bench, sub, 1)
+        event = bench.events(sub)[0]
+        expect("payload", base64.b64decode(str(event.get("payload"))), payload)
+        expect("codec", event.get("codec"), msg_type)
+        expect("publisher", event.get("publisher"), str(publisher.id))
+        if value is not None and "value" in event:
+            expect("value", event["value"], value)
+
+
+@rule("reads-one-part", lazy("A subscriber reads messages of one part."), "one-part", "hello1")
+def reads_one_part(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    for form in ("one", "parts", "one", "one"):
+        publisher.send(b'{"a":1}', form)
+    _told(bench, sub, 4)
+
+
+@rule("reads-batches", lazy("A subscriber reads batches, of 1 to 256 messages."), "batches", "hello3")
+def reads_batches(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    publisher.send_batch([b'{"a":1}', b'{"b":22}', b"[]"])
+    publisher.send(b'{"a":1}', "one")
+    publisher.send_batch([b"1"])
+    publisher.send_batch([b'{"n":%d}' % number for number in range(256)])
+    _told(bench, sub, 261)
+    payloads = [base64.b64decode(str(each.get("payload"))) for each in bench.events(sub)]
+    expect("payload", payloads[:5], [b'{"a":1}', b'{"b":22}', b"[]", b'{"a":1}', b"1"])
+    expect("payload", payloads[260], b'{"n":255}')
+
+
+@rule("reads-alone", lazy("A subscriber reads messages that are sent under its hello."), "notices")
+def reads_alone(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    for form in ("alone", "parts", "alone"):
+        publisher.send(b'{"a":1}', form)
+    _told(bench, sub, 3)
+
+
+@rule(
+    "latched-once",
+    lazy("A latched message is delivered, but not again when its seq was heard."),
+    "notices",
+    "latched",
+)
+def latched_once(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    publisher.send(b'{"a":1}', "alone", flags=LATCHED)
+    publisher.send(b'{"a":1}', "alone", seq=1, flags=LATCHED)
+    publisher.send(b'{"a":2}', flags=LATCHED)
+    publisher.send(b'{"a":2}', "alone", seq=2, flags=LATCHED)
+    _told(bench, sub, 2)
+
+
+@rule(
+    "other-topics",
+    lazy("A subscriber compares the whole topic: what only begins like it is not for it."),
+    "messages",
+)
+def other_topics(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    name = publisher.topic
+    publisher.topic = f"{name}2"
+    publisher.send(b'{"a":1}', seq=1)
+    publisher.topic = name
+    publisher.send(b'{"a":1}', seq=1)
+    _told(bench, sub, 1)
+
+
+@rule(
+    "read",
+    lazy(
+        "A subscriber answers each echo but the first with what it has read, by a filter that it takes back."
+    ),
+    "what-is-under-way",
+    "hello2",
+)
+def read(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    publisher, sub = bench.heard_publisher(topic)
+    before = [parse_read(each.what) for each in publisher.filters]
+    if any(each is not None for each in before):
+        raise broken(_("it answered the first echo"))
+    publisher.send(b'{"a":1}')
+    publisher.send(b'{"a":1}')
+    publisher.echo(next(iter(publisher.hellos)))
+    bench.need(lambda: any(parse_read(each.what) for each in publisher.filters), "read")
+    _told(bench, sub, 2)
+    answers = [each for each in publisher.filters if parse_read(each.what) is not None]
+    found = parse_read(answers[0].what)
+    expect("read.subscriber", found and found.subscriber, bench.record("subscriber", topic)["id"])
+    expect("read.publisher", found and found.publisher, publisher.id)
+    expect("read.seq", found and found.seq, 2)
+    bench.need(
+        lambda: any(not each.is_added and parse_read(each.what) for each in publisher.filters),
+        "read taken back",
+    )
+
+
+@rule(
+    "receives-in-order",
+    lazy("A subscriber gets the messages of a publisher in their order, each once."),
+    "messages",
+)
+def receives_in_order(bench: Bench) -> None:
+    """See the rule."""
+    publisher, sub = bench.heard_publisher(bench.new_topic())
+    for number in range(500):
+        publisher.send(b'{"n":%d}' % number)
+    bench.need(lambda: len(bench.events(sub)) >= 500, "message")
+    seqs = [each.get("seq") for each in bench.events(sub)]
+    if seqs != [str(number) for number in range(1, 501)]:
+        raise broken(_("the seqs are {seen}").format(seen=shown(seqs)))

@@ -1,0 +1,154 @@
+"""Rules about what a client tells the master of itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from nep.i18n import _, lazy
+from nep.messages.codecs import codec_for
+from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.protocol.requests import COUNT_MAX, id_from, node_id_from
+
+_NODE_ID = re.compile(r"[0-9a-f]{16}")
+_ENDPOINT = re.compile(r"tcp://(.+):(\d+)")
+_ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
+
+
+def _text(what: str, record: Mapping[str, Any], name: str) -> str:
+    value = record.get(name)
+    if not isinstance(value, str):
+        raise broken(
+            _("{what} is {seen}; {wanted} is expected").format(
+                what=f"{what}.{name}", seen=shown(value), wanted="text"
+            )
+        )
+    return value
+
+
+def _integer(what: str, value: object, least: int, most: int) -> int:
+    if type(value) is not int or not least <= value <= most:
+        raise broken(
+            _("{what} is {seen}; an integer from {least} to {most} is expected").format(
+                what=what, seen=shown(value), least=least, most=most
+            )
+        )
+    return value
+
+
+@rule(
+    "node-record",
+    lazy("The record of a node has its id, name, host, process, language and generation."),
+    "node",
+)
+def node_record(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.new_sub(topic)
+    bench.record("subscriber", topic)
+    node = bench.requests("subscriber+")[-1].what.get("node")
+    if not isinstance(node, dict):
+        expect("node", node, {})
+        return
+    if not _NODE_ID.fullmatch(_text("node", node, "id")):
+        raise broken(
+            _("node.id is {seen}; 16 small hexadecimal digits are expected").format(seen=shown(node["id"]))
+        )
+    expect("node.name", node.get("name"), bench.node_name)
+    _text("node", node, "host")
+    if node.get("pid") is not None:
+        _integer("node.pid", node["pid"], 0, 2**32 - 1)
+    expect("node.language", node.get("language", "Python"), bench.features.get("language"))
+    expect("node.generation", node.get("generation", "native"), "native")
+
+
+@rule(
+    "node-key",
+    lazy("Ids come from the node's key and numbers, by SHA-256."),
+    "who-speaks-for-a-node",
+    "keys",
+)
+def node_key(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.new_pub(topic)
+    record = bench.record("publisher", topic)
+    node = bench.requests("publisher+")[-1].what["node"]
+    key = _text("node", node, "key")
+    expect("node.id", node.get("id"), node_id_from(key))
+    number = _integer("publisher.number", record.get("number"), 1, COUNT_MAX)
+    expect("publisher.id", record.get("id"), id_from(key, number))
+    bench.new_sub(topic)
+    subscriber = bench.record("subscriber", topic)
+    other = _integer("subscriber.number", subscriber.get("number"), 1, COUNT_MAX)
+    expect("subscriber.id", subscriber.get("id"), id_from(key, other))
+    if other == number:
+        raise broken(_("publisher and subscriber have the same number {number}").format(number=number))
+
+
+@rule(
+    "publisher-record",
+    lazy("The record of a publisher has its id, topic, type, the codec's name and an endpoint."),
+    "publisher",
+)
+def publisher_record(bench: Bench) -> None:
+    """See the rule."""
+    for msg_type in ("json", "string", "bytes", "msgpack"):
+        topic = bench.new_topic()
+        bench.new_pub(topic, msg_type)
+        record = bench.record("publisher", topic)
+        _integer("publisher.id", record.get("id"), 1, COUNT_MAX)
+        expect("publisher.msg_type", record.get("msg_type"), msg_type)
+        expect("publisher.codec", record.get("codec"), codec_for(msg_type).name)
+        endpoints = record.get("endpoints")
+        if not isinstance(endpoints, list) or not endpoints:
+            expect("publisher.endpoints", endpoints, ["tcp://HOST:PORT"])
+        expect("publisher.latched", record.get("latched", False), False)
+
+
+@rule(
+    "publisher-port",
+    lazy("A publisher's port is none of those that belong to the original NEP."),
+    "who-connects",
+)
+def publisher_port(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.new_pub(topic)
+    for endpoint in bench.record("publisher", topic).get("endpoints", ()):
+        found = _ENDPOINT.fullmatch(str(endpoint))
+        if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
+            raise broken(_("its endpoint is {endpoint}").format(endpoint=shown(endpoint)))
+
+
+@rule(
+    "subscriber-record",
+    lazy("The record of a subscriber has its id, topic and type."),
+    "subscriber",
+)
+def subscriber_record(bench: Bench) -> None:
+    """See the rule."""
+    topic = bench.new_topic()
+    bench.new_sub(topic, "string")
+    record = bench.record("subscriber", topic)
+    _integer("subscriber.id", record.get("id"), 1, COUNT_MAX)
+    expect("subscriber.msg_type", record.get("msg_type"), "string")
+    expect("subscriber.pattern", record.get("pattern", False), False)
+
+
+@rule(
+    "request-form",
+    lazy("A request is one part: a map with 'do', 'call' and 'what'; each has another call number."),
+    "the-master",
+)
+def request_form(bench: Bench) -> None:
+    """See the rule."""
+    bench.new_pub(bench.new_topic())
+    calls: dict[tuple[str, int], object] = {}
+    for each in bench.master.heard:
+        if each.problem:
+            raise broken(_("a request came with {problem}").format(problem=each.problem))
+        if calls.setdefault((each.sender, each.call), (each.do, each.what)) != (each.do, each.what):
+            raise broken(_("two requests have the call number {call}").format(call=each.call))

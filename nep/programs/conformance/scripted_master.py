@@ -1,0 +1,167 @@
+"""A master at the level of the wire: it hears every request, and can answer what no real master would.
+
+What it knows and answers is the real master's (`nep.masters.graph.Graph`), without its clock: nobody is
+unlisted because it is silent, so that a rule decides when that happens. It is pumped by whoever judges, in one
+thread.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgpack  # type: ignore[import-untyped]
+import zmq
+
+from nep.errors import WireError
+from nep.masters.graph import Graph, Outgoing
+from nep.protocol.encoding import AnswerEncoder, decode_request
+from nep.protocol.requests import Refused, Request
+
+__all__ = ["Heard", "ScriptedMaster"]
+
+PEER = "peer"
+"""The connection of all that the tester itself registers."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A request as it came. `problem` says what is wrong with its form, in words of the wire."""
+
+    at: float
+    sender: str
+    do: str = ""
+    call: int = 0
+    what: dict[str, Any] = field(default_factory=dict)
+    problem: str = ""
+
+
+Change = Callable[[Heard, dict[str, Any]], "dict[str, Any] | None"]
+"""Changes a reply, as a map, before it is sent; None: it is not sent at all."""
+
+
+class ScriptedMaster:
+    """Serve 127.0.0.1 on a free port."""
+
+    def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
+        self._context = context
+        self._on_push = on_push
+        self._encoder = AnswerEncoder()
+        self.heard: list[Heard] = []
+        self.change: Change = lambda _heard, reply: reply
+        self.port = 0
+        self._socket: zmq.Socket[bytes] | None = None
+        self.start()
+
+    @property
+    def address(self) -> str:
+        """Where it is."""
+        return f"127.0.0.1:{self.port}"
+
+    @property
+    def sockets(self) -> list[zmq.Socket[bytes]]:
+        """What it waits for."""
+        return [] if self._socket is None else [self._socket]
+
+    def start(self) -> None:
+        """Bind, with a new epoch and nobody registered; on the port that it had before."""
+        self.graph = Graph(secrets.randbits(62) | 1, 0.0, learn_s=0.0)
+        self._socket = self._context.socket(zmq.ROUTER)
+        self._socket.linger = 0
+        self._socket.router_mandatory = 1
+        if self.port:
+            self._socket.bind(f"tcp://127.0.0.1:{self.port}")
+        else:
+            self.port = self._socket.bind_to_random_port("tcp://127.0.0.1")
+
+    def stop(self) -> None:
+        """Close its socket: there is no master."""
+        if self._socket is not None:
+            self._socket.close(0)
+            self._socket = None
+
+    def pump(self) -> None:
+        """Answer what has come."""
+        while self._socket is not None and self._socket.poll(0):
+            sender, *parts = self._socket.recv_multipart()
+            self._serve(sender.decode("utf-8", "surrogateescape"), parts)
+
+    def submit(self, request: Request) -> None:
+        """Carry out a request of the tester itself. Raises `WireError` when it is refused."""
+        for each in self.graph.apply(request, 1, 0.0, PEER):
+            if isinstance(each.answer, Refused):
+                raise WireError(each.answer.reason)
+            if each.call is None:
+                self._push(each)
+
+    def drop(self, node_id: str) -> None:
+        """Unlist a node, as when its lease has lapsed."""
+        for each in self.graph.drop([node_id]):
+            self._push(each)
+
+    def push(self, node_id: str, body: bytes) -> None:
+        """Send any body to the adapter's node."""
+        member = self.graph.members.get(node_id)
+        if member is not None and member.route != PEER:
+            self._send(member.route, body)
+
+    def _serve(self, sender: str, parts: list[bytes]) -> None:
+        body = parts[-1]
+        heard = _read(sender, parts)
+        self.heard.append(heard)
+        received = decode_request(body)
+        if isinstance(received.request, WireError):
+            epoch, revision = self.graph.epoch, self.graph.revision
+            error = received.request
+            self._reply(
+                heard, Outgoing(sender, Refused(epoch, revision, error.reason, error.code), heard.call)
+            )
+            return
+        for each in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
+            if each.call is None:
+                self._push(each)
+            else:
+                self._reply(heard, each)
+
+    def _reply(self, heard: Heard, each: Outgoing) -> None:
+        encoded = self._encoder.encode(each.answer, each.call or 0)
+        reply = self.change(heard, msgpack.unpackb(encoded, strict_map_key=False))
+        if reply is not None:
+            self._send(each.to, msgpack.packb(reply))
+
+    def _push(self, each: Outgoing) -> None:
+        member = self.graph.members.get(each.to)
+        if member is None:
+            return
+        if member.route == PEER:
+            self._on_push(each)
+        else:
+            self._send(member.route, self._encoder.encode(each.answer))
+
+    def _send(self, route: str, body: bytes) -> None:
+        if self._socket is None:
+            return
+        with suppress(zmq.ZMQError):  # its connection has ended
+            self._socket.send_multipart([route.encode("utf-8", "surrogateescape"), body])
+
+
+def _read(sender: str, parts: list[bytes]) -> Heard:
+    now = time.monotonic()
+    if len(parts) != 1:
+        return Heard(now, sender, problem=f"{len(parts)} parts")
+    try:
+        body = msgpack.unpackb(parts[0], strict_map_key=False)
+    except ValueError:
+        return Heard(now, sender, problem="no msgpack")
+    if not isinstance(body, dict):
+        return Heard(now, sender, problem="no map")
+    do, call, what = body.get("do"), body.get("call"), body.get("what", {})
+    if not isinstance(do, str) or not isinstance(what, dict):
+        return Heard(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
+    if type(call) is not int or call < 1:
+        return Heard(now, sender, do, 0, what, f"call: {call!r}")
+    return Heard(now, sender, do, call, what)
