@@ -16,7 +16,7 @@ from typing import IO, Any, Protocol
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.programs.conformance.rule import shown
+from nep.programs.conformance.verdict import shown
 
 __all__ = ["Adapter", "AdapterError", "AdapterProcess", "Lines"]
 

@@ -13,8 +13,8 @@ from nep.i18n import _
 from nep.masters.graph import Outgoing
 from nep.programs.conformance.adapter import Adapter, AdapterError, Lines
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
-from nep.programs.conformance.rule import broken
 from nep.programs.conformance.scripted_master import Heard, ScriptedMaster
+from nep.programs.conformance.verdict import broken
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
 
 __all__ = ["Bench", "Start"]

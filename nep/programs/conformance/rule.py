@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from nep.errors import NepError
-from nep.i18n import _
+from nep.programs.conformance.bench import Bench
 
-if TYPE_CHECKING:
-    from nep.programs.conformance.bench import Bench
+__all__ = ["RULES", "Rule", "rule"]
 
-__all__ = ["RULES", "BrokenRuleError", "Rule", "broken", "expect", "rule"]
-
-Judge = Callable[["Bench"], None]
-_MAX_SHOWN = 200
-
-
-class BrokenRuleError(NepError):
-    """The client broke a rule; the sentence says what was seen."""
+Judge = Callable[[Bench], None]
 
 
 @dataclass(frozen=True)
@@ -52,24 +42,3 @@ def rule(
         return judge
 
     return register
-
-
-def broken(sentence: str) -> BrokenRuleError:
-    """Return the error for something that is said in a whole sentence."""
-    return BrokenRuleError(sentence)
-
-
-def expect(what: str, seen: object, wanted: object) -> None:
-    """Raise `BrokenRuleError` unless what was seen is what is wanted. `what` is a name on the wire."""
-    if seen != wanted or type(seen) is not type(wanted):
-        raise BrokenRuleError(
-            _("{what} is {seen}; {wanted} is expected").format(
-                what=what, seen=shown(seen), wanted=shown(wanted)
-            )
-        )
-
-
-def shown(value: object) -> str:
-    """Return a value as a sentence may have it."""
-    text = ascii(value)
-    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…"

@@ -1,8 +1,7 @@
 """A master at the level of the wire: it hears every request, and can answer what no real master would.
 
 What it knows and answers is the real master's (`nep.masters.graph.Graph`), without its clock: nobody is
-unlisted because it is silent, so that a rule decides when that happens. It is pumped by whoever judges, in one
-thread.
+unlisted because it is silent, so that a rule decides when that happens. `pump` does its work.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ from __future__ import annotations
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
-from nep.programs.conformance.rule import broken, expect, rule
+from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import heard
+from nep.programs.conformance.verdict import broken, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
 

@@ -8,7 +8,8 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.adapter import AdapterError
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
-from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.wire import LATCHED, hello_part, topic_part
 
 _SECTION = "the-handshake"

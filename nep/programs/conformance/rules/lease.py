@@ -8,9 +8,10 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
-from nep.programs.conformance.rule import broken, expect, rule
+from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import heard, messages_of
 from nep.programs.conformance.scripted_master import Heard
+from nep.programs.conformance.verdict import broken, expect
 
 _SECTION = "leases-and-a-master-that-starts-again"
 

@@ -10,8 +10,9 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.malformed import malformed_parts
 from nep.programs.conformance.peers import ScriptedPublisher
-from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import heard, messages_of
+from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.wire import Header, topic_part
 
 _DEEP = 100_000

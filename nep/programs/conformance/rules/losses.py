@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from nep.i18n import lazy
 from nep.programs.conformance.bench import Bench
-from nep.programs.conformance.rule import expect, rule
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import expect
 
 _SECTION = "notices"
 

@@ -14,7 +14,8 @@ from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedSubscriber
-from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.batch import read_parts
 from nep.protocol.wire import BATCH, Parts, topic_part, unpack_at
 

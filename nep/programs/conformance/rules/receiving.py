@@ -9,7 +9,8 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
-from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.wire import LATCHED, parse_read
 
 _SENT: Mapping[str, tuple[bytes, object]] = {

@@ -9,7 +9,8 @@ from typing import Any
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
-from nep.programs.conformance.rule import broken, expect, rule, shown
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.requests import COUNT_MAX, id_from, node_id_from
 
 _NODE_ID = re.compile(r"[0-9a-f]{16}")
