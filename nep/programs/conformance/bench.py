@@ -40,7 +40,11 @@ class Bench:
         self._connecting: list[tuple[float, ScriptedSubscriber, str]] = []
         self._made: list[tuple[str, Mapping[str, Any]]] = []
         self._numbers = itertools.count(1)
-        self.adapter = Adapter(start(self.master.address))
+        try:
+            self.adapter = Adapter(start(self.master.address))
+        except BaseException:
+            self._release()
+            raise
         try:
             self.features = self.ask("features")
             self.node_name = "conformance"
@@ -264,7 +268,10 @@ class Bench:
         try:
             self.adapter.end()
         finally:
-            for peer in self._peers():
-                peer.socket.close(0)
-            self.master.stop()
-            self._context.term()
+            self._release()
+
+    def _release(self) -> None:
+        for peer in self._peers():
+            peer.socket.close(0)
+        self.master.stop()
+        self._context.term()

@@ -13,8 +13,8 @@ from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.wire import LATCHED, hello_part, topic_part
 
 _SECTION = "the-handshake"
-_MOST_WAIT_S = 5.0
-"""A tenth of it is allowed; a busy computer may take the rest."""
+_MOST_WAIT_S = 3.0
+"""A sixth of it is allowed; a busy computer may take the rest."""
 
 
 def level_of(bench: Bench) -> int:

@@ -147,6 +147,8 @@ def subscriber_record(bench: Bench) -> None:
 def request_form(bench: Bench) -> None:
     """See the rule."""
     bench.new_pub(bench.new_topic())
+    bench.new_sub(bench.new_topic())
+    bench.close_sub(bench.new_sub(bench.new_topic()))
     calls: dict[tuple[str, int], object] = {}
     for each in bench.master.heard:
         if each.problem:
