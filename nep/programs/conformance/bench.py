@@ -166,6 +166,11 @@ class Bench:
         """Return the requests of this name so far."""
         return [each for each in self.master.heard if each.do == do]
 
+    def request(self, do: str, field: str, id: object) -> Heard:
+        """Wait for the request of this name with this id in a field, and return it."""
+        self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
+        return next(each for each in self.requests(do) if each.what.get(field) == id)
+
     def record(self, kind: str, topic: str) -> Mapping[str, Any]:
         """Return the newest record of the adapter's publisher or subscriber of a topic."""
         for each in reversed(self.requests(f"{kind}+")):

@@ -14,7 +14,17 @@ from nep.programs.conformance.rule import RULES, Rule
 
 __all__ = ["Outcome", "check", "chosen_rules"]
 
-_MODULES = ("registration", "handshake", "messages", "receiving", "losses", "closing", "lease", "limits")
+_MODULES = (
+    "registration",
+    "handshake",
+    "messages",
+    "receiving",
+    "connections",
+    "losses",
+    "closing",
+    "lease",
+    "limits",
+)
 """The order in which rules are judged: what a later one is about needs what the earlier ones ask for."""
 Status = Literal["passed", "failed", "skipped"]
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import zmq
 
 from nep.errors import WireError
 from nep.messages.codecs import codec_for
+from nep.programs.conformance.ports import bind_again
 from nep.protocol.batch import BATCH_FORM, batch_part, read_parts
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import (
@@ -59,9 +60,8 @@ class ScriptedPublisher:
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
         self.topic, self.echoes = topic, echoes
-        self.socket = context.socket(zmq.XPUB)
-        self.socket.linger, self.socket.sndhwm = 0, 0
-        self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        self._context = context
+        self.socket = self._new_socket()
         port = self.socket.bind_to_random_port("tcp://127.0.0.1")
         self.codec = codec_for(msg_type)
         self.node = new_node("tester_publisher")
@@ -78,6 +78,29 @@ class ScriptedPublisher:
     def id(self) -> int:
         """Its id."""
         return self.record.id
+
+    def _new_socket(self) -> zmq.Socket[bytes]:
+        socket: zmq.Socket[bytes] = self._context.socket(zmq.XPUB)
+        socket.linger, socket.sndhwm = 0, 0
+        socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        return socket
+
+    def bind_again(self) -> None:
+        """End all connections, and wait for them on the same port."""
+        endpoint = self.record.endpoints[0]
+        self._replace_socket()
+        bind_again(self.socket, endpoint)
+
+    def bind_elsewhere(self) -> None:
+        """End all connections, and wait for others on another port."""
+        self._replace_socket()
+        port = self.socket.bind_to_random_port("tcp://127.0.0.1")
+        self.record = replace(self.record, endpoints=(f"tcp://127.0.0.1:{port}",))
+
+    def _replace_socket(self) -> None:
+        self.socket.close(0)
+        self.hellos.clear()
+        self.socket = self._new_socket()
 
     def pump(self) -> None:
         """Read filters, and echo hellos."""

@@ -18,8 +18,16 @@ import zmq
 
 from nep.errors import WireError
 from nep.masters.graph import Graph, Outgoing
+from nep.programs.conformance.ports import bind_again
 from nep.protocol.encoding import AnswerEncoder, decode_request
-from nep.protocol.requests import Refused, Request
+from nep.protocol.requests import (
+    NodeRecord,
+    PublisherCame,
+    PublisherRecord,
+    Refused,
+    RemotePublisher,
+    Request,
+)
 
 __all__ = ["Heard", "ScriptedMaster"]
 
@@ -73,7 +81,7 @@ class ScriptedMaster:
         self._socket.linger = 0
         self._socket.router_mandatory = 1
         if self.port:
-            self._socket.bind(f"tcp://127.0.0.1:{self.port}")
+            bind_again(self._socket, f"tcp://127.0.0.1:{self.port}")
         else:
             self.port = self._socket.bind_to_random_port("tcp://127.0.0.1")
 
@@ -101,6 +109,14 @@ class ScriptedMaster:
         """Unlist a node, as when its lease has lapsed."""
         for each in self.graph.drop([node_id]):
             self._push(each)
+
+    def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
+        """Name a publisher to the adapter's node twice more."""
+        came = PublisherCame(
+            self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
+        )
+        for _turn in range(2):
+            self.push(node_id, self._encoder.encode(came))
 
     def push(self, node_id: str, body: bytes) -> None:
         """Send any body to the adapter's node."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgpack  # type: ignore[import-untyped]
+import zmq
 
 from nep.errors import WireError
 from nep.protocol import wire
@@ -460,3 +461,62 @@ class EndsOnUnknownFilters(Client):
             self.pubs = {number: each for number, each in self.pubs.items() if each is not pub}
             return
         super().read_filters(pub)
+
+
+# ---- connections
+
+
+@breaks("connect-once")
+class ConnectsTwice(Client):
+    def connect(self, remotes: Any) -> None:
+        for remote in remotes:
+            for sub in self.subs.values():
+                if remote["publisher"]["id"] in sub.sources and not sub.problem:
+                    sub.problem = "connected twice"
+                    self.deliver_twice = True
+        super().connect(remotes)
+
+    deliver_twice = False
+
+    def deliver(self, sub: Sub, read: wire.Parts) -> None:
+        for _turn in range(1 + self.deliver_twice):
+            super().deliver(sub, read)
+
+
+@breaks("several-publishers")
+class HearsTheFirstOnly(Client):
+    def connect(self, remotes: Any) -> None:
+        super().connect(
+            each
+            for each in remotes
+            if not any(
+                sub.sources for sub in self.subs.values() if sub.record["topic"] == each["publisher"]["topic"]
+            )
+        )
+
+
+@breaks("reconnect")
+class ConnectsOnce(Client):
+    def move(self, sub: Sub, source: Source, endpoint: str) -> None:
+        sub.socket.setsockopt(zmq.RECONNECT_IVL, -1)
+        super().move(sub, source, endpoint)
+
+
+@breaks("endpoint-change")
+class KeepsTheFirstEndpoint(Client):
+    def move(self, sub: Sub, source: Source, endpoint: str) -> None:
+        if not source.endpoint:
+            super().move(sub, source, endpoint)
+
+
+@breaks("unusable-endpoint")
+class EndsOnBadEndpoints(Client):
+    def unusable(self, sub: Sub, endpoint: str) -> None:
+        raise SystemExit(endpoint)
+
+
+@breaks("subscriber-lost")
+class WaitsForTheLost(Client):
+    def do_close_publisher(self, pub: int) -> dict[str, Any]:
+        self.until(lambda: False, 3.5)
+        return super().do_close_publisher(pub)

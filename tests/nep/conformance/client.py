@@ -416,9 +416,21 @@ class Client:
             for sub in self.subs.values():
                 if sub.record["topic"] == record["topic"]:
                     source = sub.sources.setdefault(record["id"], Source(""))
-                    if not source.endpoint:
-                        source.endpoint = record["endpoints"][0]
-                        sub.socket.connect(source.endpoint)
+                    endpoint = next(iter(record.get("endpoints", ())), "")
+                    if not endpoint.startswith("tcp://") or " " in endpoint:
+                        self.unusable(sub, endpoint)
+                    elif source.endpoint != endpoint:
+                        self.move(sub, source, endpoint)
+
+    def unusable(self, sub: Sub, endpoint: str) -> None:
+        sub.problem = f"{endpoint} is no endpoint"
+
+    def move(self, sub: Sub, source: Source, endpoint: str) -> None:
+        if source.endpoint:
+            sub.socket.disconnect(source.endpoint)
+            source.has_echoed = False
+        source.endpoint = endpoint
+        sub.socket.connect(endpoint)
 
     def unlisted(self, what: Mapping[str, Any]) -> None:
         for sub in self.subs.values():

@@ -2,6 +2,7 @@
 
 from nep.programs.conformance.rules import (  # noqa: F401 - importing them registers the rules
     closing,
+    connections,
     handshake,
     lease,
     limits,

@@ -34,11 +34,10 @@ def bye(bench: Bench) -> None:
     bench.need(lambda: bool(subscriber.byes), "bye")
     header = subscriber.byes[0].header
     expect("bye.seq", header.seq, 5)
-    expect("bye.publisher", header.publisher, bench.record("publisher", topic)["id"])
+    id = bench.record("publisher", topic)["id"]
+    expect("bye.publisher", header.publisher, id)
     expect("received", len(subscriber.messages), 5)
-    bench.need(lambda: bool(bench.requests("publisher-")), "publisher-")
-    what = bench.requests("publisher-")[-1].what
-    expect("publisher-.last_seq", what.get("last_seq"), 5)
+    expect("publisher-.last_seq", bench.request("publisher-", "id", id).what.get("last_seq"), 5)
     subscriber.disconnect()
     bench.finish(number, "close_publisher")
 
@@ -120,12 +119,7 @@ def subscriber_closes(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.heard_publisher(topic)
     bench.close_sub(sub)
-    bench.need(lambda: bool(bench.requests("subscriber-")), "subscriber-")
-    expect(
-        "subscriber-.id",
-        bench.requests("subscriber-")[-1].what.get("id"),
-        bench.record("subscriber", topic)["id"],
-    )
+    bench.request("subscriber-", "id", bench.record("subscriber", topic)["id"])
     bench.need(lambda: not _is_connected(publisher), "disconnect")
 
 

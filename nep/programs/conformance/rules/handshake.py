@@ -89,7 +89,7 @@ def echo(bench: Bench) -> None:
 
 @rule(
     "foreign-hello",
-    lazy("A publisher ignores hellos for another topic: they are for whoever had its port before."),
+    lazy("A publisher ignores hellos for another topic: they are meant for the port's previous owner."),
     "who-connects",
 )
 def foreign_hello(bench: Bench) -> None:
@@ -155,9 +155,7 @@ def missing(bench: Bench) -> None:
     bench.connect_delay_s = None
     reply = bench.ask("publisher", topic=topic, type="json")
     expect("publisher.missing", reply.get("missing"), [subscriber.node.name])
-    bench.need(lambda: bool(bench.requests("missing")), "missing")
-    what = bench.requests("missing")[-1].what
-    expect("missing.publisher_id", what.get("publisher_id"), bench.record("publisher", topic)["id"])
+    what = bench.request("missing", "publisher_id", bench.record("publisher", topic)["id"]).what
     expect("missing.subscriber_ids", list(what.get("subscriber_ids", ())), [subscriber.record.id])
     bench.ask("close_publisher", pub=reply.get("pub"))
 

@@ -168,7 +168,7 @@ def renewed_topics(bench: Bench) -> None:
 
 @rule(
     "unknown-answers",
-    lazy("Probes, unknown pushes, unknown fields and answers that are none are ignored."),
+    lazy("Probes, unknown pushes, unknown fields and malformed answers are ignored."),
     "the-master",
 )
 def unknown_answers(bench: Bench) -> None:

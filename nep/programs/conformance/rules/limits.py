@@ -74,7 +74,7 @@ def malformed_named(bench: Bench) -> None:
         expect("subscribers.problem", problem, "a sentence")
 
 
-@rule("deep", lazy("JSON and msgpack of any depth do not end a subscriber."), "messages")
+@rule("deep", lazy("Deeply nested JSON and msgpack do not stop a subscriber."), "messages")
 def deep(bench: Bench) -> None:
     """See the rule."""
     for msg_type, payload, good in (
@@ -88,7 +88,7 @@ def deep(bench: Bench) -> None:
         bench.need(lambda: any(_seq(each) == 3 for each in bench.events(sub)), "message")  # noqa: B023
 
 
-@rule("undecodable", lazy("Payloads that are none of their codec do not end a subscriber."), "messages")
+@rule("undecodable", lazy("Payloads that can't be decoded do not stop a subscriber."), "messages")
 def undecodable(bench: Bench) -> None:
     """See the rule."""
     for msg_type, payload in (("json", b'{"a":'), ("string", b"\xff\xfe"), ("msgpack", b"\xc1")):
@@ -110,7 +110,7 @@ def large(bench: Bench) -> None:
 
 @rule(
     "unknown-filters",
-    lazy("A publisher survives subscriptions that are none, or have more than 4096 bytes."),
+    lazy("Malformed subscriptions, and those of more than 4096 bytes, do not stop a publisher."),
     "bounds",
 )
 def unknown_filters(bench: Bench) -> None:

@@ -95,7 +95,7 @@ def lost_late(bench: Bench) -> None:
 
 @rule(
     "lost-leap",
-    lazy("A gap of more than 2^32 is none: the message is refused, nothing is lost."),
+    lazy("A message whose seq leaps by more than 2^32 is rejected, and nothing counts as lost."),
     _SECTION,
     "losses",
 )

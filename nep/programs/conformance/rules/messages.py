@@ -172,7 +172,7 @@ def payload(bench: Bench) -> None:
 
 @rule(
     "seq-unheard",
-    lazy("Seqs also count messages that nobody was there to hear."),
+    lazy("Seqs also count messages that were published without subscribers."),
     "messages",
 )
 def seq_unheard(bench: Bench) -> None:
