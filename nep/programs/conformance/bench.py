@@ -195,6 +195,12 @@ class Bench:
 
     # ---- peers
 
+    def new_socket(self, kind: int) -> zmq.Socket[bytes]:
+        """Return a socket, which the rule closes."""
+        socket: zmq.Socket[bytes] = self._context.socket(kind)
+        socket.linger = 0
+        return socket
+
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:

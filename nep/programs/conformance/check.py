@@ -24,6 +24,7 @@ _MODULES = (
     "closing",
     "lease",
     "limits",
+    "services",
 )
 """The order in which rules are judged: what a later one is about needs what the earlier ones ask for."""
 Status = Literal["passed", "failed", "skipped"]
@@ -44,7 +45,7 @@ class Outcome:
             "status": self.status,
             "requirement": _(self.rule.requirement),
             "seen": self.seen,
-            "section": f"docs/wire.md#{self.rule.section.replace(' ', '-')}",
+            "section": f"docs/{self.rule.place}",
         }
 
 

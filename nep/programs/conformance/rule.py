@@ -16,8 +16,8 @@ Judge = Callable[[Bench], None]
 class Rule:
     """One rule. `requirement` is English: give it to `_` when it is shown.
 
-    `section` is the place in docs/wire.md. `features` are those that an adapter must announce to be judged.
-    `is_last`: the adapter has ended after it.
+    `section` is a heading of docs/wire.md, or another page with one. `features` are those that an adapter
+    must announce to be judged. `is_last`: the adapter has ended after it.
     """
 
     id: str
@@ -26,6 +26,12 @@ class Rule:
     judge: Judge
     features: tuple[str, ...] = ()
     is_last: bool = False
+
+    @property
+    def place(self) -> str:
+        """The page and section that says what it requires."""
+        section = self.section.replace(" ", "-")
+        return section if ".md#" in section else f"wire.md#{section}"
 
 
 RULES: dict[str, Rule] = {}

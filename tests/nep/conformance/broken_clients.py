@@ -11,9 +11,10 @@ import msgpack  # type: ignore[import-untyped]
 import zmq
 
 from nep.errors import WireError
-from nep.protocol import wire
+from nep.protocol import service_wire, wire
 from nep.protocol.batch import batch_part
-from tests.nep.conformance.client import Client, Pub, Source, Sub
+from tests.nep.conformance.client import Client
+from tests.nep.conformance.client_state import Pub, Source, Sub
 
 BROKEN: dict[str, type[Client]] = {}
 
@@ -520,3 +521,44 @@ class WaitsForTheLost(Client):
     def do_close_publisher(self, pub: int) -> dict[str, Any]:
         self.until(lambda: False, 3.5)
         return super().do_close_publisher(pub)
+
+
+# ---- services and patterns
+
+
+@breaks("service-record")
+class ServiceOfAnotherType(Client):
+    def service_type(self) -> str:
+        return "json"
+
+
+@breaks("service-answer")
+class AnswersAsRefused(Client):
+    def answer(self, call: service_wire.CallHeader) -> service_wire.Reply:
+        return super().answer(call)._replace(kind=service_wire.CallKind.REFUSED)
+
+
+@breaks("service-malformed")
+class EndsOnMalformedCalls(Client):
+    def refuse_call(self, error: WireError) -> None:
+        raise SystemExit(error)
+
+
+@breaks("service-call")
+class CallsForEver(Client):
+    def timeout(self, timeout_s: float) -> float:
+        return 1000.0
+
+
+@breaks("service-error")
+class TakesErrorsForAnswers(Client):
+    def result(self, reply: service_wire.Reply) -> dict[str, Any]:
+        return {"value": json.loads(bytes(reply.data))}
+
+
+@breaks("pattern")
+class FiltersByItsPattern(Client):
+    def do_subscriber(
+        self, topic: str, msg_type: str, latest: bool = False, pattern: bool = False
+    ) -> dict[str, Any]:
+        return super().do_subscriber(topic, msg_type, latest)

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import base64
 import json
-import queue
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
@@ -22,87 +20,18 @@ import zmq
 
 from nep.errors import WireError
 from nep.messages.codecs import codec_for, codec_numbered
-from nep.protocol import wire
+from nep.protocol import topic_pattern, wire
 from nep.protocol.batch import read_parts
+from tests.nep.conformance.client_services import Services
+from tests.nep.conformance.client_state import Pub, Source, Stream, Sub
 
 SCALE = 0.2
 BOUND_S = 0.5
 GAP_MAX = 2**32
 
 
-class Stream:
-    """Lines between two threads."""
-
-    def __init__(self) -> None:
-        self._lines: queue.Queue[bytes] = queue.Queue()
-
-    def write(self, line: bytes) -> None:
-        self._lines.put(line)
-
-    def flush(self) -> None:
-        pass
-
-    def readline(self, _limit: int = -1) -> bytes:
-        return self._lines.get()
-
-    def read_now(self) -> bytes | None:
-        try:
-            return self._lines.get_nowait()
-        except queue.Empty:
-            return None
-
-    def close(self) -> None:
-        self._lines.put(b"")
-
-
-@dataclass
-class Pub:
-    record: dict[str, Any]
-    socket: zmq.Socket[bytes]
-    codec: int
-    kept: deque[tuple[bytes, bytes]]
-    seq: int = 0
-    bytes_sent: int = 0
-    others: int = 0
-    hellos: dict[int, tuple[bytes, wire.Hello]] = field(default_factory=dict)
-
-    @property
-    def id(self) -> int:
-        return int(self.record["id"])
-
-    @property
-    def topic(self) -> bytes:
-        return wire.topic_part(self.record["topic"])
-
-
-@dataclass
-class Source:
-    endpoint: str
-    last: int | None = None
-    has_echoed: bool = False
-    promised: int = 0
-    late: range = range(0)
-    ends_at: float | None = None
-
-
-@dataclass
-class Sub:
-    number: int
-    record: dict[str, Any]
-    socket: zmq.Socket[bytes]
-    hello: bytes
-    sources: dict[int, Source] = field(default_factory=dict)
-    received: int = 0
-    lost: int = 0
-    problem: str = ""
-
-    @property
-    def id(self) -> int:
-        return int(self.record["id"])
-
-
-class Client:
-    """See the module. `lines` is the other end of its streams."""
+class Client(Services):
+    """See the module."""
 
     def __init__(self, master: str) -> None:
         self.reads, self.writes = Stream(), Stream()
@@ -116,6 +45,8 @@ class Client:
         self.node: dict[str, Any] = {}
         self.pubs: dict[int, Pub] = {}
         self.subs: dict[int, Sub] = {}
+        self.servers = []
+        self.counted = []
         self.replies: dict[int, dict[str, Any]] = {}
         self.epoch = self.revision = self.calls = self.numbers = 0
         self.renew_at = 0.0
@@ -164,7 +95,18 @@ class Client:
     # ---- what it is told to do
 
     def do_features(self) -> dict[str, Any]:
-        features = ["hello1", "hello2", "hello3", "losses", "latched", "history", "statistics", "keys"]
+        features = [
+            "patterns",
+            "services",
+            "hello1",
+            "hello2",
+            "hello3",
+            "losses",
+            "latched",
+            "history",
+            "statistics",
+            "keys",
+        ]
         return {"language": "Python", "version": "0", "features": features}
 
     def do_node(self, name: str) -> dict[str, Any]:
@@ -268,7 +210,8 @@ class Client:
         socket.sndhwm = socket.rcvhwm = 0
         record = self.subscriber_record(topic, msg_type)
         hello = self.hello(record["id"], topic)
-        for each in self.filters(topic, hello):
+        record |= {"pattern": True} if pattern else {}
+        for each in [] if pattern else self.filters(topic, hello):
             socket.subscribe(each)
         sub = Sub(len(self.subs) + 1, record, socket, hello)
         self.subs[sub.number] = sub
@@ -349,7 +292,7 @@ class Client:
             node_id=self.node["id"],
             epoch=self.epoch,
             revision=self.revision,
-            publishers=[self.publisher_counts(each) for each in self.pubs.values()],
+            publishers=[self.publisher_counts(each) for each in (*self.pubs.values(), *self.counted)],
             subscribers=[self.subscriber_counts(each) for each in self.subs.values()],
         )
 
@@ -362,7 +305,7 @@ class Client:
     def join(self) -> None:
         if time.monotonic() >= self.join_at:
             self.join_at = time.monotonic() + 0.1
-            publishers = [each.record for each in self.pubs.values()]
+            publishers = [each.record for each in (*self.pubs.values(), *self.counted)]
             subscribers = [each.record for each in self.subs.values()]
             self.tell(
                 "join", node=self.node, epoch=self.epoch, publishers=publishers, subscribers=subscribers
@@ -414,13 +357,24 @@ class Client:
         for remote in remotes:
             record = remote["publisher"]
             for sub in self.subs.values():
-                if sub.record["topic"] == record["topic"]:
+                if self.hears(sub, record["topic"]):
                     source = sub.sources.setdefault(record["id"], Source(""))
                     endpoint = next(iter(record.get("endpoints", ())), "")
                     if not endpoint.startswith("tcp://") or " " in endpoint:
                         self.unusable(sub, endpoint)
                     elif source.endpoint != endpoint:
                         self.move(sub, source, endpoint)
+
+    def hears(self, sub: Sub, topic: str) -> bool:
+        if not sub.record.get("pattern"):
+            return bool(sub.record["topic"] == topic)
+        if not topic_pattern.matches(sub.record["topic"], topic):
+            return False
+        if topic not in sub.topics:
+            sub.topics.append(topic)
+            for each in self.filters(topic, self.hello(sub.id, topic)):
+                sub.socket.subscribe(each)
+        return True
 
     def unusable(self, sub: Sub, endpoint: str) -> None:
         sub.problem = f"{endpoint} is no endpoint"
@@ -472,6 +426,9 @@ class Client:
     # ---- subscribers
 
     def read(self, sub: Sub, parts: list[bytes]) -> None:
+        if parts[0] != sub.hello and parts[0].startswith(b"\xffhello"):  # for one of several topics
+            sub.sources[wire.read_header(parts[1]).publisher].has_echoed = True
+            return
         if parts[0] == sub.hello and len(parts) == 2:
             self.notice(sub, wire.read_header(parts[1]))
             return
@@ -486,7 +443,7 @@ class Client:
         return read_parts(parts)
 
     def is_its_topic(self, sub: Sub, topic: str) -> bool:
-        return topic == sub.record["topic"]
+        return topic == sub.record["topic"] or topic in sub.topics
 
     def message(self, sub: Sub, read: wire.Parts, *, is_alone: bool) -> None:
         header = read.header
@@ -596,22 +553,32 @@ class Client:
         if self.epoch and now >= self.renew_at:
             self.renew()
         poller = zmq.Poller()
-        for socket in (self.master, *(each.socket for each in (*self.pubs.values(), *self.subs.values()))):
+        for socket in (
+            self.master,
+            *self.servers,
+            *(each.socket for each in (*self.pubs.values(), *self.subs.values())),
+        ):
             poller.register(socket, zmq.POLLIN)
         poller.poll(2)
         while self.master.poll(0):
             self.follow(self.master.recv())
+        for server in self.servers:
+            while server.poll(0):
+                self.serve(server)
         for pub in list(self.pubs.values()):
             self.read_filters(pub)
         for sub in list(self.subs.values()):
-            while sub.socket.poll(0):
-                try:
-                    self.read(sub, sub.socket.recv_multipart())
-                except WireError as error:
-                    self.refuse(sub, error)
-            for each, source in list(sub.sources.items()):
-                if source.ends_at is not None and now >= source.ends_at:
-                    self.leave_source(sub, each)
+            self.read_all(sub, now)
+
+    def read_all(self, sub: Sub, now: float) -> None:
+        while sub.socket.poll(0):
+            try:
+                self.read(sub, sub.socket.recv_multipart())
+            except WireError as error:
+                self.refuse(sub, error)
+        for each, source in list(sub.sources.items()):
+            if source.ends_at is not None and now >= source.ends_at:
+                self.leave_source(sub, each)
 
     def until(self, is_met: Callable[[], bool], timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s

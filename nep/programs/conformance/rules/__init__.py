@@ -10,4 +10,5 @@ from nep.programs.conformance.rules import (  # noqa: F401 - importing them regi
     messages,
     receiving,
     registration,
+    services,
 )

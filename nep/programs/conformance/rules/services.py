@@ -1,0 +1,193 @@
+"""Rules about services and topics with wildcards: docs/services.md has the wire of services."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import zmq
+
+from nep.i18n import _, lazy
+from nep.programs.conformance.adapter import AdapterError
+from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.peers import new_node
+from nep.programs.conformance.rule import rule
+from nep.programs.conformance.verdict import broken, expect, shown
+from nep.protocol.requests import AddPublisher, Leave, PublisherRecord
+from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, failure, topic_of
+from nep.protocol.wire import topic_part
+
+_SECTION = "services.md#calls-and-answers"
+_JSON, _CALL_S = 1, 5.0
+
+
+@contextmanager
+def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
+    socket = bench.new_socket(kind)
+    try:
+        yield socket
+    finally:
+        socket.close(0)
+
+
+def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
+    """Wait for the answers to these calls; whatever has come by then."""
+    found: dict[int | None, Reply] = {}
+
+    def have_come() -> bool:
+        while socket.poll(0):
+            read = NATIVE.read_answer(socket.recv_multipart())
+            found[read.number] = read.reply
+        return wanted <= found.keys()
+
+    bench.need(have_come, "answer")
+    return found
+
+
+@rule(
+    "service-record",
+    lazy("A server is registered as a publisher of 'nep.service:NAME', type and codec 'service'."),
+    "services.md#who-meets",
+    "services",
+)
+def service_record(bench: Bench) -> None:
+    """See the rule."""
+    name = bench.new_topic()
+    bench.ask("serve", service=name)
+    record = bench.record("publisher", topic_of(name))
+    expect("publisher.msg_type", record.get("msg_type"), SERVICE_TYPE)
+    expect("publisher.codec", record.get("codec"), SERVICE_TYPE)
+
+
+@rule(
+    "service-answer",
+    lazy("A server answers each call with its number, in the codec of the call."),
+    _SECTION,
+    "services",
+)
+def service_answer(bench: Bench) -> None:
+    """See the rule."""
+    name = bench.new_topic()
+    bench.ask("serve", service=name)
+    with _socket(bench, zmq.DEALER) as socket:
+        socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
+        for number in (7, 2**64 - 1):
+            socket.send_multipart(NATIVE.call(number, _JSON, _CALL_S, b'{"a":1}'))
+        for reply in _answers(bench, socket, {7, 2**64 - 1}).values():
+            expect("kind", int(reply.kind), int(CallKind.ANSWER))
+            expect("codec", reply.codec, _JSON)
+            expect("payload", json.loads(bytes(reply.data)), {"a": 1})
+
+
+@rule(
+    "service-malformed",
+    lazy("A server does not answer malformed calls, refuses those it can't decode, and goes on."),
+    _SECTION,
+    "services",
+)
+def service_malformed(bench: Bench) -> None:
+    """See the rule."""
+    name = bench.new_topic()
+    bench.ask("serve", service=name)
+    (head, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
+    with _socket(bench, zmq.DEALER) as socket:
+        socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
+        for parts in ([head], [head[:15], payload], [b"\2" + head[1:], payload], [head, payload, b""]):
+            socket.send_multipart(parts)
+        socket.send_multipart(NATIVE.call(2, _JSON, _CALL_S, b'{"a":'))
+        socket.send_multipart(NATIVE.call(3, _JSON, _CALL_S, b"[]"))
+        found = _answers(bench, socket, {2, 3})
+        expect("answers", sorted(each or 0 for each in found), [2, 3])
+        expect("kind", int(found[2].kind), int(CallKind.REFUSED))
+
+
+@contextmanager
+def _server(bench: Bench, name: str) -> Iterator[zmq.Socket[bytes]]:
+    node = new_node("tester_server")
+    with _socket(bench, zmq.ROUTER) as socket:
+        port = socket.bind_to_random_port("tcp://127.0.0.1")
+        record = PublisherRecord(
+            secrets.randbits(62) | 1,
+            topic_of(name),
+            SERVICE_TYPE,
+            SERVICE_TYPE,
+            (f"tcp://127.0.0.1:{port}",),
+        )
+        bench.master.submit(AddPublisher(node, record))
+        try:
+            yield socket
+        finally:
+            bench.master.submit(Leave(node.id))
+
+
+def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
+    """Answer the call that the adapter has begun, and return what it says of the answer."""
+    bench.need(lambda: bool(socket.poll(0)), "call")
+    sender, *parts = socket.recv_multipart()
+    call = NATIVE.read_call(parts)
+    expect("call.codec", call.codec in {1, 4}, True)
+    if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
+        raise broken(_("the call's timeout is {seen}").format(seen=shown(call.timeout_s)))
+    data = reply.data if reply.kind != CallKind.ANSWER else call.data
+    answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.ANSWER else _JSON)
+    socket.send_multipart([sender, *NATIVE.answer(call.number, answer)])
+    return bench.finish(number, "call").get("value")
+
+
+@rule(
+    "service-call",
+    lazy("A client calls the server that the master names, and gives back its answer."),
+    _SECTION,
+    "services",
+)
+def service_call(bench: Bench) -> None:
+    """See the rule."""
+    name = bench.new_topic()
+    with _server(bench, name) as socket:
+        number = bench.adapter.begin("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
+        value = _called(bench, socket, number, Reply(CallKind.ANSWER, b""))
+        expect("value", value, {"a": [1, None]})
+
+
+@rule(
+    "service-error",
+    lazy("A client tells an error, and a call that was refused, from an answer."),
+    _SECTION,
+    "services",
+)
+def service_error(bench: Bench) -> None:
+    """See the rule."""
+    name = bench.new_topic()
+    with _server(bench, name) as socket:
+        for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REFUSED, "")):
+            number = bench.adapter.begin("call", service=name, value={}, timeout_s=_CALL_S)
+            try:
+                value = _called(bench, socket, number, failure(kind, error, "the tester says no"))
+            except AdapterError:
+                continue
+            raise broken(_("it took it for the answer {seen}").format(seen=shown(value)))
+
+
+@rule(
+    "pattern",
+    lazy("A subscriber with wildcards hears the topics that match, with a hello for each of them."),
+    "the-master",
+    "patterns",
+)
+def pattern(bench: Bench) -> None:
+    """See the rule."""
+    place = bench.new_topic()
+    sub = bench.new_sub(f"{place}/*", pattern=True)
+    expect("subscriber.pattern", bench.record("subscriber", f"{place}/*").get("pattern"), True)
+    publishers = [bench.publisher(f"{place}/{name}") for name in ("one", "two")]
+    for publisher in publishers:
+        bench.need(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called at once
+        if topic_part(publisher.topic) not in [each.what for each in publisher.filters]:
+            raise broken(_("the filter of {topic} did not come").format(topic=publisher.topic))
+        publisher.send(b'{"a":1}')
+    bench.need(lambda: len(bench.events(sub)) >= 2, "message")
+    topics = {each.get("topic") for each in bench.events(sub)}
+    expect("topics", topics, {publisher.topic for publisher in publishers})

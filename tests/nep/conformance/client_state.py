@@ -1,0 +1,85 @@
+"""What the small client of these tests remembers: its streams, publishers and subscribers."""
+
+from __future__ import annotations
+
+import queue
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import zmq
+
+from nep.protocol import wire
+
+
+class Stream:
+    """Lines between two threads."""
+
+    def __init__(self) -> None:
+        self._lines: queue.Queue[bytes] = queue.Queue()
+
+    def write(self, line: bytes) -> None:
+        self._lines.put(line)
+
+    def flush(self) -> None:
+        pass
+
+    def readline(self, _limit: int = -1) -> bytes:
+        return self._lines.get()
+
+    def read_now(self) -> bytes | None:
+        try:
+            return self._lines.get_nowait()
+        except queue.Empty:
+            return None
+
+    def close(self) -> None:
+        self._lines.put(b"")
+
+
+@dataclass
+class Pub:
+    record: dict[str, Any]
+    socket: zmq.Socket[bytes]
+    codec: int
+    kept: deque[tuple[bytes, bytes]]
+    seq: int = 0
+    bytes_sent: int = 0
+    others: int = 0
+    hellos: dict[int, tuple[bytes, wire.Hello]] = field(default_factory=dict)
+
+    @property
+    def id(self) -> int:
+        return int(self.record["id"])
+
+    @property
+    def topic(self) -> bytes:
+        return wire.topic_part(self.record["topic"])
+
+
+@dataclass
+class Source:
+    endpoint: str
+    last: int | None = None
+    has_echoed: bool = False
+    promised: int = 0
+    late: range = range(0)
+    ends_at: float | None = None
+
+
+@dataclass
+class Sub:
+    number: int
+    record: dict[str, Any]
+    socket: zmq.Socket[bytes]
+    hello: bytes
+    sources: dict[int, Source] = field(default_factory=dict)
+    topics: list[str] = field(default_factory=list)
+    """Those that match, of a subscriber with wildcards."""
+    received: int = 0
+    lost: int = 0
+    problem: str = ""
+
+    @property
+    def id(self) -> int:
+        return int(self.record["id"])
