@@ -73,8 +73,7 @@ def three_parts(bench: Bench) -> None:
     bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
     bench.need(lambda: len(subscriber.received) >= count + _BURST, "message")
     for parts in subscriber.raw:
-        if len(parts) != 3:
-            raise broken(_("a message came in {count} part(s)").format(count=len(parts)))
+        expect("parts", len(parts), 3)
         expect("topic", parts[0], topic_part(topic))
     messages_of(subscriber)
     bench.need(lambda: len(messages_of(other)) >= count + _BURST, "message")
