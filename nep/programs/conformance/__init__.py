@@ -5,7 +5,7 @@ master and peers for it.
 """
 
 from nep.programs.conformance import rules as _rules  # noqa: F401 - importing them registers them
-from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterProcess, Lines
+from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterProcess, AdapterStreams
 from nep.programs.conformance.check import Outcome, check, chosen_rules
 from nep.programs.conformance.rule import RULES, Rule
 
@@ -14,7 +14,7 @@ __all__ = [
     "Adapter",
     "AdapterError",
     "AdapterProcess",
-    "Lines",
+    "AdapterStreams",
     "Outcome",
     "Rule",
     "check",

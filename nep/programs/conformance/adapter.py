@@ -16,9 +16,10 @@ from typing import IO, Any, Protocol
 
 from nep.errors import NepError
 from nep.i18n import _
+from nep.masters.process import NO_CONSOLE
 from nep.programs.conformance.verdict import shown
 
-__all__ = ["Adapter", "AdapterError", "AdapterProcess", "Lines"]
+__all__ = ["Adapter", "AdapterError", "AdapterProcess", "AdapterStreams"]
 
 _MAX_LINE_BYTES = 64 * 2**20
 
@@ -27,7 +28,7 @@ class AdapterError(NepError):
     """The adapter does not do what the protocol of adapters asks for."""
 
 
-class Lines(Protocol):
+class AdapterStreams(Protocol):
     """Two streams, and what is behind them."""
 
     reads: IO[bytes]
@@ -50,6 +51,7 @@ class AdapterProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env={**os.environ, "NEP_MASTER": master},
+                creationflags=NO_CONSOLE,
             )
         except OSError as error:
             raise AdapterError(
@@ -81,7 +83,7 @@ class AdapterProcess:
 class Adapter:
     """Requests to the adapter, and what it says. Only the thread that reads its lines is another one."""
 
-    def __init__(self, lines: Lines) -> None:
+    def __init__(self, lines: AdapterStreams) -> None:
         self.lines = lines
         self.events: list[Mapping[str, Any]] = []
         """Messages that its subscribers have received, in the order in which it told of them."""

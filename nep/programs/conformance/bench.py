@@ -11,15 +11,15 @@ import zmq
 
 from nep.i18n import _
 from nep.masters.graph import Outgoing
-from nep.programs.conformance.adapter import Adapter, AdapterError, Lines
+from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStreams
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
-from nep.programs.conformance.scripted_master import Heard, ScriptedMaster
+from nep.programs.conformance.scripted_master import HeardRequest, ScriptedMaster
 from nep.programs.conformance.verdict import broken
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
 
 __all__ = ["Bench", "Start"]
 
-Start = Callable[[str], Lines]
+Start = Callable[[str], AdapterStreams]
 """Starts an adapter that finds the master at this address."""
 _POLL_MS = 2
 _ANSWER_S = 15.0
@@ -162,11 +162,11 @@ class Bench:
 
     # ---- what the master hears
 
-    def requests(self, do: str) -> list[Heard]:
+    def requests(self, do: str) -> list[HeardRequest]:
         """Return the requests of this name so far."""
         return [each for each in self.master.heard if each.do == do]
 
-    def request(self, do: str, field: str, id: object) -> Heard:
+    def request(self, do: str, field: str, id: object) -> HeardRequest:
         """Wait for the request of this name with this id in a field, and return it."""
         self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.what.get(field) == id)
@@ -188,7 +188,7 @@ class Bench:
                 return str(node.get("id"))
         raise broken(_("'{what}' did not come").format(what="node"))
 
-    def renewal(self, after: int, timeout_s: float = 5.0) -> Heard:
+    def renewal(self, after: int, timeout_s: float = 5.0) -> HeardRequest:
         """Wait for a renewal after so many requests, and return it."""
         self.need(lambda: any(each.do == "renew" for each in self.master.heard[after:]), "renew", timeout_s)
         return next(each for each in self.master.heard[after:] if each.do == "renew")

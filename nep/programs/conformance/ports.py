@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import threading
 import time
 from typing import Any
 
@@ -23,4 +24,4 @@ def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
         except zmq.ZMQError as error:
             if error.errno != errno.EADDRINUSE or time.monotonic() >= deadline:
                 raise
-        time.sleep(0.005)
+        threading.Event().wait(0.005)

@@ -29,14 +29,14 @@ from nep.protocol.requests import (
     Request,
 )
 
-__all__ = ["Heard", "ScriptedMaster"]
+__all__ = ["HeardRequest", "ScriptedMaster"]
 
 PEER = "peer"
 """The connection of all that the tester itself registers."""
 
 
 @dataclass(frozen=True)
-class Heard:
+class HeardRequest:
     """A request as it came. `problem` says what is wrong with its form, in words of the wire."""
 
     at: float
@@ -47,7 +47,7 @@ class Heard:
     problem: str = ""
 
 
-Change = Callable[[Heard, dict[str, Any]], "dict[str, Any] | None"]
+Change = Callable[[HeardRequest, dict[str, Any]], "dict[str, Any] | None"]
 """Changes a reply, as a map, before it is sent; None: it is not sent at all."""
 
 
@@ -58,7 +58,7 @@ class ScriptedMaster:
         self._context = context
         self._on_push = on_push
         self._encoder = AnswerEncoder()
-        self.heard: list[Heard] = []
+        self.heard: list[HeardRequest] = []
         self.change: Change = lambda _heard, reply: reply
         self.port = 0
         self._socket: zmq.Socket[bytes] | None = None
@@ -142,7 +142,7 @@ class ScriptedMaster:
             else:
                 self._reply(heard, each)
 
-    def _reply(self, heard: Heard, each: Outgoing) -> None:
+    def _reply(self, heard: HeardRequest, each: Outgoing) -> None:
         encoded = self._encoder.encode(each.answer, each.call or 0)
         reply = self.change(heard, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
@@ -164,19 +164,19 @@ class ScriptedMaster:
             self._socket.send_multipart([route.encode("utf-8", "surrogateescape"), body])
 
 
-def _read(sender: str, parts: list[bytes]) -> Heard:
+def _read(sender: str, parts: list[bytes]) -> HeardRequest:
     now = time.monotonic()
     if len(parts) != 1:
-        return Heard(now, sender, problem=f"{len(parts)} parts")
+        return HeardRequest(now, sender, problem=f"{len(parts)} parts")
     try:
         body = msgpack.unpackb(parts[0], strict_map_key=False)
     except ValueError:
-        return Heard(now, sender, problem="no msgpack")
+        return HeardRequest(now, sender, problem="no msgpack")
     if not isinstance(body, dict):
-        return Heard(now, sender, problem="no map")
+        return HeardRequest(now, sender, problem="no map")
     do, call, what = body.get("do"), body.get("call"), body.get("what", {})
     if not isinstance(do, str) or not isinstance(what, dict):
-        return Heard(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
+        return HeardRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
     if type(call) is not int or call < 1:
-        return Heard(now, sender, do, 0, what, f"call: {call!r}")
-    return Heard(now, sender, do, call, what)
+        return HeardRequest(now, sender, do, 0, what, f"call: {call!r}")
+    return HeardRequest(now, sender, do, call, what)

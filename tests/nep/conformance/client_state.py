@@ -13,7 +13,7 @@ from nep.protocol import wire
 
 
 class Stream:
-    """Lines between two threads."""
+    """AdapterStreams between two threads."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[bytes] = queue.Queue()

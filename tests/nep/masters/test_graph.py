@@ -274,7 +274,7 @@ def test_answers_survive_the_wire(graph: Graph) -> None:
 
 @given(st.binary(max_size=50))
 def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
-    assert isinstance(encoding.decode_request(body).request, str | Ping | Look)
+    assert isinstance(encoding.decode_request(body).request, WireError | Ping | Look)
     with pytest.raises(WireError):
         encoding.decode_answer(body)
 
@@ -294,15 +294,19 @@ def test_any_bytes_are_a_request_or_a_sentence(body: bytes) -> None:
 def test_any_map_is_a_request_or_a_sentence(do: object, what: object) -> None:
     asked = encoding.decode_request(pack({"do": do, "call": 5, "what": what}))
     assert asked.call == 5
-    if isinstance(asked.request, str):
-        assert asked.request
+    if isinstance(asked.request, WireError):
+        assert asked.request.reason
 
 
 def test_a_wrong_field_is_named() -> None:
     body = pack({"do": "renew", "call": 1, "what": {"node_id": "a", "epoch": "x", "revision": 1}})
-    assert encoding.decode_request(body).request == "'Renew.epoch' is a 'str', not 'int'"
+    refused = encoding.decode_request(body).request
+    assert isinstance(refused, WireError)
+    assert (refused.code, refused.reason) == ("field-type", "'Renew.epoch' is a 'str', not 'int'")
     body = pack({"do": "leave", "call": 1, "what": {}})
-    assert encoding.decode_request(body).request == "'Leave.node_id' is missing"
+    missing = encoding.decode_request(body).request
+    assert isinstance(missing, WireError)
+    assert (missing.code, missing.reason) == ("field-missing", "'Leave.node_id' is missing")
 
 
 def test_subscribers_with_wildcards_are_no_topic_and_travel(graph: Graph) -> None:
