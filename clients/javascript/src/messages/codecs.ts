@@ -1,0 +1,125 @@
+/** Codecs: payload ↔ bytes. A codec has a name (in the graph) and a number (on the wire). */
+import { DecodeError, EncodeError } from "../errors.js";
+import { decodeUtf8, type Extension } from "../wire/parts.js";
+import { decodeImage, encodeImage } from "./image.js";
+import { countNonFinite, isTooDeep, MAX_LEVELS } from "./nesting.js";
+import { pack, unpack, withWideIntegers } from "./packing.js";
+
+/** A payload as bytes. */
+export interface Encoded {
+  readonly data: Buffer;
+  readonly extension?: Extension;
+  /** NaN and infinite numbers that became `null`. */
+  readonly nonFinite?: number;
+}
+
+export interface Codec {
+  readonly name: string;
+  readonly number: number;
+  /** @throws {EncodeError} */
+  encode(payload: unknown): Encoded;
+  /** @throws {DecodeError} */
+  decode(data: Buffer, extension: Extension): unknown;
+}
+
+const TOO_DEEP = `lists and maps are nested more than ${MAX_LEVELS} levels deep`;
+const NULL = Buffer.from("null");
+
+const json: Codec = {
+  name: "json",
+  number: 1,
+  encode(payload) {
+    let text: string | undefined;
+    try {
+      text = JSON.stringify(payload);
+    } catch (error) {
+      throw new EncodeError(`The payload has no form in JSON: ${(error as Error).message}`);
+    }
+    if (text === undefined) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
+    if (text.length > 2 * MAX_LEVELS && isTooDeep(payload)) throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
+    const data = Buffer.from(text, "utf8");
+    const nonFinite = data.includes(NULL) ? countNonFinite(payload) : 0;
+    return { data, nonFinite };
+  },
+  decode(data) {
+    let value: unknown;
+    try {
+      value = JSON.parse(data.toString("utf8"));
+    } catch (error) {
+      throw new DecodeError(`${data.length} bytes are no JSON: ${(error as Error).message}`);
+    }
+    if (data.length > 2 * MAX_LEVELS && isTooDeep(value)) throw new DecodeError(`The JSON is refused: ${TOO_DEEP}.`);
+    return value;
+  },
+};
+
+const string: Codec = {
+  name: "string",
+  number: 2,
+  encode(payload) {
+    if (typeof payload !== "string") throw new EncodeError(`A topic of type "string" takes strings, not "${typeof payload}".`);
+    return { data: Buffer.from(payload, "utf8") };
+  },
+  decode(data) {
+    try {
+      return decodeUtf8(data);
+    } catch {
+      throw new DecodeError(`${data.length} bytes are no UTF-8.`);
+    }
+  },
+};
+
+const bytes: Codec = {
+  name: "bytes",
+  number: 3,
+  encode(payload) {
+    return { data: copyOf(payload) };
+  },
+  decode(data) {
+    return data;
+  },
+};
+
+const msgpack: Codec = {
+  name: "msgpack",
+  number: 4,
+  encode(payload) {
+    if (isTooDeep(payload)) throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
+    try {
+      return { data: pack(withWideIntegers(payload)) };
+    } catch (error) {
+      throw new EncodeError(`The payload has no form in msgpack: ${(error as Error).message}`);
+    }
+  },
+  decode(data) {
+    let value: unknown;
+    try {
+      value = unpack(data);
+    } catch (error) {
+      throw new DecodeError(`${data.length} bytes are no msgpack: ${(error as Error).message}`);
+    }
+    if (isTooDeep(value)) throw new DecodeError(`The msgpack is refused: ${TOO_DEEP}.`);
+    return value;
+  },
+};
+
+const image: Codec = { name: "image", number: 5, encode: encodeImage, decode: decodeImage };
+
+const CODECS: readonly Codec[] = [json, string, bytes, msgpack, image];
+
+/** Return the codec of a message type: its own name, else JSON. */
+export function codecFor(msgType: string): Codec {
+  return CODECS.find((each) => each.name === msgType) ?? json;
+}
+
+/** Return the codec with this number on the wire, if there is one. */
+export function codecNumbered(number: number): Codec | undefined {
+  return CODECS[number - 1];
+}
+
+/** Return a copy: the caller may go on writing into its own bytes while the message is queued. */
+export function copyOf(payload: unknown): Buffer {
+  if (ArrayBuffer.isView(payload)) return Buffer.from(Buffer.from(payload.buffer, payload.byteOffset, payload.byteLength));
+  if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer) return Buffer.from(new Uint8Array(payload));
+  throw new EncodeError(`A topic of type "bytes" takes a Buffer, typed array or ArrayBuffer, not "${typeof payload}".`);
+}

@@ -1,0 +1,34 @@
+import { decode, encode } from "@msgpack/msgpack";
+
+const DECODE_OPTIONS = {
+  useBigInt64: true,
+  // Maps with integer keys (`last_seqs`) decode to bigint keys, which objects don't have.
+  mapKeyConverter: (key: unknown): string | number => (typeof key === "string" || typeof key === "number" ? key : String(key)),
+};
+const MAX_DEPTH = 65; // one more than the wire allows: `isTooDeep` gives the reason
+
+/** Encode as msgpack. Integers beyond 32 bits are integers only as `bigint`; see {@link asInteger}. */
+export function pack(value: unknown): Buffer {
+  const packed = encode(value, { useBigInt64: true, maxDepth: MAX_DEPTH, ignoreUndefined: true });
+  return Buffer.from(packed.buffer, packed.byteOffset, packed.byteLength);
+}
+
+/** Decode msgpack. 64-bit integers become `bigint`. @throws {RangeError | Error} if it is none. */
+export function unpack(packed: Uint8Array): unknown {
+  return decode(packed, DECODE_OPTIONS);
+}
+
+/** Return a value whose integers beyond 32 bits are `bigint`: msgpack would have them as floats. */
+export function withWideIntegers(value: unknown): unknown {
+  if (typeof value === "number") return asInteger(value);
+  if (Array.isArray(value)) return value.map(withWideIntegers);
+  if (value === null || typeof value !== "object") return value;
+  const prototype: unknown = Object.getPrototypeOf(value);
+  if (prototype !== Object.prototype && prototype !== null) return value;
+  return Object.fromEntries(Object.entries(value).map(([key, each]) => [key, withWideIntegers(each)]));
+}
+
+/** Return an integer beyond 32 bits as `bigint`, any other number as it is. */
+export function asInteger(value: number): number | bigint {
+  return Number.isSafeInteger(value) && (value > 0xffffffff || value < -0x80000000) ? BigInt(value) : value;
+}

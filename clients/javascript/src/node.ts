@@ -1,0 +1,284 @@
+import { EventEmitter } from "node:events";
+import { hostname } from "node:os";
+import { NepError } from "./errors.js";
+import { Publisher, type PublisherHost, type PublisherOptions } from "./pubsub/publisher.js";
+import { type MessageCallback, type SubscribeOptions, Subscriber, type SubscriberHost } from "./pubsub/subscriber.js";
+import type { NodeRecord } from "./protocol/requests.js";
+import type { Hold } from "./sockets/socket.js";
+import { MASTER_WAIT_S, MasterSession } from "./session/master_session.js";
+import { hostOf, LOOPBACK, masterAddress } from "./system/addresses.js";
+import { nowNs } from "./system/clock.js";
+import { idFrom, newKey, nodeIdFrom } from "./wire/ids.js";
+import { checkNodeName, checkTopic } from "./wire/names.js";
+import { isPattern } from "./wire/pattern.js";
+
+const LEAVE_S = 0.3;
+
+/** How a node finds its master. */
+export interface NodeOptions {
+  /** Host and port of the master, such as `192.168.1.10:7780`. Default: `NEP_MASTER`, else `127.0.0.1:7780`. */
+  readonly master?: string;
+  /** Seconds that `publisher` and `subscribe` wait for a master; `null` waits until there is one. Default: 2. */
+  readonly masterWaitS?: number | null;
+}
+
+/** Connected through a master; made by `Node.hybrid`. */
+export interface HybridConfiguration {
+  readonly kind: "hybrid";
+  readonly master: string;
+}
+
+/** How a publisher or subscriber is connected. */
+export type Configuration = HybridConfiguration;
+
+/** Called with each decoded payload. */
+export type PayloadCallback<T = unknown> = (payload: T) => void;
+
+interface Closable {
+  close(timeoutS?: number): Promise<void>;
+}
+
+const openNodes = new Set<Node>();
+
+// Fires when only unreferenced timers are left: the program has ended, so deliver what is on its way and leave.
+process.on("beforeExit", () => {
+  for (const each of openNodes) void each.close();
+});
+
+/**
+ * A program's place in the graph: makes publishers and subscribers, and keeps its lease with the master.
+ *
+ * A program that only publishes ends when everything is delivered; one that subscribes stays until `close`.
+ * Before `process.exit()`, await `close()`. Problems that are no errors of a call are told by the event `warning`
+ * with one sentence; without a listener they go to `process.emitWarning`.
+ *
+ * @example
+ * import { Node } from "nep-js";
+ *
+ * await using node = new Node("display");
+ * for await (const message of node.subscribe("odometry")) console.log(message.payload);
+ */
+export class Node extends EventEmitter<{ warning: [string] }> {
+  /** The node's id: 16 hexadecimal digits. */
+  readonly id: string;
+  private readonly record: NodeRecord;
+  private readonly masterOf: string;
+  private readonly masterWaitS: number | undefined;
+  private readonly sessions = new Map<string, MasterSession>();
+  private readonly open = new Set<Closable>();
+  private readonly holders = new Set<object>();
+  private lastNumber = 0;
+  private closed: Promise<void> | undefined;
+
+  /**
+   * @param name 1 to 200 bytes without control characters. Two nodes may have the same name.
+   * @throws {BadNameError | NepError} for a name or address that can't be one.
+   */
+  constructor(
+    readonly name: string,
+    options: NodeOptions | string = {},
+  ) {
+    super();
+    const { master, masterWaitS = MASTER_WAIT_S } = typeof options === "string" ? {} : options;
+    this.masterOf = masterAddress(master);
+    this.masterWaitS = masterWaitS ?? undefined;
+    const key = newKey();
+    this.id = nodeIdFrom(key);
+    this.record = { id: this.id, name: checkNodeName(name), host: hostname(), pid: process.pid, language: "JavaScript", since_ns: nowNs(), key };
+    openNodes.add(this);
+  }
+
+  get isClosed(): boolean {
+    return this.closed !== undefined;
+  }
+
+  // ---- publishers and subscribers
+
+  /**
+   * Return a publisher that is connected to all registered subscribers: they receive the next message.
+   *
+   * @throws {MasterUnreachableError} when no master answers in time.
+   * @throws {BadTopicError | RequestRefusedError}
+   */
+  publisher<T = unknown>(topic: string, options: PublisherOptions = {}): Promise<Publisher<T>> {
+    return this.makePublisher<T>(topic, options, this.masterWaitS).ready;
+  }
+
+  /**
+   * Subscribe to a topic or to a pattern such as `/robot/**`. Iterate over the result, or pass a callback.
+   * Await `ready` to be sure that all publishers are connected.
+   *
+   * @example
+   * node.subscribe("odometry", { keep: "latest" }, (message) => console.log(message.payload));
+   */
+  subscribe<T = unknown>(topic: string, options?: SubscribeOptions, callback?: MessageCallback<T>): Subscriber<T>;
+  subscribe<T = unknown>(topic: string, callback: MessageCallback<T>): Subscriber<T>;
+  subscribe<T = unknown>(topic: string, second: SubscribeOptions | MessageCallback<T> = {}, callback?: MessageCallback<T>): Subscriber<T> {
+    const [options, onMessage] = typeof second === "function" ? [{}, second] : [second, callback];
+    return this.makeSubscriber<T>(topic, options, onMessage, this.masterWaitS);
+  }
+
+  private makePublisher<T>(topic: string, options: PublisherOptions, waitS: number | undefined, configuration?: Configuration): Publisher<T> {
+    this.checkOpen();
+    checkTopic(topic);
+    const number = this.nextNumber();
+    const id = idFrom(this.record.key, number);
+    const session = this.session(configuration);
+    const host: PublisherHost = {
+      hold: () => this.hold(),
+      warn: (message) => this.warn(message),
+      register: async (owner, transport) => {
+        const { history = 0, latched = false } = options;
+        const record = { id, number, topic, msg_type: owner.type, codec: owner.codecName, latched: latched || history > 0, history };
+        const sessionPublisher = { counts: () => owner.counts(), move: (hosts: readonly string[]) => transport.move(hosts) };
+        return this.patiently(session, waitS, session.addPublisher(record, sessionPublisher, waitS));
+      },
+      reportMissing: (subscribers) => session.reportMissing(id, subscribers),
+      unregister: (owner) => {
+        session.removePublisher(id, BigInt(owner.sent));
+        this.open.delete(owner);
+      },
+    };
+    const publisher = new Publisher<T>({ ...options, id, number, topic }, host);
+    this.open.add(publisher);
+    return publisher;
+  }
+
+  private makeSubscriber<T>(
+    topic: string,
+    options: SubscribeOptions,
+    callback: MessageCallback<T> | undefined,
+    waitS: number | undefined,
+    configuration?: Configuration,
+  ): Subscriber<T> {
+    this.checkOpen();
+    checkTopic(topic);
+    const number = this.nextNumber();
+    const id = idFrom(this.record.key, number);
+    const session = this.session(configuration);
+    const pattern = isPattern(topic);
+    const host: SubscriberHost = {
+      hold: () => "long",
+      warn: (message) => this.warn(message),
+      register: (owner) => {
+        this.holders.add(owner);
+        this.wake();
+        const record = { id, number, topic, msg_type: options.type ?? "json", pattern };
+        return this.patiently(session, waitS, session.addSubscriber(record, owner, waitS));
+      },
+      unregister: (owner) => {
+        this.holders.delete(owner);
+        session.removeSubscriber(id);
+        this.open.delete(owner as Subscriber);
+      },
+    };
+    const subscriber = new Subscriber<T>({ ...options, id, number, topic }, host, callback);
+    if (!subscriber.isClosed) this.open.add(subscriber);
+    return subscriber;
+  }
+
+  /** Warn when there is no master, and when registering fails. */
+  private async patiently<R>(session: MasterSession, waitS: number | undefined, registered: Promise<R>): Promise<R> {
+    const warnAfter = (): void =>
+      this.warn(`No master answers at ${session.address}; waiting for one. Start it with "nep master", or set NEP_MASTER to its address.`);
+    const timer = waitS === undefined ? setTimeout(warnAfter, MASTER_WAIT_S * 1000) : undefined;
+    try {
+      return await registered;
+    } catch (error) {
+      if (!this.isClosed) this.warn((error as Error).message);
+      throw error;
+    } finally {
+      clearTimeout(timer);
+    }
+  }
+
+  // ---- names of the original NEP
+
+  /** Return a publisher at once. What is published before it is connected waits, also for a master. */
+  new_pub<T = unknown>(topic: string, type = "json", configuration?: Configuration): Publisher<T> {
+    return this.makePublisher<T>(topic, { type }, undefined, configuration);
+  }
+
+  /** Same as {@link new_pub}. */
+  new_publisher<T = unknown>(topic: string, type = "json", configuration?: Configuration): Publisher<T> {
+    return this.new_pub<T>(topic, type, configuration);
+  }
+
+  /** Subscribe; `callback` gets each decoded payload. Waits for a master as long as there is none. */
+  new_sub<T = unknown>(topic: string, type = "json", callback?: PayloadCallback<T>, configuration?: Configuration): Subscriber<T> {
+    const onMessage = callback && ((message: { readonly payload: T }): void => callback(message.payload));
+    return this.makeSubscriber<T>(topic, { type }, onMessage, undefined, configuration);
+  }
+
+  /** Same as {@link new_sub}, with a callback. */
+  new_callback<T = unknown>(topic: string, type: string, callback: PayloadCallback<T>, configuration?: Configuration): Subscriber<T> {
+    return this.new_sub<T>(topic, type, callback, configuration);
+  }
+
+  /** Connect through the master at `ip`; `127.0.0.1` means the node's own master. */
+  hybrid(ip = LOOPBACK): HybridConfiguration {
+    return { kind: "hybrid", master: ip === LOOPBACK ? this.masterOf : masterAddress(ip) };
+  }
+
+  /** Same as {@link hybrid}. */
+  master(ip = LOOPBACK): HybridConfiguration {
+    return this.hybrid(ip);
+  }
+
+  // ---- the end
+
+  /**
+   * Close all publishers and subscribers, deliver what is on its way, and leave the master.
+   *
+   * @param timeoutS Seconds to wait for subscribers to take everything. Default: 2.
+   */
+  close(timeoutS?: number): Promise<void> {
+    this.closed ??= this.finish(timeoutS);
+    return this.closed;
+  }
+
+  private async finish(timeoutS?: number): Promise<void> {
+    openNodes.delete(this);
+    await Promise.all([...this.open].map((each) => each.close(timeoutS)));
+    await Promise.all([...this.sessions.values()].map((each) => each.leave(LEAVE_S)));
+  }
+
+  /** Close at the end of an `await using` block. */
+  [Symbol.asyncDispose](): Promise<void> {
+    return this.close();
+  }
+
+  // ---- inside
+
+  private hold(): Hold {
+    return this.holders.size > 0 ? "long" : "none";
+  }
+
+  private wake(): void {
+    for (const each of this.sessions.values()) each.wake();
+    for (const each of this.open) if (each instanceof Publisher) each.wake();
+  }
+
+  private session(configuration?: Configuration): MasterSession {
+    const address = configuration?.master ?? this.masterOf;
+    let session = this.sessions.get(address);
+    if (!session) {
+      session = new MasterSession(address, this.record, (message) => this.warn(`Master at ${hostOf(address)}: ${message}`), () => this.holders.size > 0);
+      this.sessions.set(address, session);
+    }
+    return session;
+  }
+
+  private nextNumber(): number {
+    return ++this.lastNumber;
+  }
+
+  private checkOpen(): void {
+    if (this.closed) throw new NepError(`The node "${this.name}" is closed.`);
+  }
+
+  private warn(message: string): void {
+    if (this.listenerCount("warning") > 0) this.emit("warning", message);
+    else process.emitWarning(message, "NepWarning");
+  }
+}

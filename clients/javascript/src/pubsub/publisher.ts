@@ -1,0 +1,315 @@
+import { ClosedError, EncodeError } from "../errors.js";
+import { type Codec, codecFor, type Encoded } from "../messages/codecs.js";
+import type { ExpectedSubscriber, PublisherCount } from "../protocol/requests.js";
+import type { Hold } from "../sockets/socket.js";
+import { nowNs } from "../system/clock.js";
+import { WINDOW_BYTES } from "./byte_window.js";
+import { MAX_HISTORY } from "./history.js";
+import { XpubTransport } from "./xpub_transport.js";
+
+/** Wait for a promise; false when it was rejected or took longer. */
+function within(timeoutMs: number, awaited: Promise<unknown>): Promise<boolean> {
+  return new Promise((resolve) => {
+    const timer = setTimeout(() => resolve(false), timeoutMs);
+    awaited.then(
+      () => resolve(true),
+      () => resolve(false),
+    ).finally(() => clearTimeout(timer));
+  });
+}
+
+const HANDSHAKE_MS = 500;
+const BYE_AGAIN_MS = 50;
+const CLOSE_S = 2;
+const VALIDATE_INTERVAL_MS = 1000;
+const WARN_INTERVAL_MS = 10_000;
+const MAX_EARLY_MESSAGES = 50_000;
+
+/** How a topic is published. */
+export interface PublisherOptions {
+  /** `json` (default), `string`, `bytes`, `msgpack`, `image`, or a name of your own that is carried as JSON. */
+  readonly type?: string;
+  /** Keep the newest message and send it to late subscribers. */
+  readonly latched?: boolean;
+  /** Keep so many messages for late subscribers (0 to 1000). */
+  readonly history?: number;
+  /** Whether small messages that wait for the socket may travel together. Default: true. */
+  readonly batch?: boolean;
+  /** Throw `EncodeError` for a payload that can't be encoded, instead of counting it in `rejected`. */
+  readonly strict?: boolean;
+}
+
+export interface PublisherSpec extends PublisherOptions {
+  readonly id: bigint;
+  readonly number: number;
+  readonly topic: string;
+}
+
+/** What a publisher needs from its node. */
+export interface PublisherHost {
+  readonly hold: () => Hold;
+  readonly warn: (message: string) => void;
+  /** Bind and register; the subscribers to wait for. */
+  register(publisher: Publisher, transport: XpubTransport): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
+  reportMissing(subscribers: readonly bigint[]): void;
+  unregister(publisher: Publisher): void;
+}
+
+/**
+ * Publishes messages on one topic; made by `Node.publisher` and `Node.new_pub`.
+ *
+ * A payload that can't be encoded is dropped, counted in `rejected` and named by the node's `warning` event.
+ *
+ * @example
+ * const publisher = await node.publisher("odometry", { type: "json" });
+ * publisher.publish({ x: 1.5, y: 0 });
+ */
+export class Publisher<T = unknown> {
+  /** Resolves when all registered subscribers are connected, after 0.5 s at most; rejects if it can't be registered. */
+  readonly ready: Promise<this>;
+  /** Payloads that could not be encoded. */
+  rejected = 0;
+  /** Messages in which NaN or infinity was sent as `null`, because JSON has neither. */
+  nanCount = 0;
+  /** Messages dropped before the handshake was over, for lack of room. */
+  dropped = 0;
+  /** Messages and subscriptions that could not be understood. */
+  refused = 0;
+  private readonly codec: Codec;
+  private readonly transport: XpubTransport;
+  private readonly waitedFor = new Map<bigint, string>();
+  private early: { readonly encoded: Encoded; readonly stampNs: bigint }[] | undefined = [];
+  private earlyBytes = 0;
+  private isBusy = true;
+  private closing: Promise<void> | undefined;
+  private onSubscribers: (() => void) | undefined;
+  private problem = "";
+  private validatedAt = -Infinity;
+  private warnedAt = -Infinity;
+
+  /** @internal */
+  constructor(
+    readonly spec: PublisherSpec,
+    private readonly host: PublisherHost,
+  ) {
+    this.codec = codecFor(spec.type ?? "json");
+    const history = Math.min(MAX_HISTORY, Math.max(spec.history ?? 0, spec.latched ? 1 : 0));
+    this.transport = new XpubTransport(
+      {
+        id: spec.id,
+        topic: spec.topic,
+        codecNumber: this.codec.number,
+        latched: history > 0,
+        history,
+        batch: spec.batch ?? true,
+      },
+      () => (this.isBusy ? "brief" : host.hold()),
+      () => this.onSubscribers?.(),
+      () => this.refused++,
+    );
+    this.ready = this.begin();
+    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+  }
+
+  get topic(): string {
+    return this.spec.topic;
+  }
+
+  /** Type under which the topic is listed. */
+  get type(): string {
+    return this.spec.type ?? "json";
+  }
+
+  /** Name of the codec. */
+  get codecName(): string {
+    return this.codec.name;
+  }
+
+  /** Messages published so far, also those that nobody was there to receive. */
+  get sent(): number {
+    return this.transport.count + (this.early?.length ?? 0);
+  }
+
+  /** Number of connected subscribers. */
+  get subscribers(): number {
+    return this.transport.subscriptions.greeted.size;
+  }
+
+  /** Names of nodes that subscribe and have not connected: they are starting up or don't respond. */
+  get unconnectedSubscribers(): string[] {
+    const names = [...this.waitedFor].filter(([id]) => !this.transport.subscriptions.greeted.has(id)).map(([, name]) => name);
+    return [...new Set(names)].sort();
+  }
+
+  get isClosed(): boolean {
+    return this.closing !== undefined;
+  }
+
+  // ---- the handshake
+
+  private async begin(): Promise<this> {
+    try {
+      const { expected, hung } = await this.host.register(this, this.transport);
+      for (const each of [...expected, ...hung]) this.waitedFor.set(each.id, each.nodeName);
+      const absent = await this.waitForSubscribers(new Set(expected.map((each) => each.id)));
+      if (absent.length > 0) this.host.reportMissing(absent);
+    } catch (error) {
+      this.early = undefined;
+      this.transport.close();
+      this.closing ??= Promise.resolve();
+      this.host.unregister(this);
+      throw error;
+    } finally {
+      this.isBusy = false;
+    }
+    const early = this.early ?? [];
+    this.early = undefined;
+    for (const { encoded, stampNs } of early) this.transport.send(encoded, stampNs);
+    return this;
+  }
+
+  private waitForSubscribers(expected: ReadonlySet<bigint>): Promise<bigint[]> {
+    const { greeted } = this.transport.subscriptions;
+    const absent = (): bigint[] => [...expected].filter((each) => !greeted.has(each));
+    return this.waitUntil(() => absent().length === 0, HANDSHAKE_MS).then(absent);
+  }
+
+  private waitUntil(isMet: () => boolean, timeoutMs: number): Promise<void> {
+    if (isMet()) return Promise.resolve();
+    this.transport.wake();
+    return new Promise((resolve) => {
+      const finish = (): void => {
+        clearTimeout(timer);
+        this.onSubscribers = undefined;
+        resolve();
+      };
+      const timer = setTimeout(finish, timeoutMs);
+      this.onSubscribers = () => {
+        if (isMet()) finish();
+      };
+    });
+  }
+
+  // ---- publishing
+
+  /**
+   * Publish a message. Returns at once; before the handshake is over, messages wait for it.
+   *
+   * @throws {ClosedError} after `close`.
+   * @throws {EncodeError} with the option `strict`, for a payload that can't be encoded.
+   */
+  publish(payload: T): void {
+    if (this.closing) throw new ClosedError(`The publisher of "${this.topic}" is closed.`);
+    const isWanted = this.early || this.spec.latched || this.spec.history || this.spec.strict || this.transport.subscriptions.isHeard;
+    if (!isWanted && performance.now() < this.validatedAt + VALIDATE_INTERVAL_MS) {
+      this.transport.skip();
+      return;
+    }
+    const encoded = this.encode(payload);
+    if (!encoded) return;
+    if (this.early) this.keepEarly(encoded);
+    else if (isWanted) this.transport.send(encoded);
+    else {
+      this.validatedAt = performance.now(); // unsubscribed topics: errors show all the same
+      this.transport.skip();
+    }
+  }
+
+  private encode(payload: T): Encoded | undefined {
+    try {
+      const encoded = this.codec.encode(payload);
+      this.problem = "";
+      if (encoded.nonFinite) {
+        this.nanCount++;
+        this.warnRarely(`"${this.topic}": NaN or infinity was sent as null, because JSON has neither.`);
+      }
+      return encoded;
+    } catch (error) {
+      if (!(error instanceof EncodeError) || this.spec.strict) throw error;
+      this.rejected++;
+      this.problem = error.message;
+      this.warnRarely(`"${this.topic}": a message was not sent. ${error.message}`);
+      return undefined;
+    }
+  }
+
+  private keepEarly(encoded: Encoded): void {
+    const bytes = encoded.data.length;
+    if (this.early!.length >= MAX_EARLY_MESSAGES || (this.earlyBytes + bytes > WINDOW_BYTES && this.earlyBytes > 0)) {
+      this.dropped++;
+      this.warnRarely(`"${this.topic}": messages are dropped, because the publisher is not connected yet.`);
+      return;
+    }
+    this.earlyBytes += bytes;
+    this.early!.push({ encoded, stampNs: nowNs() });
+  }
+
+  private warnRarely(message: string): void {
+    const now = performance.now();
+    if (now < this.warnedAt + WARN_INTERVAL_MS) return;
+    this.warnedAt = now;
+    this.host.warn(message);
+  }
+
+  // ---- the lease and the end
+
+  /** @internal */
+  counts(): PublisherCount {
+    const { count, bytes, lastStampNs } = this.transport;
+    return {
+      id: this.spec.id,
+      count: BigInt(count),
+      bytes: BigInt(bytes),
+      last_seq: BigInt(count),
+      ...(lastStampNs !== undefined && { last_stamp_ns: lastStampNs }),
+      ...(this.problem && { problem: this.problem }),
+    };
+  }
+
+  /** @internal */
+  move(hosts: readonly string[]): Promise<string[]> {
+    return this.transport.move(hosts);
+  }
+
+  /** @internal Read subscriptions now. */
+  wake(): void {
+    this.transport.wake();
+  }
+
+  /**
+   * Unregister, deliver what is on its way, and close.
+   *
+   * @param timeoutS Seconds to wait for subscribers to take everything. Default: 2.
+   */
+  close(timeoutS = CLOSE_S): Promise<void> {
+    this.closing ??= this.finish(timeoutS);
+    return this.closing;
+  }
+
+  private async finish(timeoutS: number): Promise<void> {
+    const isReady = await within(timeoutS * 1000, this.ready);
+    this.host.unregister(this);
+    if (!isReady) {
+      this.transport.close();
+      return;
+    }
+    this.isBusy = true;
+    const { greeted } = this.transport.subscriptions;
+    const deadline = performance.now() + timeoutS * 1000;
+    this.transport.sayBye();
+    while (greeted.size > 0 && performance.now() < deadline) {
+      await this.waitUntil(() => greeted.size === 0, Math.min(BYE_AGAIN_MS, deadline - performance.now()));
+      this.transport.sayBye(); // a full queue drops it like anything else
+    }
+    if (greeted.size > 0) {
+      this.host.warn(`"${this.topic}" closed before ${greeted.size} subscriber(s) took everything.`);
+    }
+    await this.transport.flush();
+    this.transport.close();
+  }
+
+  /** Close at the end of an `await using` block. */
+  [Symbol.asyncDispose](): Promise<void> {
+    return this.close();
+  }
+}

@@ -1,0 +1,345 @@
+import { ClosedError, DecodeError } from "../errors.js";
+import type { Message } from "../messages/message.js";
+import { MAX_COUNT, type SubscriberCount } from "../protocol/requests.js";
+import type { ReachablePublisher, SessionSubscriber } from "../session/master_session.js";
+import type { Hold } from "../sockets/socket.js";
+import { isPattern } from "../wire/pattern.js";
+import { Inbox } from "./inbox.js";
+import { TopicReader, type TopicReaderHost } from "./topic_reader.js";
+
+const HANDSHAKE_MS = 500;
+const MAX_MESSAGES = 10_000;
+const MAX_BYTES = 256 * 2 ** 20;
+const MAX_TURN_MS = 10; // so long callbacks run in a row; then timers do
+const WARN_INTERVAL_MS = 10_000;
+
+/** How a topic is subscribed to. */
+export interface SubscribeOptions {
+  /** Type under which the subscriber is listed. Default: `json`. The codec of a message decides how it is decoded. */
+  readonly type?: string;
+  /** `all` (default), or `latest`: messages that were not read in time are replaced by newer ones. */
+  readonly keep?: "all" | "latest";
+  /** Inbox size in messages; the oldest ones are dropped and counted in `lost`. Default: 10 000. */
+  readonly maxMessages?: number;
+  /** Inbox size in bytes. Default: 256 MiB. */
+  readonly maxBytes?: number;
+  /** Closes the subscriber when it is aborted. */
+  readonly signal?: AbortSignal;
+}
+
+export interface SubscriberSpec extends SubscribeOptions {
+  readonly id: bigint;
+  readonly number: number;
+  readonly topic: string;
+}
+
+/** What a subscriber needs from its node. */
+export interface SubscriberHost {
+  readonly hold: () => Hold;
+  readonly warn: (message: string) => void;
+  /** Register; calls `connect` with the publishers that are there. */
+  register(subscriber: SessionSubscriber): Promise<void>;
+  unregister(subscriber: SessionSubscriber): void;
+}
+
+/** Called with each message. */
+export type MessageCallback<T = unknown> = (message: Message<T>) => void;
+
+/**
+ * Receives the messages of a topic; made by `Node.subscribe`. Iterate over it, or pass a callback. A topic with
+ * the level `*` or `**` is a pattern.
+ *
+ * @example
+ * for await (const message of node.subscribe("odometry")) {
+ *   console.log(message.payload, message.stampNs);
+ * }
+ */
+export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, SessionSubscriber {
+  /** Resolves when all publishers of the topic are connected, after 0.5 s at most; rejects if it can't be registered. */
+  readonly ready: Promise<this>;
+  readonly isPattern: boolean;
+  private readonly readers = new Map<string, TopicReader>();
+  private readonly inbox: Inbox;
+  private readonly readerHost: TopicReaderHost;
+  private readonly waiters: ((message: Message<T> | undefined) => void)[] = [];
+  private onGreeted: (() => void) | undefined;
+  private isDelivering = false;
+  private turnEnds = 0;
+  private closed: Promise<void> | undefined;
+  private problem = "";
+  private warnedAt = -Infinity;
+  private readonly totals = { received: 0, lost: 0, refused: 0 };
+  private readonly close_ = (): void => void this.close();
+
+  /** @internal */
+  constructor(
+    readonly spec: SubscriberSpec,
+    private readonly host: SubscriberHost,
+    private readonly callback?: MessageCallback<T>,
+  ) {
+    this.isPattern = isPattern(spec.topic);
+    this.inbox = new Inbox(spec.keep !== "latest", spec.maxMessages ?? MAX_MESSAGES, spec.maxBytes ?? MAX_BYTES);
+    this.readerHost = {
+      hold: host.hold,
+      onMessage: (message, reader) => this.arrived(message as Message<T>, reader),
+      onRefused: (reason) => this.warnRarely(`"${spec.topic}": what came was no message. ${reason}`),
+      onGreeted: () => this.onGreeted?.(),
+    };
+    if (!this.isPattern) this.reader(spec.topic);
+    this.ready = this.begin();
+    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+    if (spec.signal?.aborted) this.close_();
+    else spec.signal?.addEventListener("abort", this.close_, { once: true });
+  }
+
+  get topic(): string {
+    return this.spec.topic;
+  }
+
+  get type(): string {
+    return this.spec.type ?? "json";
+  }
+
+  /** Messages that arrived. */
+  get received(): number {
+    return this.sum((each) => each.sources.received, this.totals.received);
+  }
+
+  /** Messages that did not arrive, or were dropped here for lack of room. */
+  get lost(): number {
+    return this.sum((each) => each.sources.lost, this.totals.lost);
+  }
+
+  /** What came and was no message of the wire. */
+  get refused(): number {
+    return this.sum((each) => each.refused, this.totals.refused);
+  }
+
+  /** Number of publishers that have greeted this subscriber. */
+  get publishers(): number {
+    return this.sum((each) => each.sources.echoing, 0);
+  }
+
+  get isClosed(): boolean {
+    return this.closed !== undefined;
+  }
+
+  private sum(of: (reader: TopicReader) => number, start: number): number {
+    let total = start;
+    for (const each of this.readers.values()) total += of(each);
+    return total;
+  }
+
+  // ---- the handshake
+
+  private async begin(): Promise<this> {
+    try {
+      await this.host.register(this);
+    } catch (error) {
+      await this.close();
+      throw error;
+    }
+    await this.waitForEchoes();
+    return this;
+  }
+
+  private waitForEchoes(): Promise<void> {
+    const listed = [...this.readers.values()].flatMap((each) => [...each.sources.byId.values()]).filter((each) => each.remote);
+    const isMet = (): boolean => this.isClosed || listed.every((each) => each.hasEchoed || each.problem || each.endsAt !== undefined);
+    if (isMet()) return Promise.resolve();
+    return new Promise((resolve) => {
+      const finish = (): void => {
+        clearTimeout(timer);
+        this.onGreeted = undefined;
+        resolve();
+      };
+      const timer = setTimeout(finish, HANDSHAKE_MS);
+      this.onGreeted = () => {
+        if (isMet()) finish();
+      };
+    });
+  }
+
+  private reader(topic: string): TopicReader {
+    let reader = this.readers.get(topic);
+    if (!reader) {
+      reader = new TopicReader(this.spec.id, topic, this.type, this.readerHost);
+      this.readers.set(topic, reader);
+    }
+    return reader;
+  }
+
+  /** @internal Bind or connect without a master. */
+  attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
+    return this.reader(this.topic).attach(endpoint, how);
+  }
+
+  // ---- reading
+
+  private arrived(message: Message<T>, reader: TopicReader): void {
+    if (this.isClosed) return;
+    const waiter = this.inbox.length === 0 ? this.waiters.shift() : undefined;
+    if (waiter) {
+      waiter(message);
+      return;
+    }
+    if (this.callback && this.inbox.length === 0 && !this.isDelivering && performance.now() < this.turnEnds) {
+      this.deliver(message);
+      return;
+    }
+    const dropped = this.inbox.put(message as Message);
+    if (dropped > 0) {
+      reader.sources.dropped(dropped);
+      this.warnRarely(`"${this.topic}": messages come faster than they are read; the oldest ones are dropped.`);
+    }
+    if (this.callback) this.deliverSoon();
+  }
+
+  /** Run callbacks now if this turn of the event loop has time left, else in the next one. */
+  private deliverSoon(): void {
+    if (this.isDelivering) return;
+    this.isDelivering = true;
+    if (performance.now() >= this.turnEnds + MAX_TURN_MS) this.deliverInbox();
+    else setImmediate(() => this.deliverInbox());
+  }
+
+  private deliverInbox(): void {
+    this.turnEnds = performance.now() + MAX_TURN_MS;
+    while (!this.isClosed) {
+      const message = this.inbox.take();
+      if (!message) break;
+      this.deliver(message as Message<T>);
+      if (performance.now() >= this.turnEnds && this.inbox.length > 0) {
+        setImmediate(() => this.deliverInbox());
+        return;
+      }
+    }
+    this.isDelivering = false;
+  }
+
+  private deliver(message: Message<T>): void {
+    try {
+      this.callback!(message);
+    } catch (error) {
+      if (error instanceof DecodeError) this.problem = error.message;
+      this.warnRarely(`"${this.topic}": the callback failed. ${error instanceof Error ? (error.stack ?? error.message) : String(error)}`);
+    }
+  }
+
+  /**
+   * Return the next message.
+   *
+   * @param timeoutS Seconds; undefined waits until there is one.
+   * @returns undefined when none came in time, or the subscriber was closed.
+   * @throws {ClosedError} if it is closed already, or has a callback.
+   */
+  receive(timeoutS?: number): Promise<Message<T> | undefined> {
+    if (this.callback) return Promise.reject(new ClosedError(`"${this.topic}": messages go to the callback.`));
+    const message = this.inbox.take() as Message<T> | undefined;
+    if (message || this.isClosed) return Promise.resolve(message);
+    return new Promise((resolve) => {
+      const settle = (received: Message<T> | undefined): void => {
+        clearTimeout(timer);
+        resolve(received);
+      };
+      const expire = (): void => {
+        this.waiters.splice(this.waiters.indexOf(settle), 1);
+        resolve(undefined);
+      };
+      const timer = timeoutS === undefined ? undefined : setTimeout(expire, timeoutS * 1000);
+      this.waiters.push(settle);
+    });
+  }
+
+  /** Messages as they come; leaving the loop closes the subscriber. @throws when it can't be registered. */
+  async *[Symbol.asyncIterator](): AsyncIterator<Message<T>, void, undefined> {
+    try {
+      await Promise.race([this.ready, this.closedEarly()]);
+      for (let message = await this.receive(); message; message = await this.receive()) yield message;
+    } finally {
+      await this.close();
+    }
+  }
+
+  private closedEarly(): Promise<void> {
+    return new Promise((resolve) => {
+      if (this.isClosed) resolve();
+      else this.onClosed.push(resolve);
+    });
+  }
+
+  private readonly onClosed: (() => void)[] = [];
+
+  private warnRarely(message: string): void {
+    const now = performance.now();
+    if (now < this.warnedAt + WARN_INTERVAL_MS) return;
+    this.warnedAt = now;
+    this.host.warn(message);
+  }
+
+  // ---- the session
+
+  /** @internal */
+  counts(): SubscriberCount {
+    const bounded = (count: number): bigint => {
+      const value = BigInt(Math.max(0, count));
+      return value > MAX_COUNT ? MAX_COUNT : value;
+    };
+    return {
+      id: this.spec.id,
+      received: bounded(this.received),
+      lost: bounded(this.lost),
+      ...(this.problem && { problem: this.problem }),
+    };
+  }
+
+  /** @internal */
+  connect(remotes: readonly ReachablePublisher[]): void {
+    if (!this.isClosed) for (const each of remotes) this.reader(each.topic).connect(each);
+  }
+
+  /** @internal */
+  reconcile(topic: string, remotes: readonly ReachablePublisher[]): void {
+    if (!this.isClosed && (remotes.length > 0 || this.readers.has(topic))) this.reader(topic).reconcile(remotes);
+  }
+
+  /** @internal */
+  gone(id: bigint, lastSeq: bigint, isClosed: boolean): void {
+    for (const each of this.readers.values()) each.gone(id, lastSeq, isClosed);
+  }
+
+  /** @internal */
+  tick(lastSeqs: ReadonlyMap<bigint, bigint>): void {
+    for (const [topic, reader] of this.readers) {
+      reader.tick(lastSeqs);
+      if (!this.isPattern || reader.sources.byId.size > 0) continue;
+      this.readers.delete(topic); // nobody publishes it any more
+      this.totals.received += reader.sources.received;
+      this.totals.lost += reader.sources.lost;
+      this.totals.refused += reader.refused;
+      reader.close();
+    }
+  }
+
+  /** Unregister and forget what was not read. */
+  close(): Promise<void> {
+    this.closed ??= this.finish();
+    return this.closed;
+  }
+
+  private finish(): Promise<void> {
+    this.spec.signal?.removeEventListener("abort", this.close_);
+    this.host.unregister(this);
+    this.inbox.clear();
+    for (const each of this.readers.values()) each.close();
+    for (const waiter of this.waiters.splice(0)) waiter(undefined);
+    for (const each of this.onClosed.splice(0)) each();
+    this.onGreeted?.();
+    return Promise.resolve();
+  }
+
+  /** Close at the end of an `await using` block. */
+  [Symbol.asyncDispose](): Promise<void> {
+    return this.close();
+  }
+}

@@ -1,0 +1,198 @@
+import { WireError } from "../errors.js";
+import { codecNumbered } from "../messages/codecs.js";
+import { Message } from "../messages/message.js";
+import type { ReachablePublisher } from "../session/master_session.js";
+import { SubSocket, type Hold } from "../sockets/socket.js";
+import { readBatch } from "../wire/batch.js";
+import { Flag, type Header, HEADER_BYTES, readHeaderPart } from "../wire/header.js";
+import { helloPart, readPart } from "../wire/notices.js";
+import { type Extension, NO_EXTENSION, readRest, splitOnePart, topicPart } from "../wire/parts.js";
+import { WINDOW_BYTES } from "./byte_window.js";
+import { Sources, type Source } from "./loss.js";
+
+const RECEIVE_MARK = 1000;
+const RECEIVE_MARK_IMAGES = 64;
+
+export interface TopicReaderHost {
+  readonly hold: () => Hold;
+  onMessage(message: Message, reader: TopicReader): void;
+  /** Bytes that are no message; `reason` says why. */
+  onRefused(reason: string): void;
+  /** An echo, or a publisher that can't be connected to. */
+  onGreeted(): void;
+}
+
+/** Reads one topic from all of its publishers: a SUB socket, who was heard, and what was lost. */
+export class TopicReader {
+  readonly sources = new Sources();
+  /** Messages and notices that could not be understood. */
+  refused = 0;
+  private readonly socket: SubSocket;
+  private readonly topicPart: Buffer;
+  private readonly hello: Buffer;
+
+  constructor(
+    private readonly id: bigint,
+    readonly topic: string,
+    private readonly type: string,
+    private readonly host: TopicReaderHost,
+  ) {
+    this.topicPart = topicPart(topic);
+    this.hello = helloPart({ subscriber: id, topic, level: 3 });
+    this.socket = new SubSocket(type === "image" ? RECEIVE_MARK_IMAGES : RECEIVE_MARK);
+    this.socket.filter(this.topicPart);
+    this.socket.filter(this.hello); // sorts behind the topic: a publisher that sees it has the topic's filter
+    this.socket.read((parts) => this.read(parts), host.hold);
+  }
+
+  // ---- connections
+
+  /** Connect to a publisher; twice is once. */
+  connect(remote: ReachablePublisher): void {
+    for (const old of this.sources.replacedBy(remote)) this.sources.closing(old, 0n);
+    const { endpoint } = remote;
+    const source = this.sources.listed(remote);
+    source.isLapsed = false;
+    source.endsAt = undefined;
+    if (!endpoint || endpoint === source.endpoint) return;
+    for (const [id, other] of this.sources.byId) {
+      if (other !== source && other.endpoint === endpoint) this.leave(id); // its port is another's now
+    }
+    if (source.endpoint) {
+      this.socket.disconnect(source.endpoint);
+      source.hasEchoed = false;
+    }
+    this.connectTo(source, endpoint);
+  }
+
+  private connectTo(source: Source, endpoint: string): void {
+    source.endpoint = undefined;
+    source.problem = "";
+    try {
+      this.socket.connect(endpoint);
+      source.endpoint = endpoint;
+    } catch (error) {
+      source.problem = `Can't connect to ${endpoint} of "${source.remote?.nodeName ?? ""}": ${String(error)}`;
+      this.refuse(source.problem);
+      this.host.onGreeted();
+    }
+  }
+
+  /** Bind or connect without a master. */
+  async attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
+    if (how === "bind") await this.socket.bind(endpoint);
+    else this.socket.connect(endpoint);
+  }
+
+  /** These are all publishers of the topic: connect to new ones; others are silent. */
+  reconcile(remotes: readonly ReachablePublisher[]): void {
+    for (const each of remotes) this.connect(each);
+    const listed = new Set(remotes.map((each) => each.id));
+    for (const [id, source] of this.sources.byId) if (source.remote && !listed.has(id)) source.isLapsed = true;
+  }
+
+  /** A publisher is unlisted. Its connection stays until its bye comes, or it is replaced. */
+  gone(id: bigint, lastSeq: bigint, isClosed: boolean): void {
+    if (isClosed) this.sources.closing(id, lastSeq);
+    else this.sources.lapsed(id, lastSeq);
+  }
+
+  /** Leave publishers that have closed without a bye; compare with what the master knows of the others. */
+  tick(lastSeqs: ReadonlyMap<bigint, bigint>): void {
+    for (const id of this.sources.ended()) {
+      this.sources.settle(id);
+      this.leave(id);
+    }
+    if (this.socket.hasInput) return;
+    for (const [id, seq] of lastSeqs) this.sources.promised(id, seq);
+  }
+
+  private leave(id: bigint): void {
+    const source = this.sources.remove(id);
+    if (source?.endpoint) this.socket.disconnect(source.endpoint);
+  }
+
+  close(): void {
+    this.socket.close();
+  }
+
+  // ---- reading
+
+  private read(parts: Buffer[]): void {
+    try {
+      this.parse(parts);
+    } catch (error) {
+      if (!(error instanceof WireError)) throw error;
+      this.refuse(error.message);
+    }
+  }
+
+  private refuse(reason: string): void {
+    this.refused++;
+    this.host.onRefused(reason);
+  }
+
+  private parse(parts: Buffer[]): void {
+    const first = parts[0]!;
+    const isAlone = first.equals(this.hello);
+    if (isAlone && parts.length === 2) {
+      this.notice(readHeaderPart(parts[1]!));
+    } else if (isAlone || first.equals(this.topicPart)) {
+      const { header, payload, extension } = readRest(parts.slice(1));
+      this.message(header, payload, extension, isAlone);
+    } else if (parts.length === 1 && first.subarray(0, this.topicPart.length).equals(this.topicPart)) {
+      this.onePart(first);
+    } else {
+      throw new WireError("topic", "A message begins with something else than its topic.");
+    }
+  }
+
+  private onePart(part: Buffer): void {
+    const at = this.topicPart.length;
+    if (part.length >= at + HEADER_BYTES && part.readUInt16LE(at + 2) & Flag.BATCH) {
+      const { header, entries } = readBatch(part);
+      let { seq } = header;
+      for (const { stampNs, payload } of entries) {
+        this.message({ ...header, flags: 0, seq, stampNs, size: payload.length }, payload, NO_EXTENSION, false);
+        seq++;
+      }
+      return;
+    }
+    const [, head, body] = splitOnePart(part);
+    const { header, payload, extension } = readRest([head, body]);
+    this.message(header, payload, extension, false);
+  }
+
+  private message(header: Header, payload: Buffer, extension: Extension, isAlone: boolean): void {
+    const codec = codecNumbered(header.codec);
+    if (!codec) throw new WireError("codec", `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`);
+    if (header.flags & (Flag.SHARED | Flag.BATCH)) {
+      throw new WireError("shared", "The payload lies in shared memory, which was not agreed on.");
+    }
+    const { publisher, seq } = header;
+    if (!isAlone && this.sources.isEarly(publisher)) return;
+    if (!this.sources.arrived(publisher, seq, isAlone)) return;
+    const type = this.sources.byId.get(publisher)?.remote?.msgType ?? this.type;
+    const isLatched = (header.flags & Flag.LATCHED) !== 0;
+    this.host.onMessage(new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched), this);
+  }
+
+  /** An echo, or the last word of a publisher that closes. */
+  private notice(header: Header): void {
+    const { publisher, seq } = header;
+    const source = this.sources.get(publisher);
+    const isPossible = this.sources.reached(publisher, seq);
+    if (header.flags & Flag.BYE) {
+      this.leave(publisher);
+    } else if (!(header.flags & Flag.OFFER)) {
+      if (source.hasEchoed) {
+        const boundBytes = BigInt(Math.floor(WINDOW_BYTES / Math.max(1, this.sources.echoing)));
+        this.socket.say(readPart({ subscriber: this.id, publisher, seq, boundBytes }));
+      } else {
+        source.hasEchoed = true;
+      }
+    }
+    this.host.onGreeted();
+    if (!isPossible) throw new WireError("seq-gap", `The publisher's number leaps from ${source.last} to ${seq}.`);
+  }
+}

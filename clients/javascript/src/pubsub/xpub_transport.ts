@@ -1,0 +1,217 @@
+import { XpubSocket } from "../sockets/socket.js";
+import type { Hold } from "../sockets/socket.js";
+import { isFreePort } from "../system/addresses.js";
+import { NepError } from "../errors.js";
+import { nowNs } from "../system/clock.js";
+import { MAX_BATCH, packBatch } from "../wire/batch.js";
+import { Flag, packHeader } from "../wire/header.js";
+import { onePart, packExtension, topicPart } from "../wire/parts.js";
+import type { Encoded } from "../messages/codecs.js";
+import { Backlog, BACKLOG_STEP_BYTES, STEP_BYTES } from "./byte_window.js";
+import { History } from "./history.js";
+import { Subscriptions } from "./subscriptions.js";
+
+const SEND_MARK = 50_000;
+const MAX_SUBSCRIPTION_BYTES = 4096;
+const SMALL_BYTES = 16_384; // larger messages: copying them together costs more than parts
+const MAX_SENT_TOGETHER = 64;
+const FULL_BATCH_BYTES = 65_536;
+const BIND_TRIES = 100;
+
+/** A message that waits for the socket and goes out alone or in a batch, or finished parts. */
+type Entry = { readonly payload: Buffer; readonly seq: number; readonly stampNs: bigint } | { readonly parts: Buffer[] };
+
+export interface XpubSpec {
+  readonly id: bigint;
+  readonly topic: string;
+  readonly codecNumber: number;
+  readonly latched: boolean;
+  /** Messages kept for late subscribers. */
+  readonly history: number;
+  readonly batch: boolean;
+}
+
+/**
+ * A publisher's XPUB socket with its subscribers: greets them, sends each message in the form that all of them
+ * read, and drops messages for those that have no room.
+ */
+export class XpubTransport {
+  /** Messages sent or skipped: the seq of the newest one. */
+  count = 0;
+  bytes = 0;
+  lastStampNs: bigint | undefined;
+  readonly subscriptions: Subscriptions;
+  private readonly socket: XpubSocket<Entry>;
+  private readonly topic: Buffer;
+  private readonly history: History;
+  private readonly backlog = new Backlog();
+  private readonly bound = new Map<string, string>();
+  private moving: Promise<unknown> = Promise.resolve();
+  private settledBytes = 0;
+  private settleAt = 0; // from so many bytes on a message is not simply sent to all
+
+  constructor(
+    private readonly spec: XpubSpec,
+    hold: () => Hold,
+    private readonly onSubscribers: () => void,
+    refuse: (reason: string) => void,
+  ) {
+    this.topic = topicPart(spec.topic);
+    this.history = new History(spec.history);
+    this.subscriptions = new Subscriptions(spec.topic, spec.id, refuse);
+    this.socket = new XpubSocket<Entry>(SEND_MARK, MAX_SUBSCRIPTION_BYTES, (queue) => this.take(queue));
+    this.socket.read((event) => this.noteSubscription(event), hold);
+  }
+
+  // ---- where it is reached
+
+  /** Be bound at these hosts and no others, each with a port of its own. Returns the endpoints. */
+  move(hosts: readonly string[]): Promise<string[]> {
+    const moved = this.moving.then(() => this.bindAt(hosts));
+    this.moving = moved.catch(() => undefined);
+    return moved;
+  }
+
+  private async bindAt(hosts: readonly string[]): Promise<string[]> {
+    for (const [host, endpoint] of this.bound) {
+      if (hosts.includes(host)) continue;
+      this.bound.delete(host);
+      await this.socket.unbind(endpoint);
+    }
+    for (const host of hosts) if (!this.bound.has(host)) this.bound.set(host, await this.bindFreePort(host));
+    return hosts.map((host) => this.bound.get(host)!);
+  }
+
+  private async bindFreePort(host: string): Promise<string> {
+    for (let tries = 0; tries < BIND_TRIES; tries++) {
+      const endpoint = await this.socket.bind(`tcp://${host}:*`);
+      if (isFreePort(Number(endpoint.slice(endpoint.lastIndexOf(":") + 1)))) return endpoint;
+      await this.socket.unbind(endpoint);
+    }
+    throw new NepError(`No free port at ${host}.`);
+  }
+
+  /** Bind or connect at one endpoint, without a master. */
+  async attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
+    if (how === "bind") await this.socket.bind(endpoint);
+    else this.socket.connect(endpoint);
+  }
+
+  wake(): void {
+    this.socket.wake();
+  }
+
+  // ---- sending
+
+  /** Count a message that nobody reads. */
+  skip(): void {
+    this.count++;
+    this.lastStampNs = nowNs();
+  }
+
+  /** Send a message. */
+  send(encoded: Encoded, stampNs = nowNs()): void {
+    const { data, extension } = encoded;
+    const size = data.length;
+    const seq = ++this.count;
+    this.bytes += size;
+    this.lastStampNs = stampNs;
+    if (this.spec.latched || extension || this.bytes >= this.settleAt) {
+      this.sendSettled(this.tail(data, extension && packExtension(extension), seq, stampNs), size);
+    } else if (size < SMALL_BYTES) {
+      this.socket.send({ payload: data, seq, stampNs });
+    } else {
+      this.socket.send({ parts: [this.topic, ...this.tail(data, undefined, seq, stampNs)] });
+    }
+  }
+
+  /** Header, payload and extension of a message. */
+  private tail(data: Buffer, extension: Buffer | undefined, seq: number, stampNs: bigint): Buffer[] {
+    const flags = (this.spec.latched ? Flag.LATCHED : 0) | (extension ? Flag.EXTENSION : 0);
+    const header = this.header(flags, data.length, seq, stampNs);
+    return extension ? [header, data, extension] : [header, data];
+  }
+
+  private header(flags: number, size: number, seq: number, stampNs: bigint): Buffer {
+    return packHeader({ codec: this.spec.codecNumber, flags, size, seq: BigInt(seq), stampNs, publisher: this.spec.id });
+  }
+
+  /** To all at once; while somebody has no room, to everybody else alone. */
+  private sendSettled(tail: Buffer[], size: number): void {
+    this.history.add(tail, size);
+    const windows = [...this.subscriptions.greeted.values()].filter((each) => each.window);
+    const since = this.bytes - size - this.settledBytes; // sent to all
+    if (since > 0) for (const each of windows) each.window!.sent(this.count - 1, since);
+    this.settledBytes = this.bytes;
+    const { tellsAll } = this.subscriptions;
+    const roomy = windows.filter((each) => each.window!.hasRoom(size));
+    if (roomy.length === windows.length && (tellsAll || this.backlog.hasRoom(size))) {
+      this.socket.send({ parts: [this.topic, ...tail] });
+      if (!tellsAll) this.backlog.sent(tail[1]!, size + since);
+      this.settleAt = this.bytes + (tellsAll ? STEP_BYTES : BACKLOG_STEP_BYTES);
+    } else {
+      this.settleAt = 0; // each message is looked at until all have room again
+      for (const each of roomy) this.socket.send({ parts: [each.hello, ...tail] });
+      for (const each of windows) if (!roomy.includes(each)) each.window!.missed();
+    }
+    for (const each of roomy) each.window!.sent(this.count, size);
+    const now = performance.now();
+    for (const each of windows) if (each.window!.takeAsk(now, roomy.includes(each))) this.notify(each.hello, 0);
+  }
+
+  /** The next message for libzmq: those that wait anyway go together where all read that. */
+  private take(queue: Entry[]): Buffer[] {
+    const first = queue.shift()!;
+    if ("parts" in first) return first.parts;
+    if (!this.subscriptions.readsOnePart) return [this.topic, ...this.tail(first.payload, undefined, first.seq, first.stampNs)];
+    const together = [first];
+    let bytes = first.payload.length;
+    const most = this.spec.batch && this.subscriptions.readsBatches ? Math.min(MAX_SENT_TOGETHER, MAX_BATCH) : 1;
+    for (let next = queue[0]; next && "payload" in next && together.length < most && bytes < FULL_BATCH_BYTES; next = queue[0]) {
+      if (next.seq !== first.seq + together.length) break;
+      together.push(next);
+      bytes += next.payload.length;
+      queue.shift();
+    }
+    const header = { codec: this.spec.codecNumber, seq: BigInt(first.seq), publisher: this.spec.id };
+    if (together.length > 1) return [packBatch(this.topic, header, together)];
+    return [onePart(this.topic, { ...header, flags: 0, size: first.payload.length, stampNs: first.stampNs }, first.payload)];
+  }
+
+  /** Resolves when everything is handed to libzmq. */
+  flush(): Promise<void> {
+    return this.socket.flush();
+  }
+
+  // ---- subscribers
+
+  private noteSubscription(event: Buffer): void {
+    const subscriber = this.subscriptions.note(event);
+    if (subscriber !== undefined) this.greet(subscriber);
+    if (this.settleAt === 0) {
+      for (const each of this.subscriptions.greeted.values()) if (each.window?.takeMissed()) this.notify(each.hello, 0);
+    }
+    this.onSubscribers();
+  }
+
+  /** What is kept for late subscribers, then the echo: from here on the subscriber counts. */
+  private greet(subscriber: bigint): void {
+    const greeted = this.subscriptions.greeted.get(subscriber)!;
+    for (const each of this.history.kept) this.socket.send({ parts: [greeted.hello, ...each.parts] });
+    if (this.history.kept.length > 0) greeted.window?.sent(this.count, this.history.bytes);
+    this.notify(greeted.hello, 0);
+  }
+
+  private notify(hello: Buffer, flags: number): void {
+    this.socket.send({ parts: [hello, this.header(flags, 0, this.count, nowNs())] });
+  }
+
+  /** Tell all subscribers that nothing comes any more. */
+  sayBye(): void {
+    for (const each of this.subscriptions.greeted.values()) this.notify(each.hello, Flag.BYE);
+  }
+
+  close(lingerMs = 0): void {
+    this.socket.close(lingerMs);
+  }
+}

@@ -1,0 +1,111 @@
+import { ClosedError, MasterUnreachableError, NepError, RequestRefusedError, WireError } from "../errors.js";
+import { type Answer, decodeAnswer, encodeRequest, type Request } from "../protocol/requests.js";
+import { DealerSocket } from "../sockets/socket.js";
+
+interface PendingCall {
+  readonly request: Request;
+  readonly timer: NodeJS.Timeout | undefined;
+  readonly onReply: ((answer: Answer) => void) | undefined;
+  readonly resolve: (answer: Answer) => void;
+  readonly reject: (error: NepError) => void;
+}
+
+/**
+ * Requests to the master over one DEALER. A connection that stays silent is replaced by a new one, over which
+ * the calls under way are sent again: so nothing piles up while the master is away.
+ */
+export class RpcClient {
+  /** When the master was last heard, by `performance.now()`. */
+  heardAt = -Infinity;
+  private nextCall = 1;
+  private readonly pending = new Map<number, PendingCall>();
+  private socket: DealerSocket;
+  private isClosed = false;
+
+  constructor(
+    readonly address: string,
+    private readonly onAnswer: (answer: Answer) => void,
+    private readonly onRefused: (error: WireError) => void,
+    private readonly isHeld: () => boolean,
+  ) {
+    this.socket = this.connect();
+  }
+
+  private connect(): DealerSocket {
+    return new DealerSocket(
+      `tcp://${this.address}`,
+      (parts) => this.read(parts),
+      () => (this.pending.size > 0 ? "brief" : this.isHeld() ? "long" : "none"),
+    );
+  }
+
+  /** Replace the connection and send the calls that wait for an answer again. */
+  reconnect(): void {
+    if (this.isClosed) return;
+    this.socket.close();
+    this.socket = this.connect();
+    for (const [call, each] of this.pending) this.socket.send([encodeRequest(each.request, call)]);
+  }
+
+  /** Send a request whose answer only reaches `onAnswer`. */
+  tell(request: Request): void {
+    if (!this.isClosed) this.socket.send([encodeRequest(request, this.nextCall++)]);
+  }
+
+  /**
+   * Send a request and return its answer.
+   *
+   * @param timeoutS Seconds; undefined waits until the master answers.
+   * @param onReply Called with the answer before anything else that the master says is read.
+   * @throws {MasterUnreachableError} when there was no answer in time.
+   * @throws {RequestRefusedError} when the master refused it.
+   */
+  ask(request: Request, timeoutS?: number, onReply?: (answer: Answer) => void): Promise<Answer> {
+    if (this.isClosed) return Promise.reject(new ClosedError("The node is closed."));
+    return new Promise<Answer>((resolve, reject) => {
+      const call = this.nextCall++;
+      const expire = (): void => {
+        this.pending.delete(call);
+        reject(new MasterUnreachableError(this.address));
+      };
+      const timer = timeoutS === undefined ? undefined : setTimeout(expire, timeoutS * 1000);
+      this.pending.set(call, { request, timer, onReply, resolve, reject });
+      this.socket.send([encodeRequest(request, call)]);
+    });
+  }
+
+  wake(): void {
+    this.socket.wake();
+  }
+
+  close(): void {
+    this.isClosed = true;
+    this.socket.close();
+    for (const each of this.pending.values()) {
+      clearTimeout(each.timer);
+      each.reject(new ClosedError("The node is closed."));
+    }
+    this.pending.clear();
+  }
+
+  private read(parts: Buffer[]): void {
+    let read: { call: number; answer: Answer };
+    try {
+      if (parts.length !== 1) throw new WireError("part-count", `A reply has 1 part, this one has ${parts.length}.`);
+      read = decodeAnswer(parts[0]!);
+    } catch (error) {
+      if (!(error instanceof WireError)) throw error;
+      this.onRefused(error);
+      return;
+    }
+    this.heardAt = performance.now();
+    this.onAnswer(read.answer);
+    const pending = this.pending.get(read.call);
+    if (!pending) return;
+    this.pending.delete(read.call);
+    clearTimeout(pending.timer);
+    pending.onReply?.(read.answer);
+    if (read.answer.is === "refused") pending.reject(new RequestRefusedError(read.answer.reason));
+    else pending.resolve(read.answer);
+  }
+}

@@ -1,0 +1,336 @@
+/**
+ * The only module that uses zeromq.js: the sockets of the wire behind one narrow interface.
+ *
+ * zeromq.js 6 refuses a second `send` while one is under way (EBUSY; zeromq.js #381, #406, #427), so each
+ * socket has its own send queue. A pending `receive` keeps a Node.js process alive; a `Reader` therefore polls
+ * with an unreferenced timer while its owner needs nothing.
+ */
+import { Dealer, Router, Subscriber, XPublisher } from "zeromq";
+
+const ZMQ_SNDHWM = 23;
+const HELD_RECEIVE_MS = 1000;
+const BRIEF_RECEIVE_MS = 20;
+const POLL_MS = 10;
+const MAX_TURN_MS = 10; // then timers run: renewals of the lease above all
+
+const immediate = (): Promise<void> => new Promise((resolve) => setImmediate(resolve));
+
+type ReadableSocket = Dealer | Router | Subscriber | XPublisher;
+type WritableSocket = Dealer | Router | XPublisher;
+
+/** How long a {@link Reader} may keep the process alive: not at all, for a moment, or until it is closed. */
+export type Hold = "none" | "brief" | "long";
+
+/** Reads a socket until it is closed and hands each multipart message to `onParts`. */
+class Reader {
+  private isClosed = false;
+  private isReading = false;
+  private timer: NodeJS.Timeout | undefined;
+
+  constructor(
+    private readonly socket: ReadableSocket,
+    private readonly onParts: (parts: Buffer[]) => void,
+    private readonly hold: () => Hold,
+  ) {
+    this.wake();
+  }
+
+  /** Read now; call it when `hold` may have changed to a longer one. */
+  wake(): void {
+    if (this.isClosed || this.isReading) return;
+    clearTimeout(this.timer);
+    this.isReading = true;
+    void this.read();
+  }
+
+  close(): void {
+    this.isClosed = true;
+    clearTimeout(this.timer);
+  }
+
+  private async read(): Promise<void> {
+    try {
+      while (!this.isClosed) {
+        const hold = this.hold();
+        if (hold === "none" && !this.socket.readable) break;
+        await this.receive(hold);
+      }
+    } catch (error) {
+      if (!this.isClosed && !this.socket.closed) process.emitWarning(error as Error);
+    } finally {
+      this.isReading = false;
+    }
+    if (!this.isClosed && !this.socket.closed) this.timer = setTimeout(() => this.wake(), POLL_MS).unref();
+  }
+
+  private async receive(hold: Hold): Promise<void> {
+    this.socket.receiveTimeout = hold === "long" ? HELD_RECEIVE_MS : BRIEF_RECEIVE_MS;
+    const turnEnds = performance.now() + MAX_TURN_MS;
+    try {
+      do {
+        this.onParts((await this.socket.receive()) as Buffer[]);
+      } while (!this.isClosed && this.socket.readable && performance.now() < turnEnds);
+      if (performance.now() >= turnEnds) await immediate();
+    } catch (error) {
+      if ((error as NodeJS.ErrnoException).code !== "EAGAIN") throw error;
+    }
+  }
+}
+
+/** Sends in order; whatever zeromq.js can't take yet waits in `queue`. */
+class Sender<T> {
+  private readonly queue: T[] = [];
+  /** Parts that zeromq.js refused because another send is under way. */
+  private unsent: Buffer[] | undefined;
+  private last: Promise<void> = Promise.resolve();
+  private waiting: Promise<void> | undefined;
+
+  constructor(
+    private readonly socket: WritableSocket,
+    /** Takes entries from the queue, oldest first, and returns the parts of the next message. */
+    private readonly take: (queue: T[]) => Buffer[],
+  ) {}
+
+  get length(): number {
+    return this.queue.length;
+  }
+
+  send(entry: T): void {
+    this.queue.push(entry);
+    if (!this.waiting) this.pump();
+  }
+
+  /** Resolves when everything is handed to libzmq. */
+  async flush(): Promise<void> {
+    while (this.waiting) await this.waiting;
+    await this.last;
+  }
+
+  private pump(): void {
+    while ((this.unsent || this.queue.length > 0) && !this.socket.closed) {
+      const parts = this.unsent ?? this.take(this.queue);
+      if (!this.trySend(parts)) {
+        this.unsent = parts;
+        this.waiting = this.last.then(() => {
+          this.waiting = undefined;
+          this.pump();
+        });
+        return;
+      }
+      this.unsent = undefined;
+    }
+  }
+
+  private trySend(parts: Buffer[]): boolean {
+    try {
+      // A ROUTER's EHOSTUNREACH, and a socket that is being closed: nobody is there to read it.
+      this.last = (this.socket as XPublisher).send(parts).catch(() => undefined);
+      return true;
+    } catch (error) {
+      if ((error as NodeJS.ErrnoException).code === "EBUSY") return false;
+      if (this.socket.closed) return true;
+      throw error;
+    }
+  }
+}
+
+const firstEntry = (queue: Buffer[][]): Buffer[] => queue.shift()!;
+
+/** The node's connection to the master, or a client's to a server: a DEALER. */
+export class DealerSocket {
+  private readonly socket = new Dealer({ linger: 0 });
+  private readonly sender = new Sender<Buffer[]>(this.socket, firstEntry);
+  private readonly reader: Reader;
+
+  constructor(endpoint: string, onParts: (parts: Buffer[]) => void, hold: () => Hold, onDisconnect?: () => void) {
+    if (onDisconnect) {
+      this.socket.events.on("disconnect", onDisconnect);
+    }
+    this.socket.connect(endpoint);
+    this.reader = new Reader(this.socket, onParts, hold);
+  }
+
+  send(parts: Buffer[]): void {
+    this.sender.send(parts);
+    this.wake();
+  }
+
+  wake(): void {
+    this.reader.wake();
+  }
+
+  /** Resolves when everything is handed to libzmq. */
+  flush(): Promise<void> {
+    return this.sender.flush();
+  }
+
+  close(): void {
+    this.reader.close();
+    if (!this.socket.closed) this.socket.close();
+  }
+}
+
+/** A server's socket: a ROUTER. */
+export class RouterSocket {
+  private readonly socket: Router;
+  private readonly sender: Sender<Buffer[]>;
+  private reader: Reader | undefined;
+
+  /** @param maxBytes Peers that send a larger part are disconnected. */
+  constructor(maxBytes: number) {
+    this.socket = new Router({ linger: 1000, maxMessageSize: maxBytes });
+    this.sender = new Sender<Buffer[]>(this.socket, firstEntry);
+  }
+
+  bind(endpoint: string): Promise<string> {
+    return bindTo(this.socket, endpoint);
+  }
+
+  unbind(endpoint: string): Promise<void> {
+    return this.socket.unbind(endpoint);
+  }
+
+  read(onParts: (parts: Buffer[]) => void, hold: () => Hold): void {
+    this.reader = new Reader(this.socket, onParts, hold);
+  }
+
+  send(parts: Buffer[]): void {
+    this.sender.send(parts);
+  }
+
+  flush(): Promise<void> {
+    return this.sender.flush();
+  }
+
+  close(): void {
+    this.reader?.close();
+    if (!this.socket.closed) this.socket.close();
+  }
+}
+
+/** A subscriber's socket: a SUB that connects. */
+export class SubSocket {
+  private readonly socket: Subscriber;
+  private reader: Reader | undefined;
+
+  /** @param receiveMark High-water mark in messages. */
+  constructor(receiveMark: number) {
+    this.socket = new Subscriber({ linger: 0, receiveHighWaterMark: receiveMark });
+    // zeromq.js has no name for it; libzmq silently drops filters beyond 1000 otherwise.
+    (this.socket as unknown as { setInt32Option(option: number, value: number): void }).setInt32Option(ZMQ_SNDHWM, 0);
+  }
+
+  read(onParts: (parts: Buffer[]) => void, hold: () => Hold): void {
+    this.reader = new Reader(this.socket, onParts, hold);
+  }
+
+  wake(): void {
+    this.reader?.wake();
+  }
+
+  /** Whether something waits to be read. */
+  get hasInput(): boolean {
+    return !this.socket.closed && this.socket.readable;
+  }
+
+  filter(filter: Buffer): void {
+    this.socket.subscribe(filter);
+  }
+
+  /** Tell all publishers something by a filter that is taken back at once. */
+  say(filter: Buffer): void {
+    if (this.socket.closed) return;
+    this.socket.subscribe(filter);
+    this.socket.unsubscribe(filter);
+  }
+
+  connect(endpoint: string): void {
+    this.socket.connect(endpoint);
+  }
+
+  bind(endpoint: string): Promise<string> {
+    return bindTo(this.socket, endpoint);
+  }
+
+  disconnect(endpoint: string): void {
+    try {
+      if (!this.socket.closed) this.socket.disconnect(endpoint);
+    } catch (error) {
+      if ((error as NodeJS.ErrnoException).code !== "ENOENT") throw error; // the peer has gone already
+    }
+  }
+
+  close(): void {
+    this.reader?.close();
+    if (!this.socket.closed) this.socket.close();
+  }
+}
+
+/** A publisher's socket: an XPUB that binds and sees each subscription. */
+export class XpubSocket<T> {
+  private readonly socket: XPublisher;
+  private readonly sender: Sender<T>;
+  private reader: Reader | undefined;
+
+  /**
+   * @param sendMark High-water mark in messages for each connection.
+   * @param maxSubscriptionBytes Peers that subscribe to more are disconnected.
+   * @param take Takes queued entries, oldest first, and returns the parts of the next message.
+   */
+  constructor(sendMark: number, maxSubscriptionBytes: number, take: (queue: T[]) => Buffer[]) {
+    this.socket = new XPublisher({ linger: 0, sendHighWaterMark: sendMark, maxMessageSize: maxSubscriptionBytes });
+    this.socket.verbosity = "allSubs";
+    this.sender = new Sender<T>(this.socket, take);
+  }
+
+  get isClosed(): boolean {
+    return this.socket.closed;
+  }
+
+  /** Number of entries that libzmq has not taken yet. */
+  get queueLength(): number {
+    return this.sender.length;
+  }
+
+  read(onEvent: (event: Buffer) => void, hold: () => Hold): void {
+    this.reader = new Reader(this.socket, (parts) => onEvent(parts[0]!), hold);
+  }
+
+  wake(): void {
+    this.reader?.wake();
+  }
+
+  bind(endpoint: string): Promise<string> {
+    return bindTo(this.socket, endpoint);
+  }
+
+  connect(endpoint: string): void {
+    this.socket.connect(endpoint);
+  }
+
+  async unbind(endpoint: string): Promise<void> {
+    if (!this.socket.closed) await this.socket.unbind(endpoint);
+  }
+
+  send(entry: T): void {
+    if (!this.socket.closed) this.sender.send(entry);
+  }
+
+  /** Resolves when everything is handed to libzmq. */
+  flush(): Promise<void> {
+    return this.sender.flush();
+  }
+
+  /** Close. What libzmq still holds is sent for at most `lingerMs`. */
+  close(lingerMs = 0): void {
+    this.reader?.close();
+    if (this.socket.closed) return;
+    this.socket.linger = lingerMs;
+    this.socket.close();
+  }
+}
+
+async function bindTo(socket: Router | Subscriber | XPublisher, endpoint: string): Promise<string> {
+  await socket.bind(endpoint);
+  return socket.lastEndpoint ?? endpoint;
+}

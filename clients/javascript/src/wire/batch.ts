@@ -1,0 +1,65 @@
+import { WireError } from "../errors.js";
+import { Flag, HEADER_BYTES, type Header, readHeader, writeHeader } from "./header.js";
+import { splitOnePart } from "./parts.js";
+
+export const MAX_BATCH = 256;
+
+/** One message of a batch. */
+export interface BatchEntry {
+  readonly stampNs: bigint;
+  readonly payload: Buffer;
+}
+
+/**
+ * Return several messages of one publisher as one part.
+ *
+ * @param topic The topic part.
+ * @param first Codec, publisher and seq of the first message; the others count on from it.
+ * @param entries 1 to 256 messages.
+ */
+export function packBatch(topic: Buffer, first: Pick<Header, "codec" | "seq" | "publisher">, entries: readonly BatchEntry[]): Buffer {
+  const tableBytes = 4 + 12 * entries.length;
+  const size = entries.reduce((sum, each) => sum + each.payload.length, tableBytes);
+  const part = Buffer.allocUnsafe(topic.length + HEADER_BYTES + size);
+  topic.copy(part, 0);
+  writeHeader(part, topic.length, { ...first, flags: Flag.BATCH, size, stampNs: entries[0]!.stampNs });
+  let at = topic.length + HEADER_BYTES;
+  at = part.writeUInt32LE(entries.length, at);
+  for (const each of entries) at = part.writeUInt32LE(each.payload.length, at);
+  for (const each of entries) at = part.writeBigUInt64LE(each.stampNs, at);
+  for (const each of entries) at += each.payload.copy(part, at);
+  return part;
+}
+
+/** Read the messages in what follows the header of a batch. @throws {WireError} */
+export function readBatchBody(body: Buffer): BatchEntry[] {
+  const count = body.length >= 4 ? body.readUInt32LE(0) : 0;
+  if (count < 1 || count > MAX_BATCH) {
+    throw new WireError("batch-count", `A batch has 1 to ${MAX_BATCH} messages, this one has ${count}.`);
+  }
+  let at = 4 + 12 * count;
+  if (body.length < at) throw new WireError("batch-table", "The batch ends within its table.");
+  const entries: BatchEntry[] = [];
+  for (let index = 0; index < count; index++) {
+    const end = at + body.readUInt32LE(4 + 4 * index);
+    if (end > body.length) break;
+    const stampNs = body.readBigUInt64LE(4 + 4 * count + 8 * index);
+    entries.push({ stampNs, payload: body.subarray(at, end) });
+    at = end;
+  }
+  if (entries.length !== count || at !== body.length) {
+    throw new WireError("batch-sizes", "The messages of the batch have other sizes than its table says.");
+  }
+  return entries;
+}
+
+/** Read a batch from its one part. @throws {WireError} */
+export function readBatch(part: Buffer): { topic: Buffer; header: Header; entries: BatchEntry[] } {
+  const [topic, head, body] = splitOnePart(part);
+  const header = readHeader(head);
+  if (header.flags !== Flag.BATCH) throw new WireError("batch-form", "A batch has no other flags.");
+  if (header.size !== body.length) {
+    throw new WireError("payload-size", `The header says ${header.size} bytes, the batch has ${body.length}.`);
+  }
+  return { topic, header, entries: readBatchBody(body) };
+}

@@ -1,0 +1,85 @@
+/** What a hello filter says: who subscribes to what, and which forms of messages it reads. */
+export interface Hello {
+  readonly subscriber: bigint;
+  readonly topic: string;
+  /** 0 three parts only, 1 also one part, 2 also answers echoes, 3 also reads batches. */
+  readonly level: 0 | 1 | 2 | 3;
+}
+
+/** A subscriber has read everything of a publisher up to `seq`. */
+export interface Read {
+  readonly subscriber: bigint;
+  readonly publisher: bigint;
+  readonly seq: bigint;
+  /** How many bytes it wants under way at most. */
+  readonly boundBytes: bigint;
+}
+
+/** A subscriber reads a publisher's shared memory of this generation. */
+export interface Shares {
+  readonly subscriber: bigint;
+  readonly publisher: bigint;
+  readonly generation: bigint;
+}
+
+const HELLO = /^\xffhello([123]?)\/([0-9a-fA-F]{16})\//;
+const READ = /^\xffread\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})$/;
+const SHARES = /^\xffshares\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})$/;
+const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
+
+function hex(value: bigint): string {
+  return value.toString(16).padStart(16, "0");
+}
+
+function prefixed(text: string): Buffer {
+  return Buffer.concat([Buffer.from([0xff]), Buffer.from(text, "utf8")]);
+}
+
+/** Return the filter by which a subscriber says hello: also the first part of what is sent to it alone. */
+export function helloPart(hello: Hello): Buffer {
+  return prefixed(`hello${hello.level || ""}/${hex(hello.subscriber)}/${hello.topic}`);
+}
+
+/** Parse a hello filter; undefined for anything else. */
+export function parseHello(part: Buffer): Hello | undefined {
+  const match = HELLO.exec(part.toString("latin1", 0, 32));
+  if (!match) return undefined;
+  try {
+    const topic = utf8.decode(part.subarray(match[0].length));
+    return { subscriber: BigInt(`0x${match[2]}`), topic, level: Number(match[1]) as Hello["level"] };
+  } catch {
+    return undefined;
+  }
+}
+
+/** Return the filter that answers an echo. */
+export function readPart(read: Read): Buffer {
+  return prefixed(`read/${[read.subscriber, read.publisher, read.seq, read.boundBytes].map(hex).join("/")}`);
+}
+
+/** Parse the answer to an echo; undefined for anything else. */
+export function parseRead(part: Buffer): Read | undefined {
+  const numbers = parseNumbers(READ, part);
+  if (!numbers) return undefined;
+  const [subscriber, publisher, seq, boundBytes] = numbers;
+  return { subscriber: subscriber!, publisher: publisher!, seq: seq!, boundBytes: boundBytes! };
+}
+
+/** Return the filter that answers an offer of shared memory. */
+export function sharesPart(shares: Shares): Buffer {
+  return prefixed(`shares/${[shares.subscriber, shares.publisher, shares.generation].map(hex).join("/")}`);
+}
+
+/** Parse the answer to an offer; undefined for anything else. */
+export function parseShares(part: Buffer): Shares | undefined {
+  const numbers = parseNumbers(SHARES, part);
+  if (!numbers) return undefined;
+  const [subscriber, publisher, generation] = numbers;
+  return { subscriber: subscriber!, publisher: publisher!, generation: generation! };
+}
+
+function parseNumbers(pattern: RegExp, part: Buffer): bigint[] | undefined {
+  if (part.length > 80) return undefined;
+  const match = pattern.exec(part.toString("latin1"));
+  return match ? match.slice(1).map((digits) => BigInt(`0x${digits}`)) : undefined;
+}
