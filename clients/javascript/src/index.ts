@@ -10,5 +10,9 @@ export { Publisher } from "./pubsub/publisher.js";
 export type { PublisherOptions } from "./pubsub/publisher.js";
 export { Subscriber } from "./pubsub/subscriber.js";
 export type { MessageCallback, SubscribeOptions } from "./pubsub/subscriber.js";
+export { Client } from "./services/client.js";
+export type { CallOptions, ClientOptions } from "./services/client.js";
+export { Server } from "./services/server.js";
+export type { ServiceCallback } from "./services/server.js";
 
 export default { ...errors, Node, node: Node };

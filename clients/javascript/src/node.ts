@@ -4,6 +4,9 @@ import { NepError } from "./errors.js";
 import { Publisher, type PublisherHost, type PublisherOptions } from "./pubsub/publisher.js";
 import { type MessageCallback, type SubscribeOptions, Subscriber, type SubscriberHost } from "./pubsub/subscriber.js";
 import type { NodeRecord } from "./protocol/requests.js";
+import { Client, type ClientHost, type ClientOptions } from "./services/client.js";
+import { Server, type ServerHost, type ServiceCallback } from "./services/server.js";
+import { SERVICE_TYPE, topicOfService } from "./services/wire.js";
 import type { Hold } from "./sockets/socket.js";
 import { MASTER_WAIT_S, MasterSession } from "./session/master_session.js";
 import { hostOf, LOOPBACK, masterAddress } from "./system/addresses.js";
@@ -177,6 +180,67 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return subscriber;
   }
 
+  // ---- services
+
+  /**
+   * Answer the calls of a service. Resolves when the service is registered.
+   *
+   * @throws {MasterUnreachableError | BadTopicError | RequestRefusedError}
+   */
+  serve<Request = unknown, Answer = unknown>(service: string, callback: ServiceCallback<Request, Answer>): Promise<Server> {
+    return this.makeServer(service, callback as ServiceCallback, this.masterWaitS).ready;
+  }
+
+  /** Return a client of a service; there need not be a server yet. */
+  client<Request = unknown, Answer = unknown>(service: string, options: ClientOptions = {}): Client<Request, Answer> {
+    return this.makeClient<Request, Answer>(service, options);
+  }
+
+  private makeServer(service: string, callback: ServiceCallback, waitS: number | undefined): Server {
+    this.checkOpen();
+    const topic = topicOfService(service);
+    const number = this.nextNumber();
+    const id = idFrom(this.record.key, number);
+    const session = this.session();
+    const host: ServerHost = {
+      warn: (message) => this.warn(message),
+      register: (owner) => {
+        this.holders.add(owner);
+        this.wake();
+        const record = { id, number, topic, msg_type: SERVICE_TYPE, codec: SERVICE_TYPE };
+        return this.patiently(session, waitS, session.addPublisher(record, owner, waitS));
+      },
+      unregister: (owner) => {
+        this.holders.delete(owner);
+        session.removePublisher(id, BigInt(owner.calls));
+        this.open.delete(owner);
+      },
+    };
+    const server = new Server(id, service, callback, host);
+    this.open.add(server);
+    return server;
+  }
+
+  private makeClient<Request, Answer>(service: string, options: ClientOptions): Client<Request, Answer> {
+    this.checkOpen();
+    const topic = topicOfService(service);
+    const number = this.nextNumber();
+    const id = idFrom(this.record.key, number);
+    const session = this.session();
+    const host: ClientHost = {
+      warn: (message) => this.warn(message),
+      register: (owner) =>
+        this.patiently(session, this.masterWaitS, session.addSubscriber({ id, number, topic, msg_type: SERVICE_TYPE }, owner, this.masterWaitS)),
+      unregister: (owner) => {
+        session.removeSubscriber(id);
+        this.open.delete(owner as Client);
+      },
+    };
+    const client = new Client<Request, Answer>(id, service, options, host);
+    this.open.add(client);
+    return client;
+  }
+
   /** Warn when there is no master, and when registering fails. */
   private async patiently<R>(session: MasterSession, waitS: number | undefined, registered: Promise<R>): Promise<R> {
     const warnAfter = (): void =>
@@ -213,6 +277,16 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   /** Same as {@link new_sub}, with a callback. */
   new_callback<T = unknown>(topic: string, type: string, callback: PayloadCallback<T>, configuration?: Configuration): Subscriber<T> {
     return this.new_sub<T>(topic, type, callback, configuration);
+  }
+
+  /** Answer the calls of a service. Waits for a master as long as there is none. */
+  new_server<Request = unknown, Answer = unknown>(service: string, callback: ServiceCallback<Request, Answer>): Server {
+    return this.makeServer(service, callback as ServiceCallback, undefined);
+  }
+
+  /** Same as {@link client}. */
+  new_client<Request = unknown, Answer = unknown>(service: string, options: ClientOptions = {}): Client<Request, Answer> {
+    return this.client<Request, Answer>(service, options);
   }
 
   /** Connect through the master at `ip`; `127.0.0.1` means the node's own master. */

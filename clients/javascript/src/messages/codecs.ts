@@ -1,6 +1,7 @@
 /** Codecs: payload ↔ bytes. A codec has a name (in the graph) and a number (on the wire). */
 import { DecodeError, EncodeError } from "../errors.js";
-import { decodeUtf8, type Extension } from "../wire/parts.js";
+import type { Extension } from "../wire/extension.js";
+import { decodeUtf8 } from "../wire/utf8.js";
 import { decodeImage, encodeImage } from "./image.js";
 import { countNonFinite, isTooDeep, MAX_LEVELS } from "./nesting.js";
 import { pack, unpack, withWideIntegers } from "./packing.js";

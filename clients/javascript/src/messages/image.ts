@@ -1,6 +1,6 @@
 /** Pictures: JPEG or PNG files and raw pixels with their shape. The bytes are neither encoded nor decoded here. */
 import { DecodeError, EncodeError } from "../errors.js";
-import type { Extension } from "../wire/parts.js";
+import type { Extension } from "../wire/extension.js";
 
 /** A picture as it is published and received on topics of type `image`. */
 export interface Image {

@@ -1,5 +1,5 @@
 import { type Codec } from "./codecs.js";
-import type { Extension } from "../wire/parts.js";
+import type { Extension } from "../wire/extension.js";
 
 /** A received message. */
 export class Message<T = unknown> {

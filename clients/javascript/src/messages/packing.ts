@@ -18,6 +18,21 @@ export function unpack(packed: Uint8Array): unknown {
   return decode(packed, DECODE_OPTIONS);
 }
 
+/** Decode msgpack whose maps have text keys only. @throws if it is none. */
+export function unpackWithTextKeys(packed: Uint8Array): unknown {
+  return decode(packed, { ...DECODE_OPTIONS, mapKeyConverter: textKey });
+}
+
+function textKey(key: unknown): string {
+  if (typeof key !== "string") throw new RangeError(`The key ${String(key)} is no text.`);
+  return key;
+}
+
+/** Whether a decoded value is a map. */
+export function isMap(value: unknown): value is Record<string, unknown> {
+  return value !== null && typeof value === "object" && !Array.isArray(value) && !(value instanceof Uint8Array) && !(value instanceof Date);
+}
+
 /** Return a value whose integers beyond 32 bits are `bigint`: msgpack would have them as floats. */
 export function withWideIntegers(value: unknown): unknown {
   if (typeof value === "number") return asInteger(value);

@@ -1,6 +1,6 @@
 /** What nodes and the master say to each other, as values, and their form on the wire. */
 import { WireError } from "../errors.js";
-import { pack, unpack, withWideIntegers } from "../messages/packing.js";
+import { isMap, pack, unpack, withWideIntegers } from "../messages/packing.js";
 
 /** Largest value of a counter: larger ones are told as this. */
 export const MAX_COUNT = 2n ** 63n - 1n;
@@ -191,10 +191,6 @@ function readRemote(each: Fields): RemotePublisher {
     history: Number(record.integer("history", 0n)),
     nodeName: each.text("node_name"),
   };
-}
-
-function isMap(value: unknown): value is Record<string, unknown> {
-  return value !== null && typeof value === "object" && !Array.isArray(value) && !(value instanceof Uint8Array) && !(value instanceof Date);
 }
 
 /** Typed access to a decoded map; throws `WireError` that names the field. */

@@ -95,7 +95,7 @@ export class Sources {
   private leapt(source: Source, last: bigint, seq: bigint): boolean {
     if (source.leaptTo === 0n || source.leaptTo !== seq - 1n) {
       source.leaptTo = seq;
-      throw new WireError("seq-gap", `The message's number leaps from ${last} to ${seq}.`);
+      throw new WireError("seq-leap", `The message's number leaps from ${last} to ${seq}.`);
     }
     source.leaptTo = 0n; // it goes on from there: counting begins anew
     source.promised = 0n;

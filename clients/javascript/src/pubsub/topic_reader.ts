@@ -3,10 +3,9 @@ import { codecNumbered } from "../messages/codecs.js";
 import { Message } from "../messages/message.js";
 import type { ReachablePublisher } from "../session/master_session.js";
 import { SubSocket, type Hold } from "../sockets/socket.js";
-import { readBatch } from "../wire/batch.js";
-import { Flag, type Header, HEADER_BYTES, readHeaderPart } from "../wire/header.js";
+import { Flag, type Header, readHeaderPart } from "../wire/header.js";
 import { helloPart, readPart } from "../wire/notices.js";
-import { type Extension, NO_EXTENSION, readRest, splitOnePart, topicPart } from "../wire/parts.js";
+import { readRest, splitParts, topicPart, type WireMessage } from "../wire/parts.js";
 import { WINDOW_BYTES } from "./byte_window.js";
 import { Sources, type Source } from "./loss.js";
 
@@ -133,47 +132,28 @@ export class TopicReader {
   }
 
   private parse(parts: Buffer[]): void {
-    const first = parts[0]!;
-    const isAlone = first.equals(this.hello);
-    if (isAlone && parts.length === 2) {
+    if (parts.length === 2 && parts[0]!.equals(this.hello)) {
       this.notice(readHeaderPart(parts[1]!));
-    } else if (isAlone || first.equals(this.topicPart)) {
-      const { header, payload, extension } = readRest(parts.slice(1));
-      this.message(header, payload, extension, isAlone);
-    } else if (parts.length === 1 && first.subarray(0, this.topicPart.length).equals(this.topicPart)) {
-      this.onePart(first);
-    } else {
-      throw new WireError("topic", "A message begins with something else than its topic.");
-    }
-  }
-
-  private onePart(part: Buffer): void {
-    const at = this.topicPart.length;
-    if (part.length >= at + HEADER_BYTES && part.readUInt16LE(at + 2) & Flag.BATCH) {
-      const { header, entries } = readBatch(part);
-      let { seq } = header;
-      for (const { stampNs, payload } of entries) {
-        this.message({ ...header, flags: 0, seq, stampNs, size: payload.length }, payload, NO_EXTENSION, false);
-        seq++;
-      }
       return;
     }
-    const [, head, body] = splitOnePart(part);
-    const { header, payload, extension } = readRest([head, body]);
-    this.message(header, payload, extension, false);
+    const { first, rest } = splitParts(parts);
+    const isAlone = first.equals(this.hello);
+    if (!isAlone && !first.equals(this.topicPart)) {
+      throw new WireError("first-part", "A message begins with something else than its topic.");
+    }
+    for (const each of readRest(rest, parts.length === 1)) this.message(each, isAlone);
   }
 
-  private message(header: Header, payload: Buffer, extension: Extension, isAlone: boolean): void {
-    const codec = codecNumbered(header.codec);
-    if (!codec) throw new WireError("codec", `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`);
-    if (header.flags & (Flag.SHARED | Flag.BATCH)) {
-      throw new WireError("shared", "The payload lies in shared memory, which was not agreed on.");
+  private message({ header, payload, extension }: WireMessage, isAlone: boolean): void {
+    const { publisher, seq, flags } = header;
+    if (flags & Flag.SHARED) {
+      throw new WireError("shared-memory", "The payload lies in shared memory, which was not agreed on.");
     }
-    const { publisher, seq } = header;
     if (!isAlone && this.sources.isEarly(publisher)) return;
     if (!this.sources.arrived(publisher, seq, isAlone)) return;
     const type = this.sources.byId.get(publisher)?.remote?.msgType ?? this.type;
-    const isLatched = (header.flags & Flag.LATCHED) !== 0;
+    const codec = codecNumbered(header.codec)!;
+    const isLatched = (flags & Flag.LATCHED) !== 0;
     this.host.onMessage(new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched), this);
   }
 
@@ -193,6 +173,6 @@ export class TopicReader {
       }
     }
     this.host.onGreeted();
-    if (!isPossible) throw new WireError("seq-gap", `The publisher's number leaps from ${source.last} to ${seq}.`);
+    if (!isPossible) throw new WireError("seq-leap", `The publisher's number leaps from ${source.last} to ${seq}.`);
   }
 }

@@ -1,7 +1,5 @@
-import { XpubSocket } from "../sockets/socket.js";
-import type { Hold } from "../sockets/socket.js";
-import { isFreePort } from "../system/addresses.js";
-import { NepError } from "../errors.js";
+import { Bindings } from "../sockets/bindings.js";
+import { type Hold, XpubSocket } from "../sockets/socket.js";
 import { nowNs } from "../system/clock.js";
 import { MAX_BATCH, packBatch } from "../wire/batch.js";
 import { Flag, packHeader } from "../wire/header.js";
@@ -16,7 +14,6 @@ const MAX_SUBSCRIPTION_BYTES = 4096;
 const SMALL_BYTES = 16_384; // larger messages: copying them together costs more than parts
 const MAX_SENT_TOGETHER = 64;
 const FULL_BATCH_BYTES = 65_536;
-const BIND_TRIES = 100;
 
 /** A message that waits for the socket and goes out alone or in a batch, or finished parts. */
 type Entry = { readonly payload: Buffer; readonly seq: number; readonly stampNs: bigint } | { readonly parts: Buffer[] };
@@ -45,8 +42,7 @@ export class XpubTransport {
   private readonly topic: Buffer;
   private readonly history: History;
   private readonly backlog = new Backlog();
-  private readonly bound = new Map<string, string>();
-  private moving: Promise<unknown> = Promise.resolve();
+  private readonly bindings: Bindings;
   private settledBytes = 0;
   private settleAt = 0; // from so many bytes on a message is not simply sent to all
 
@@ -60,6 +56,7 @@ export class XpubTransport {
     this.history = new History(spec.history);
     this.subscriptions = new Subscriptions(spec.topic, spec.id, refuse);
     this.socket = new XpubSocket<Entry>(SEND_MARK, MAX_SUBSCRIPTION_BYTES, (queue) => this.take(queue));
+    this.bindings = new Bindings(this.socket);
     this.socket.read((event) => this.noteSubscription(event), hold);
   }
 
@@ -67,28 +64,7 @@ export class XpubTransport {
 
   /** Be bound at these hosts and no others, each with a port of its own. Returns the endpoints. */
   move(hosts: readonly string[]): Promise<string[]> {
-    const moved = this.moving.then(() => this.bindAt(hosts));
-    this.moving = moved.catch(() => undefined);
-    return moved;
-  }
-
-  private async bindAt(hosts: readonly string[]): Promise<string[]> {
-    for (const [host, endpoint] of this.bound) {
-      if (hosts.includes(host)) continue;
-      this.bound.delete(host);
-      await this.socket.unbind(endpoint);
-    }
-    for (const host of hosts) if (!this.bound.has(host)) this.bound.set(host, await this.bindFreePort(host));
-    return hosts.map((host) => this.bound.get(host)!);
-  }
-
-  private async bindFreePort(host: string): Promise<string> {
-    for (let tries = 0; tries < BIND_TRIES; tries++) {
-      const endpoint = await this.socket.bind(`tcp://${host}:*`);
-      if (isFreePort(Number(endpoint.slice(endpoint.lastIndexOf(":") + 1)))) return endpoint;
-      await this.socket.unbind(endpoint);
-    }
-    throw new NepError(`No free port at ${host}.`);
+    return this.bindings.move(hosts);
   }
 
   /** Bind or connect at one endpoint, without a master. */

@@ -198,6 +198,8 @@ export class MasterSession {
     if (isSilent && Math.max(this.connectedAt, this.rpc.heardAt) < now - RECONNECT_MS) {
       this.connectedAt = now;
       this.rpc.reconnect();
+    } else if (isSilent) {
+      this.rpc.resend();
     }
     void this.followHosts();
     this.renew();

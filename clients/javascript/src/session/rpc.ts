@@ -44,6 +44,11 @@ export class RpcClient {
     if (this.isClosed) return;
     this.socket.close();
     this.socket = this.connect();
+    this.resend();
+  }
+
+  /** Send the calls that wait for an answer again, which does no harm. */
+  resend(): void {
     for (const [call, each] of this.pending) this.socket.send([encodeRequest(each.request, call)]);
   }
 

@@ -72,7 +72,9 @@ class Reader {
       } while (!this.isClosed && this.socket.readable && performance.now() < turnEnds);
       if (performance.now() >= turnEnds) await immediate();
     } catch (error) {
-      if ((error as NodeJS.ErrnoException).code !== "EAGAIN") throw error;
+      const { code } = error as NodeJS.ErrnoException;
+      if (code === "EBUSY") await immediate(); // the socket is being bound
+      else if (code !== "EAGAIN") throw error;
     }
   }
 }
@@ -83,6 +85,7 @@ class Sender<T> {
   /** Parts that zeromq.js refused because another send is under way. */
   private unsent: Buffer[] | undefined;
   private last: Promise<void> = Promise.resolve();
+  private isInFlight = false;
   private waiting: Promise<void> | undefined;
 
   constructor(
@@ -111,7 +114,8 @@ class Sender<T> {
       const parts = this.unsent ?? this.take(this.queue);
       if (!this.trySend(parts)) {
         this.unsent = parts;
-        this.waiting = this.last.then(() => {
+        // EBUSY without a send under way: the socket is being bound.
+        this.waiting = (this.isInFlight ? this.last : immediate()).then(() => {
           this.waiting = undefined;
           this.pump();
         });
@@ -124,7 +128,13 @@ class Sender<T> {
   private trySend(parts: Buffer[]): boolean {
     try {
       // A ROUTER's EHOSTUNREACH, and a socket that is being closed: nobody is there to read it.
-      this.last = (this.socket as XPublisher).send(parts).catch(() => undefined);
+      this.isInFlight = true;
+      this.last = (this.socket as XPublisher)
+        .send(parts)
+        .catch(() => undefined)
+        .then(() => {
+          this.isInFlight = false;
+        });
       return true;
     } catch (error) {
       if ((error as NodeJS.ErrnoException).code === "EBUSY") return false;

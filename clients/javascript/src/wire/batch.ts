@@ -1,6 +1,5 @@
 import { WireError } from "../errors.js";
-import { Flag, HEADER_BYTES, type Header, readHeader, writeHeader } from "./header.js";
-import { splitOnePart } from "./parts.js";
+import { Flag, HEADER_BYTES, type Header, writeHeader } from "./header.js";
 
 export const MAX_BATCH = 256;
 
@@ -51,15 +50,4 @@ export function readBatchBody(body: Buffer): BatchEntry[] {
     throw new WireError("batch-sizes", "The messages of the batch have other sizes than its table says.");
   }
   return entries;
-}
-
-/** Read a batch from its one part. @throws {WireError} */
-export function readBatch(part: Buffer): { topic: Buffer; header: Header; entries: BatchEntry[] } {
-  const [topic, head, body] = splitOnePart(part);
-  const header = readHeader(head);
-  if (header.flags !== Flag.BATCH) throw new WireError("batch-form", "A batch has no other flags.");
-  if (header.size !== body.length) {
-    throw new WireError("payload-size", `The header says ${header.size} bytes, the batch has ${body.length}.`);
-  }
-  return { topic, header, entries: readBatchBody(body) };
 }

@@ -52,33 +52,21 @@ export function packHeader(header: Header): Buffer {
   return packed;
 }
 
-/**
- * Read the header at `offset`.
- *
- * @throws {WireError} `version` if it is of another version, `header-size` if it has another size.
- */
-export function readHeader(part: Buffer, offset = 0): Header {
-  if (part.length - offset < HEADER_BYTES) {
-    throw new WireError("header-size", `A header has ${HEADER_BYTES} bytes, this one has ${part.length - offset}.`);
-  }
-  const version = part[offset];
-  if (version !== VERSION) {
-    throw new WireError("version", `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`);
-  }
-  return {
-    codec: part[offset + 1]!,
-    flags: part.readUInt16LE(offset + 2),
-    size: part.readUInt32LE(offset + 4),
-    seq: part.readBigUInt64LE(offset + 8),
-    stampNs: part.readBigUInt64LE(offset + 16),
-    publisher: part.readBigUInt64LE(offset + 24),
-  };
-}
-
-/** Read a header that is a part of its own. @throws {WireError} */
+/** Read a header from its part. @throws {WireError} `header-size`, or `version` for another version than ours. */
 export function readHeaderPart(part: Buffer): Header {
   if (part.length !== HEADER_BYTES) {
     throw new WireError("header-size", `A header has ${HEADER_BYTES} bytes, this one has ${part.length}.`);
   }
-  return readHeader(part);
+  const version = part[0];
+  if (version !== VERSION) {
+    throw new WireError("version", `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`);
+  }
+  return {
+    codec: part[1]!,
+    flags: part.readUInt16LE(2),
+    size: part.readUInt32LE(4),
+    seq: part.readBigUInt64LE(8),
+    stampNs: part.readBigUInt64LE(16),
+    publisher: part.readBigUInt64LE(24),
+  };
 }

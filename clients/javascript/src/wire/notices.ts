@@ -1,3 +1,5 @@
+import { decodeUtf8 } from "./utf8.js";
+
 /** What a hello filter says: who subscribes to what, and which forms of messages it reads. */
 export interface Hello {
   readonly subscriber: bigint;
@@ -25,7 +27,6 @@ export interface Shares {
 const HELLO = /^\xffhello([123]?)\/([0-9a-fA-F]{16})\//;
 const READ = /^\xffread\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})$/;
 const SHARES = /^\xffshares\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})\/([0-9a-fA-F]{16})$/;
-const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
 
 function hex(value: bigint): string {
   return value.toString(16).padStart(16, "0");
@@ -45,7 +46,7 @@ export function parseHello(part: Buffer): Hello | undefined {
   const match = HELLO.exec(part.toString("latin1", 0, 32));
   if (!match) return undefined;
   try {
-    const topic = utf8.decode(part.subarray(match[0].length));
+    const topic = decodeUtf8(part.subarray(match[0].length));
     return { subscriber: BigInt(`0x${match[2]}`), topic, level: Number(match[1]) as Hello["level"] };
   } catch {
     return undefined;

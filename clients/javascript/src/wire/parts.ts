@@ -1,27 +1,20 @@
 import { BadTopicError, WireError } from "../errors.js";
 import { isTooDeep } from "../messages/nesting.js";
-import { pack, unpack } from "../messages/packing.js";
+import { codecNumbered } from "../messages/codecs.js";
+import { isMap, pack, unpackWithTextKeys } from "../messages/packing.js";
+import { readBatchBody } from "./batch.js";
+import type { Extension } from "./extension.js";
+import { decodeUtf8 } from "./utf8.js";
 import { Flag, HEADER_BYTES, type Header, packHeader, readHeaderPart, writeHeader } from "./header.js";
 import { checkTopic } from "./names.js";
-
-/** Named values that travel beside a payload, such as an image's shape. */
-export type Extension = Readonly<Record<string, unknown>>;
 
 export const NO_EXTENSION: Extension = Object.freeze({});
 
 /** A message as read from its parts. */
 export interface WireMessage {
-  readonly topic: string;
   readonly header: Header;
   readonly payload: Buffer;
   readonly extension: Extension;
-}
-
-const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
-
-/** Decode UTF-8 strictly. @throws {TypeError} if it is not UTF-8. */
-export function decodeUtf8(bytes: Uint8Array): string {
-  return utf8.decode(bytes);
 }
 
 /** First part of a topic's messages and the filter of its subscribers: the name and a zero byte. */
@@ -42,15 +35,13 @@ export function packExtension(extension: Extension): Buffer {
 export function readExtension(part: Buffer): Extension {
   let value: unknown;
   try {
-    value = unpack(part);
+    value = unpackWithTextKeys(part);
   } catch (error) {
-    throw new WireError("extension", `The extension is no msgpack: ${String(error)}`);
+    throw new WireError("extension", `The extension is no msgpack with text keys: ${String(error)}`);
   }
-  if (value === null || typeof value !== "object" || Array.isArray(value) || value instanceof Uint8Array || value instanceof Date) {
-    throw new WireError("extension", "The extension is no map.");
-  }
+  if (!isMap(value)) throw new WireError("extension", "The extension is no map.");
   if (isTooDeep(value)) throw new WireError("extension", "The extension is nested too deeply.");
-  return value as Extension;
+  return value;
 }
 
 /** Return the parts of a message; sets the flag EXTENSION if there is an extension. */
@@ -69,47 +60,65 @@ export function onePart(topic: Buffer, header: Header, payload: Buffer): Buffer 
   return part;
 }
 
-/** Split a message of one part into topic, header and payload. @throws {WireError} `part-count` if it is too short. */
-export function splitOnePart(part: Buffer): [Buffer, Buffer, Buffer] {
-  const cut = part.indexOf(0) + 1;
-  if (cut === 0 || part.length < cut + HEADER_BYTES) {
+/** Split the parts of a message into the first one and the rest; one part counts as three. @throws {WireError} `part-count` */
+export function splitParts(parts: readonly Buffer[]): { first: Buffer; rest: readonly Buffer[] } {
+  const [first, ...rest] = parts;
+  if (!first) throw new WireError("part-count", "A message has 3 or 4 parts, this one has none.");
+  if (rest.length > 0) return { first, rest };
+  const cut = first.indexOf(0) + 1;
+  if (cut === 0 || first.length < cut + HEADER_BYTES) {
     throw new WireError("part-count", "A message has 3 or 4 parts, this one has 1.");
   }
-  return [part.subarray(0, cut), part.subarray(cut, cut + HEADER_BYTES), part.subarray(cut + HEADER_BYTES)];
+  return { first: first.subarray(0, cut), rest: [first.subarray(cut, cut + HEADER_BYTES), first.subarray(cut + HEADER_BYTES)] };
 }
 
 /**
- * Read header, payload and extension of a message from the parts after the first.
+ * Read what follows the first part: one message, or those of a batch.
  *
- * @throws {WireError} for everything that docs/wire.md does not allow.
+ * @param isOnePart Whether all came in one part, as batches do.
+ * @throws {WireError} for everything that docs/wire.md does not allow, in its order of checks.
  */
-export function readRest(rest: readonly Buffer[]): Omit<WireMessage, "topic"> {
+export function readRest(rest: readonly Buffer[], isOnePart: boolean): WireMessage[] {
   const [head, payload, packed] = rest;
-  if (!head) throw new WireError("part-count", "A message has 3 or 4 parts, this one has 1.");
-  const header = readHeaderPart(head);
+  const header = readHeaderPart(head!);
   const expected = header.flags & Flag.EXTENSION ? 3 : 2;
-  if (rest.length !== 2 && rest.length !== 3) {
-    throw new WireError("part-count", `A message has 3 or 4 parts, this one has ${rest.length + 1}.`);
-  }
   if (rest.length !== expected || !payload) {
-    throw new WireError("part-count", `The flags ask for ${expected + 1} parts, there are ${rest.length + 1}.`);
+    throw new WireError("part-count", `The message has ${rest.length + 1} parts, its flags ask for ${expected + 1}.`);
   }
+  const found = header.flags & Flag.BATCH ? readBatch(header, payload, isOnePart) : [readOne(header, payload, packed)];
+  if (!codecNumbered(header.codec)) {
+    throw new WireError("codec", `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`);
+  }
+  return found;
+}
+
+function readOne(header: Header, payload: Buffer, packed: Buffer | undefined): WireMessage {
   if (header.size !== 0 && header.size !== payload.length) {
     throw new WireError("payload-size", `The header says ${header.size} bytes, the payload has ${payload.length}.`);
   }
   return { header, payload, extension: packed ? readExtension(packed) : NO_EXTENSION };
 }
 
-/** Read a message from its parts. @throws {WireError} for everything that docs/wire.md does not allow. */
-export function readParts(parts: readonly Buffer[]): WireMessage {
-  if (parts.length === 0) throw new WireError("part-count", "A message has 3 or 4 parts, this one has none.");
-  const [first, ...rest] = parts.length === 1 ? splitOnePart(parts[0]!) : parts;
-  const read = readRest(rest);
-  return { topic: readTopicPart(first!), ...read };
+function readBatch(header: Header, body: Buffer, isOnePart: boolean): WireMessage[] {
+  if (!isOnePart || header.flags !== Flag.BATCH) throw new WireError("batch-form", "A batch is one part and has no other flags.");
+  if (header.size !== body.length) {
+    throw new WireError("payload-size", `The header says ${header.size} bytes, the batch has ${body.length}.`);
+  }
+  return readBatchBody(body).map(({ stampNs, payload }, index) => ({
+    header: { ...header, flags: 0, seq: header.seq + BigInt(index), stampNs, size: payload.length },
+    payload,
+    extension: NO_EXTENSION,
+  }));
+}
+
+/** Read the messages in `parts` and their topic. @throws {WireError} for everything that docs/wire.md does not allow. */
+export function readParts(parts: readonly Buffer[]): { topic: string; messages: WireMessage[] } {
+  const { first, rest } = splitParts(parts);
+  return { topic: readTopicPart(first), messages: readRest(rest, parts.length === 1) };
 }
 
 function readTopicPart(part: Buffer): string {
-  if (part[part.length - 1] !== 0) throw new WireError("topic", "The topic does not end with a zero byte.");
+  if (part[part.length - 1] !== 0) throw new WireError("topic-end", "The topic does not end with a zero byte.");
   try {
     return checkTopic(decodeUtf8(part.subarray(0, -1)));
   } catch (error) {

@@ -1,0 +1,293 @@
+import {
+  ClosedError,
+  EncodeError,
+  type NepError,
+  NoServerError,
+  RequestRefusedError,
+  ServerGoneError,
+  ServiceError,
+  ServiceTimeoutError,
+  WireError,
+} from "../errors.js";
+import { codecFor, codecNumbered } from "../messages/codecs.js";
+import type { SubscriberCount } from "../protocol/requests.js";
+import type { ReachablePublisher, SessionSubscriber } from "../session/master_session.js";
+import { DealerSocket } from "../sockets/socket.js";
+import { CallKind, type CallParts, MAX_PAYLOAD_BYTES, packCall, readCall, readFailure, SERVICE_TYPE, timeoutMs } from "./wire.js";
+
+const DEFAULT_TIMEOUT_S = 5;
+const IDLE_MS = 200; // then the connection is closed: it would keep the process alive
+const DRAIN_MS = 20; // answers that were received before the connection ended are read first
+
+/** How a service is called. */
+export interface ClientOptions {
+  /** `json` (default), `msgpack`, `string` or `bytes`. */
+  readonly type?: string;
+  /** Seconds that a call waits for a server and its answer; `null` waits for ever. Default: 5. */
+  readonly timeoutS?: number | null;
+}
+
+export interface CallOptions {
+  readonly timeoutS?: number | null;
+  /** Gives up waiting; the server may still carry the call out. */
+  readonly signal?: AbortSignal;
+}
+
+/** What a client needs from its node. */
+export interface ClientHost {
+  readonly warn: (message: string) => void;
+  register(client: SessionSubscriber): Promise<void>;
+  unregister(client: SessionSubscriber): void;
+}
+
+interface PendingCall {
+  readonly number: bigint;
+  readonly codec: number;
+  readonly payload: Buffer;
+  readonly timeoutS: number | null;
+  readonly endsAt: number;
+  connection: Connection | undefined;
+  settle(outcome: { readonly answer: unknown } | { readonly error: Error }): void;
+}
+
+/** The connection to one server. */
+interface Connection {
+  readonly server: bigint;
+  readonly socket: DealerSocket;
+  readonly calls: Map<bigint, PendingCall>;
+  idle: NodeJS.Timeout | undefined;
+}
+
+/**
+ * Calls a service; made by `Node.client`. Any number of calls may be under way.
+ *
+ * @example
+ * const { sum } = await node.client("/sum").call({ a: 2, b: 3 });
+ */
+export class Client<Request = unknown, Answer = unknown> implements SessionSubscriber {
+  /** Resolves when the client is registered; rejects if it can't be. */
+  readonly ready: Promise<this>;
+  /** Calls that were answered, also with an error. */
+  answered = 0;
+  /** Calls that ended without an answer. */
+  failed = 0;
+  /** Answers that came too late, or were none. */
+  late = 0;
+  private readonly servers = new Map<bigint, ReachablePublisher>();
+  private readonly connections = new Map<bigint, Connection>();
+  private readonly waiting = new Set<PendingCall>();
+  private lastNumber = 0n;
+  private closed: Promise<void> | undefined;
+
+  /** @internal */
+  constructor(
+    readonly id: bigint,
+    readonly service: string,
+    private readonly options: ClientOptions,
+    private readonly host: ClientHost,
+  ) {
+    this.ready = this.begin();
+    this.ready.catch(() => undefined); // each call rejects
+  }
+
+  private async begin(): Promise<this> {
+    try {
+      await this.host.register(this);
+      return this;
+    } catch (error) {
+      for (const each of this.waiting) each.settle({ error: error as NepError });
+      await this.close();
+      throw error;
+    }
+  }
+
+  /**
+   * Call the service and return its answer.
+   *
+   * @throws {NoServerError} nothing was sent: no server was reached in time.
+   * @throws {ServiceTimeoutError} it was sent, and no answer came in time.
+   * @throws {ServerGoneError} the server ended meanwhile.
+   * @throws {ServiceError} the server's callback raised.
+   * @throws {RequestRefusedError} the server did not carry it out.
+   * @throws {EncodeError | DecodeError} the request can't be sent; the answer can't be read.
+   */
+  call(request: Request, options: CallOptions = {}): Promise<Answer> {
+    const codec = codecFor(this.options.type ?? "json");
+    return new Promise<Answer>((resolve, reject) => {
+      if (this.closed) throw new ClosedError(`The client of "${this.service}" is closed.`);
+      options.signal?.throwIfAborted();
+      const payload = codec.encode(request).data;
+      if (payload.length > MAX_PAYLOAD_BYTES) throw new EncodeError(`The request has ${payload.length} bytes, 64 MiB are allowed.`);
+      const { timeoutS = this.options.timeoutS === undefined ? DEFAULT_TIMEOUT_S : this.options.timeoutS } = options;
+      const pending: PendingCall = {
+        number: ++this.lastNumber,
+        codec: codec.number,
+        payload,
+        timeoutS,
+        endsAt: timeoutS === null ? Infinity : performance.now() + timeoutS * 1000,
+        connection: undefined,
+        settle: (outcome) => {
+          clearTimeout(timer);
+          options.signal?.removeEventListener("abort", abort);
+          this.forget(pending);
+          if ("answer" in outcome) resolve(outcome.answer as Answer);
+          else reject(outcome.error);
+        },
+      };
+      const abort = (): void => this.fail(pending, options.signal!.reason as Error);
+      const timer = timeoutS === null ? undefined : setTimeout(() => this.expire(pending), timeoutS * 1000);
+      options.signal?.addEventListener("abort", abort, { once: true });
+      this.waiting.add(pending);
+      this.send(pending);
+    });
+  }
+
+  private expire(pending: PendingCall): void {
+    const name = `"${this.service}"`;
+    const error = pending.connection
+      ? new ServiceTimeoutError(`${name} did not answer within ${pending.timeoutS} s; it may still carry the call out.`)
+      : new NoServerError(`No server of ${name} was reached within ${pending.timeoutS} s.`);
+    this.fail(pending, error);
+  }
+
+  private fail(pending: PendingCall, error: Error): void {
+    this.failed++;
+    pending.settle({ error });
+  }
+
+  private forget(pending: PendingCall): void {
+    this.waiting.delete(pending);
+    const { connection } = pending;
+    if (!connection) return;
+    connection.calls.delete(pending.number);
+    if (connection.calls.size === 0) this.endWhenIdle(connection);
+  }
+
+  // ---- connections
+
+  private send(pending: PendingCall): void {
+    const server = [...this.servers.values()].find((each) => each.codec === SERVICE_TYPE && each.endpoint);
+    if (!server || pending.connection) return;
+    const connection = this.connections.get(server.id) ?? this.connectTo(server);
+    clearTimeout(connection.idle);
+    pending.connection = connection;
+    connection.calls.set(pending.number, pending);
+    const leftS = pending.endsAt === Infinity ? null : (pending.endsAt - performance.now()) / 1000;
+    const { number, codec, payload } = pending;
+    connection.socket.send(packCall({ kind: CallKind.CALL, codec, timeoutMs: timeoutMs(leftS), number, payload }));
+  }
+
+  private connectTo(server: ReachablePublisher): Connection {
+    const calls = new Map<bigint, PendingCall>();
+    const socket = new DealerSocket(
+      server.endpoint!,
+      (parts) => this.read(parts, connection),
+      () => (calls.size > 0 ? "brief" : "none"),
+      () => void setTimeout(() => this.ended(connection), DRAIN_MS),
+    );
+    const connection: Connection = { server: server.id, socket, calls, idle: undefined };
+    this.connections.set(server.id, connection);
+    return connection;
+  }
+
+  private endWhenIdle(connection: Connection): void {
+    clearTimeout(connection.idle);
+    connection.idle = setTimeout(() => this.drop(connection), IDLE_MS);
+  }
+
+  private drop(connection: Connection): void {
+    clearTimeout(connection.idle);
+    if (this.connections.get(connection.server) === connection) this.connections.delete(connection.server);
+    connection.socket.close();
+  }
+
+  private ended(connection: Connection): void {
+    const error = new ServerGoneError(`The server of "${this.service}" ended; it may or may not have carried the call out.`);
+    for (const each of [...connection.calls.values()]) this.fail(each, error);
+    this.drop(connection);
+  }
+
+  private read(parts: Buffer[], connection: Connection): void {
+    let answer: CallParts;
+    try {
+      answer = readCall(parts, "answer");
+    } catch (error) {
+      if (!(error instanceof WireError)) throw error;
+      this.late++;
+      this.host.warn(`"${this.service}": what came was no answer. ${error.message}`);
+      return;
+    }
+    const pending = connection.calls.get(answer.number);
+    if (!pending) {
+      this.late++;
+      return;
+    }
+    if (answer.kind === CallKind.REFUSED) {
+      this.fail(pending, new RequestRefusedError(`The server of "${this.service}" refused: ${readFailure(answer.payload).reason}`));
+      return;
+    }
+    this.answered++;
+    pending.settle(this.outcome(answer));
+  }
+
+  private outcome(answer: CallParts): { answer: unknown } | { error: Error } {
+    if (answer.kind === CallKind.ERROR) {
+      const { kind, reason } = readFailure(answer.payload);
+      return { error: new ServiceError(kind, reason) };
+    }
+    try {
+      const codec = codecNumbered(answer.codec);
+      if (!codec) throw new WireError("codec", `The answer has codec ${answer.codec}, which this nep-js does not know.`);
+      return { answer: codec.decode(answer.payload, {}) };
+    } catch (error) {
+      return { error: error as Error };
+    }
+  }
+
+  // ---- the session
+
+  /** @internal */
+  counts(): SubscriberCount {
+    return { id: this.id, received: BigInt(this.answered), lost: BigInt(this.failed) };
+  }
+
+  /** @internal */
+  connect(remotes: readonly ReachablePublisher[]): void {
+    for (const each of remotes) this.servers.set(each.id, each);
+    for (const each of this.waiting) this.send(each);
+  }
+
+  /** @internal */
+  reconcile(_topic: string, remotes: readonly ReachablePublisher[]): void {
+    this.servers.clear();
+    this.connect(remotes);
+  }
+
+  /** @internal No more calls go there; those under way end with the connection. */
+  gone(id: bigint): void {
+    this.servers.delete(id);
+  }
+
+  /** @internal */
+  tick(): void {
+    // Answers have no seqs.
+  }
+
+  /** Unregister; calls under way reject with `ClosedError`. */
+  close(): Promise<void> {
+    this.closed ??= this.finish();
+    return this.closed;
+  }
+
+  private finish(): Promise<void> {
+    this.host.unregister(this);
+    for (const each of [...this.waiting]) this.fail(each, new ClosedError(`The client of "${this.service}" is closed.`));
+    for (const each of [...this.connections.values()]) this.drop(each);
+    return Promise.resolve();
+  }
+
+  /** Close at the end of an `await using` block. */
+  [Symbol.asyncDispose](): Promise<void> {
+    return this.close();
+  }
+}

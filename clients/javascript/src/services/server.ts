@@ -1,0 +1,174 @@
+import { DecodeError, EncodeError, WireError } from "../errors.js";
+import { codecFor, codecNumbered, type Encoded } from "../messages/codecs.js";
+import type { ExpectedSubscriber, PublisherCount } from "../protocol/requests.js";
+import { Bindings } from "../sockets/bindings.js";
+import { RouterSocket } from "../sockets/socket.js";
+import { CallKind, type CallParts, MAX_PAYLOAD_BYTES, packCall, packFailure, readCall } from "./wire.js";
+
+const MAX_CALLS = 1000;
+const MAX_CALL_BYTES = 256 * 2 ** 20;
+const CLOSE_S = 2;
+
+/** Answers a call; what it throws is raised at the client as `ServiceError`. Nothing (`undefined`) is an empty map. */
+export type ServiceCallback<Request = unknown, Answer = unknown> = (request: Request) => Answer | Promise<Answer>;
+
+/** What a server needs from its node. */
+export interface ServerHost {
+  readonly warn: (message: string) => void;
+  register(server: Server): Promise<{ expected: ExpectedSubscriber[] }>;
+  unregister(server: Server): void;
+}
+
+/**
+ * Answers the calls of a service; made by `Node.serve` and `Node.new_server`. Calls are carried out at once, also
+ * several at a time where the callback is asynchronous.
+ *
+ * @example
+ * await node.serve("/sum", ({ a, b }) => ({ sum: a + b }));
+ */
+export class Server {
+  /** Resolves when the service is registered; rejects if it can't be. */
+  readonly ready: Promise<this>;
+  /** Calls that were answered, also with an error. */
+  calls = 0;
+  /** Answers that were errors. */
+  errors = 0;
+  /** Calls that were refused: closing, too many under way, or not decodable. */
+  refused = 0;
+  /** What came and was no call. */
+  unreadable = 0;
+  private readonly socket = new RouterSocket(MAX_PAYLOAD_BYTES);
+  private readonly bindings = new Bindings(this.socket);
+  private readonly running = new Set<Promise<void>>();
+  private runningBytes = 0;
+  private answeredBytes = 0;
+  private closed: Promise<void> | undefined;
+
+  /** @internal */
+  constructor(
+    readonly id: bigint,
+    readonly service: string,
+    private readonly callback: ServiceCallback,
+    private readonly host: ServerHost,
+  ) {
+    this.socket.read(
+      (parts) => this.read(parts),
+      () => "long",
+    );
+    this.ready = this.begin();
+    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+  }
+
+  private async begin(): Promise<this> {
+    try {
+      await this.host.register(this);
+      return this;
+    } catch (error) {
+      this.closed ??= Promise.resolve();
+      this.socket.close();
+      this.host.unregister(this);
+      throw error;
+    }
+  }
+
+  private read(parts: Buffer[]): void {
+    const [client, ...rest] = parts;
+    let call: CallParts;
+    try {
+      call = readCall(rest, "call");
+    } catch (error) {
+      if (!(error instanceof WireError)) throw error;
+      this.unreadable++;
+      this.host.warn(`"${this.service}": what came was no call. ${error.message}`);
+      return;
+    }
+    const reason = this.refusal(call);
+    if (reason !== undefined) {
+      this.refused++;
+      this.send(client!, call, CallKind.REFUSED, { data: packFailure("", reason) });
+      return;
+    }
+    this.runningBytes += call.payload.length;
+    const answered = this.answer(client!, call).finally(() => {
+      this.runningBytes -= call.payload.length;
+      this.running.delete(answered);
+    });
+    this.running.add(answered);
+  }
+
+  private refusal(call: CallParts): string | undefined {
+    if (this.closed) return `"${this.service}" closes`;
+    if (this.running.size >= MAX_CALLS || this.runningBytes + call.payload.length > MAX_CALL_BYTES) {
+      return `"${this.service}" has too many calls waiting`;
+    }
+    return codecNumbered(call.codec) ? undefined : `codec ${call.codec} is not known`;
+  }
+
+  private async answer(client: Buffer, call: CallParts): Promise<void> {
+    const codec = codecNumbered(call.codec)!;
+    let request: unknown;
+    try {
+      request = codec.decode(call.payload, {});
+    } catch (error) {
+      if (!(error instanceof DecodeError)) throw error;
+      this.refused++;
+      this.send(client, call, CallKind.REFUSED, { data: packFailure("", error.message) });
+      return;
+    }
+    try {
+      const answer = (await this.callback(request)) ?? {};
+      const encoded = codec.encode(answer);
+      if (encoded.data.length > MAX_PAYLOAD_BYTES) throw new EncodeError(`The answer has ${encoded.data.length} bytes, 64 MiB are allowed.`);
+      this.calls++;
+      this.send(client, call, CallKind.ANSWER, encoded);
+    } catch (error) {
+      this.calls++;
+      this.errors++;
+      const { name = "Error", message = String(error) } = error instanceof Error ? error : {};
+      this.host.warn(`"${this.service}": a call failed. ${error instanceof Error ? (error.stack ?? message) : message}`);
+      this.send(client, call, CallKind.ERROR, { data: packFailure(name, message) });
+    }
+  }
+
+  private send(client: Buffer, call: CallParts, kind: number, { data }: Encoded): void {
+    const codec = kind === CallKind.ANSWER ? call.codec : codecFor("json").number;
+    if (kind !== CallKind.REFUSED) this.answeredBytes += data.length;
+    this.socket.send([client, ...packCall({ kind, codec, timeoutMs: 0, number: call.number, payload: data })]);
+  }
+
+  /** @internal */
+  counts(): PublisherCount {
+    const count = BigInt(this.calls);
+    return { id: this.id, count, bytes: BigInt(this.answeredBytes), last_seq: count, errors: this.errors };
+  }
+
+  /** @internal */
+  move(hosts: readonly string[]): Promise<string[]> {
+    return this.bindings.move(hosts);
+  }
+
+  /**
+   * Unregister, refuse calls that still come, let callbacks that run answer, and close.
+   *
+   * @param timeoutS Seconds to wait for callbacks. Default: 2.
+   */
+  close(timeoutS = CLOSE_S): Promise<void> {
+    this.closed ??= this.finish(timeoutS);
+    return this.closed;
+  }
+
+  private async finish(timeoutS: number): Promise<void> {
+    this.host.unregister(this);
+    let timer: NodeJS.Timeout | undefined;
+    const expired = new Promise((resolve) => (timer = setTimeout(resolve, timeoutS * 1000)));
+    await Promise.race([Promise.allSettled(this.running), expired]);
+    clearTimeout(timer);
+    await this.socket.flush();
+    this.socket.close();
+  }
+
+  /** Close at the end of an `await using` block. */
+  [Symbol.asyncDispose](): Promise<void> {
+    return this.close();
+  }
+}
