@@ -1,0 +1,259 @@
+"""nep-js: its own tests, the listings of the paper, and messages between Python and JavaScript on bad days."""
+
+from __future__ import annotations
+
+import base64
+import json
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+from tests.clients.node_programs import (
+    LONG_S,
+    NEEDS_NODE,
+    PACKAGE,
+    Adapter,
+    build_package,
+    node,
+    run_script,
+)
+
+pytestmark = NEEDS_NODE
+
+PUBLISHER = """\
+const zmq = require("zeromq");
+const nep = require("nep-js");
+
+var node = new nep.{node}("publisher_sample");
+var publisher = node.new_pub("test", "json");
+var message = {{ message: "hello world" }};
+publisher.publish(message);
+"""
+SUBSCRIBER = """\
+const zmq = require("zeromq");
+const nep = require("nep-js");
+
+var node = new nep.{node}("subscriber_sample");
+var callback = function (message) {{
+  console.log(JSON.stringify(message));
+  node.close();
+}};
+var subscriber = node.new_callback("test", "json", callback);
+"""
+LARGE_BYTES = 6 * 2**20
+LARGE_COUNT = 50
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _package() -> None:
+    build_package()
+
+
+@pytest.fixture
+def program(master: Master) -> Iterator[Adapter]:
+    """A program in JavaScript that does what it is told, with a node of the name `js`."""
+    running = Adapter(master.address)
+    running.do("node", name="js")
+    yield running
+    running.end()
+
+
+@pytest.fixture
+def python(master: Master) -> Iterator[nep.node]:
+    with nep.node("python") as own:
+        yield own
+
+
+def wait_until(is_met: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + LONG_S
+    while not is_met():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_own_tests_of_the_package_pass():
+    tests = sorted(str(each) for each in (PACKAGE / "test").glob("*.test.mjs"))
+    done = subprocess.run(
+        [str(node), "--test", *tests], cwd=PACKAGE, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_lock_file_names_no_registry():
+    lock = json.loads((PACKAGE / "package-lock.json").read_text())
+    assert not [name for name, each in lock["packages"].items() if "resolved" in each]
+
+
+@pytest.mark.parametrize("name", ["Node", "node"])
+def test_published_message_arrives_and_the_program_ends(python, master, tmp_path, name):
+    subscriber = python.new_sub("test", "json")
+    done = run_script(PUBLISHER.format(node=name), tmp_path, NEP_MASTER=master.address)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert subscriber.listen(True) == (True, {"message": "hello world"})
+    assert subscriber.lost == 0
+
+
+def test_callback_of_the_listing_gets_the_message(python, master, tmp_path):
+    publisher = python.new_pub("test", "json", latched=True)
+    publisher.publish({"message": "hello world"})
+    done = run_script(SUBSCRIBER.format(node="Node"), tmp_path, NEP_MASTER=master.address)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout) == {"message": "hello world"}
+
+
+@pytest.mark.parametrize(
+    ("msg_type", "payload"),
+    [
+        ("json", {"text": "grüß", "list": [1, 2.5, None, True]}),
+        ("string", "grüß dich"),
+        ("bytes", b"\x00\xff"),
+        ("msgpack", {"a": [1, -2.5, "ü", None]}),
+        ("robot/description", {"name": "Pepper"}),
+    ],
+)
+def test_payloads_arrive_unchanged_both_ways(program, python, msg_type, payload):
+    received = program.do("subscriber", topic="to_js", type=msg_type)["sub"]
+    python.new_pub("to_js", msg_type).publish(payload)
+    assert program.wait(lambda messages: len(messages) == 1)
+    (message,) = program.messages
+    assert message["sub"] == received
+    assert message["seq"] == "1"
+    if msg_type == "bytes":
+        assert base64.b64decode(message["payload"]) == payload
+    else:
+        assert message["value"] == payload
+    subscriber = python.new_sub("to_py", msg_type)
+    published = program.do("publisher", topic="to_py", type=msg_type)
+    assert published["missing"] == []
+    given = {"bytes": base64.b64encode(payload).decode()} if msg_type == "bytes" else {"value": payload}
+    program.do("publish", pub=published["pub"], **given)
+    assert subscriber.listen(True) == (True, payload)
+
+
+def test_bursts_arrive_in_order_both_ways(program, python):
+    program.do("subscriber", topic="to_js", type="json")
+    publisher = python.new_pub("to_js", "json")
+    for n in range(5000):
+        publisher.publish({"n": n})
+    assert program.wait(lambda messages: len(messages) == 5000)
+    assert [each["value"]["n"] for each in program.messages] == list(range(5000))
+    subscriber = python.new_sub("to_py", "json")
+    pub = program.do("publisher", topic="to_py", type="json")["pub"]
+    program.do("publish", pub=pub, value={}, count=5000)
+    assert [subscriber.listen(True)[1]["n"] for _ in range(5000)] == list(range(1, 5001))
+    assert subscriber.lost == 0
+
+
+def test_late_subscribers_receive_latched_messages_and_history(program, python):
+    latched = program.do("publisher", topic="state", type="json", latched=True)["pub"]
+    history = program.do("publisher", topic="log", type="json", history=3)["pub"]
+    program.do("publish", pub=latched, value={}, count=5)
+    program.do("publish", pub=history, value={}, count=5)
+    assert python.new_sub("state", "json").listen(True) == (True, {"n": 5})
+    subscriber = python.new_sub("log", "json")
+    assert [subscriber.listen(True)[1]["n"] for _ in range(3)] == [3, 4, 5]
+    publisher = python.new_pub("kept", "json", history=2)
+    for n in range(4):
+        publisher.publish(n)
+    program.do("subscriber", topic="kept", type="json")
+    assert program.wait(lambda messages: len(messages) == 2)
+    assert [each["value"] for each in program.messages] == [2, 3]
+
+
+def test_patterns_hear_topics_that_come_later(program, python):
+    sub = program.do("subscriber", topic="/*/camera", type="json")["sub"]
+    for name in ("left", "right"):
+        python.new_pub(f"/{name}/camera", "json").publish(name)
+    assert program.wait(lambda messages: len(messages) == 2)
+    assert {each["topic"] for each in program.messages} == {"/left/camera", "/right/camera"}
+    assert program.do("counts", sub=sub) | {"re": 0} == {
+        "re": 0, "received": "2", "lost": "0", "refused": "0",
+    }  # fmt: skip
+
+
+def test_services_are_called_both_ways(program, python):
+    program.do("serve", service="/echo")
+    assert python.new_client("/echo").call({"a": [1, 2]}) == {"a": [1, 2]}
+
+    def fail(_request: object) -> None:
+        raise LookupError("no such joint")
+
+    python.new_server("/double", lambda request: 2 * request, threads=1)
+    python.new_server("/fail", fail, threads=1)
+    assert program.do("call", service="/double", value=21, timeout_s=LONG_S)["value"] == 42
+    failed = program.reply(program.begin("call", service="/fail", value=1, timeout_s=LONG_S))
+    assert failed["error"] == "LookupError: no such joint"
+    nobody = program.reply(program.begin("call", service="/nobody", value=1, timeout_s=0.05))
+    assert "/nobody" in nobody["error"]
+
+
+def test_master_that_is_restarted_under_traffic_loses_nothing(monkeypatch):
+    with Master("127.0.0.1:0", learn_s=0.5) as first:
+        address = first.address
+        monkeypatch.setenv("NEP_MASTER", address)
+        program = Adapter(address)
+        program.do("node", name="js")
+        own = nep.node("python")
+        subscriber = own.new_sub("to_py", "json")
+        publisher = own.new_pub("to_js", "json")
+        sub = program.do("subscriber", topic="to_js", type="json")["sub"]
+        pub = program.do("publisher", topic="to_py", type="json")["pub"]
+        publisher.publish(0)
+        program.do("publish", pub=pub, value=0)
+    publisher.publish(1)  # while there is no master
+    program.do("publish", pub=pub, value=1)
+    with Master(address, learn_s=0.5):
+        later = own.new_sub("new", "json")  # waits until the nodes are back
+        new = program.do("publisher", topic="new", type="json")
+        program.do("publish", pub=new["pub"], value=3)
+        assert later.listen(True) == (True, 3)
+        publisher.publish(2)
+        program.do("publish", pub=pub, value=2)
+        assert [subscriber.listen(True)[1] for _ in range(3)] == [0, 1, 2]
+        assert program.wait(lambda messages: [each["value"] for each in messages] == [0, 1, 2])
+        late = own.new_pub("to_js", "json")  # the new master knows the subscriber in JavaScript
+        assert late.subscribers >= 1
+        assert (subscriber.lost, program.do("counts", sub=sub)["lost"]) == (0, "0")
+        own.close()
+        program.end()
+
+
+def test_killed_program_leaves_the_graph_and_costs_new_publishers_nothing(program, python):
+    program.do("subscriber", topic="test", type="json")
+    publisher = python.new_pub("test", "json")
+    assert publisher.subscribers == 1
+    program.process.kill()
+    wait_until(lambda: publisher.subscribers == 0)
+    publisher.publish(1)
+
+
+def test_subscriber_that_reads_nothing_for_a_while_counts_what_it_missed(program, python):
+    sub = program.do("subscriber", topic="large", type="bytes", latest=True)["sub"]
+    publisher = python.new_pub("large", "bytes")
+    hang = program.begin("hang", seconds=0.5)
+    for _ in range(LARGE_COUNT):
+        publisher.publish(bytes(LARGE_BYTES))
+    program.reply(hang)
+
+    def is_complete() -> bool:
+        counts = program.do("counts", sub=sub)
+        return int(counts["received"]) + int(counts["lost"]) == LARGE_COUNT
+
+    wait_until(is_complete)
+
+
+def test_publisher_bounds_what_is_under_way_to_a_slow_subscriber(program, python):
+    subscriber = python.new_sub("large", "bytes")
+    pub = program.do("publisher", topic="large", type="bytes")["pub"]
+    payload = base64.b64encode(bytes(LARGE_BYTES)).decode()
+    program.do("publish", pub=pub, bytes=payload, count=LARGE_COUNT)
+    program.do("close_publisher", pub=pub)
+    received = 0
+    while subscriber.listen(timeout_s=0.3)[0]:
+        received += 1
+    assert received + subscriber.lost == LARGE_COUNT
+    assert received >= 24 * 2**20 // LARGE_BYTES
