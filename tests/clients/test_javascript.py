@@ -1,9 +1,10 @@
-"""nep-js: its own tests, the listings of the paper, and messages between Python and JavaScript on bad days."""
+"""nep-js: its own tests, the listings of the paper, and exchange with Python, also on bad days."""
 
 from __future__ import annotations
 
 import base64
 import json
+import os
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -75,10 +76,16 @@ def wait_until(is_met: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def test_own_tests_of_the_package_pass():
+def test_own_tests_of_the_package_pass(master):
     tests = sorted(str(each) for each in (PACKAGE / "test").glob("*.test.mjs"))
     done = subprocess.run(
-        [str(node), "--test", *tests], cwd=PACKAGE, capture_output=True, text=True, timeout=120, check=False
+        [str(node), "--test", *tests],
+        cwd=PACKAGE,
+        env={**os.environ, "NEP_MASTER": master.address},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     assert done.returncode == 0, done.stdout
 

@@ -66,6 +66,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   private isDelivering = false;
   private turnEnds = 0;
   private closed: Promise<void> | undefined;
+  private failure: Error | undefined;
   private problem = "";
   private warnedAt = -Infinity;
   private readonly totals = { received: 0, lost: 0, refused: 0 };
@@ -136,6 +137,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     try {
       await this.host.register(this);
     } catch (error) {
+      this.failure = error as Error;
       await this.close();
       throw error;
     }
@@ -254,7 +256,8 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   /** Messages as they come; leaving the loop closes the subscriber. @throws when it can't be registered. */
   async *[Symbol.asyncIterator](): AsyncIterator<Message<T>, void, undefined> {
     try {
-      await Promise.race([this.ready, this.closedEarly()]);
+      await Promise.race([this.ready.catch(() => undefined), this.closedEarly()]);
+      if (this.failure) throw this.failure;
       for (let message = await this.receive(); message; message = await this.receive()) yield message;
     } finally {
       await this.close();

@@ -1,0 +1,126 @@
+// The API with a real master: run by tests/clients/test_javascript.py, which starts one. Skipped without NEP_MASTER.
+import assert from "node:assert/strict";
+import { once } from "node:events";
+import { test } from "node:test";
+import * as nep from "../dist/index.mjs";
+
+const { Node } = nep;
+const hasMaster = { skip: process.env.NEP_MASTER ? false : "needs a master: set NEP_MASTER" };
+
+process.on("unhandledRejection", (reason) => {
+  throw new Error(`unhandled rejection: ${reason}`);
+});
+
+test("a subscription is iterated and closed by leaving the loop", hasMaster, async () => {
+  const node = new Node("iterating");
+  const publisher = await node.publisher("iterated");
+  const subscriber = node.subscribe("iterated");
+  await subscriber.ready;
+  for (let n = 1; n <= 5; n++) publisher.publish({ n });
+  const received = [];
+  for await (const message of subscriber) {
+    received.push(message.payload.n);
+    if (received.length === 5) break;
+  }
+  assert.deepEqual(received, [1, 2, 3, 4, 5]);
+  assert.ok(subscriber.isClosed);
+  await node.close();
+});
+
+test("a signal ends the loop", hasMaster, async () => {
+  const node = new Node("aborting");
+  const controller = new AbortController();
+  const subscriber = node.subscribe("aborted", { signal: controller.signal });
+  setTimeout(() => controller.abort(), 20);
+  for await (const message of subscriber) assert.fail(`received ${message.payload}`);
+  assert.ok(subscriber.isClosed);
+  const already = node.subscribe("aborted", { signal: AbortSignal.abort() });
+  for await (const message of already) assert.fail(`received ${message.payload}`);
+  await node.close();
+});
+
+test("the latest message replaces those that nobody read", hasMaster, async () => {
+  const node = new Node("latest");
+  const publisher = await node.publisher("newest");
+  const subscriber = await node.subscribe("newest", { keep: "latest" }).ready;
+  const other = await node.subscribe("newest", { maxMessages: 3 }).ready;
+  for (let n = 1; n <= 100; n++) publisher.publish(n);
+  while (other.received + other.lost < 100) await new Promise((resolve) => setImmediate(resolve));
+  assert.equal((await subscriber.receive(1)).payload, 100);
+  assert.equal(subscriber.lost, 0);
+  assert.deepEqual([other.received, other.lost], [3, 97]);
+  assert.equal((await other.receive(1)).payload, 98);
+  await node.close();
+});
+
+test("a callback that throws is told as a warning and gets the next message", hasMaster, async () => {
+  const node = new Node("throwing");
+  const received = [];
+  const subscriber = node.subscribe("thrown", (message) => {
+    received.push(message.payload);
+    throw new Error("broken callback");
+  });
+  await subscriber.ready;
+  const publisher = await node.publisher("thrown");
+  const warned = once(node, "warning");
+  publisher.publish(1);
+  publisher.publish(2);
+  const [warning] = await warned;
+  assert.match(warning, /broken callback/);
+  while (received.length < 2) await new Promise((resolve) => setImmediate(resolve));
+  await node.close();
+});
+
+test("payloads that can't be encoded are counted and named", hasMaster, async () => {
+  const node = new Node("rejecting");
+  const warnings = [];
+  node.on("warning", (warning) => warnings.push(warning));
+  const publisher = await node.publisher("rejected");
+  publisher.publish({ n: 1n });
+  assert.equal(publisher.rejected, 1);
+  assert.equal(warnings.length, 1);
+  const strict = await node.publisher("strict", { strict: true });
+  assert.throws(() => strict.publish(() => 1), nep.EncodeError);
+  await node.close();
+  assert.throws(() => publisher.publish(1), nep.ClosedError);
+  assert.throws(() => node.subscribe("late"), nep.NepError);
+});
+
+test("calls are answered, refused and given up", hasMaster, async () => {
+  const node = new Node("calling");
+  await node.serve("/twice", async (n) => 2 * n);
+  await node.serve("/slow", () => new Promise((resolve) => setTimeout(resolve, 200, "late")));
+  const client = node.client("/twice", { timeoutS: 5 });
+  assert.deepEqual(await Promise.all([1, 2, 3].map((n) => client.call(n))), [2, 4, 6]);
+  const slow = node.client("/slow");
+  await assert.rejects(slow.call(1, { timeoutS: 0.05 }), nep.ServiceTimeoutError);
+  await assert.rejects(slow.call(1, { signal: AbortSignal.timeout(30) }), { name: "TimeoutError" });
+  await assert.rejects(client.call(1n), nep.EncodeError);
+  await assert.rejects(node.client("/nobody").call(1, { timeoutS: 0.02 }), nep.NoServerError);
+  await node.close();
+  await assert.rejects(client.call(1), nep.ClosedError);
+});
+
+test("without a master, calls fail in time and programs are told", async () => {
+  const node = new Node("alone", { master: "127.0.0.1:1", masterWaitS: 0.05 });
+  const warnings = [];
+  node.on("warning", (warning) => warnings.push(warning));
+  await assert.rejects(node.publisher("topic"), nep.MasterUnreachableError);
+  await assert.rejects(async () => {
+    for await (const message of node.subscribe("topic")) assert.fail(String(message));
+  }, nep.MasterUnreachableError);
+  node.subscribe("topic", () => undefined);
+  await new Promise((resolve) => setTimeout(resolve, 100));
+  assert.equal(warnings.length, 3);
+  await node.close();
+  assert.throws(() => new Node("x", { master: "no address" }), nep.NepError);
+  assert.throws(() => new Node("a\nb"), nep.BadNameError);
+});
+
+test("both module kinds have the same classes", async () => {
+  const { createRequire } = await import("node:module");
+  const required = createRequire(import.meta.url)("../dist/index.js");
+  assert.equal(required.Node, Node);
+  assert.equal(required.node, nep.node);
+  assert.equal(nep.default.Node, Node);
+});
