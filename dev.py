@@ -197,7 +197,10 @@ def script(
         raise Trouble(f"'{name}' needs '{path}', which this revision does not have")
     python = make_environment(computer, ROOT, extra)
     if name == "test" and not (computer.which("node") and computer.which("npm")):
-        print("· no node and npm here: the tests of nep-js and those with original programs in JavaScript are skipped", flush=True)
+        print(
+            "· no node and npm here: tests of nep-js and of original programs in JavaScript are skipped",
+            flush=True,
+        )
     with screen(computer) as environ:
         return computer.do([str(python), path, *arguments], environ, None)
 
