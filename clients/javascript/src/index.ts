@@ -3,7 +3,8 @@ import { Node } from "./node.js";
 
 export * from "./errors.js";
 export { Node, Node as node } from "./node.js";
-export type { Configuration, HybridConfiguration, NodeOptions, PayloadCallback } from "./node.js";
+export type { Configuration, DirectConfiguration, DirectOptions, HybridConfiguration } from "./configuration.js";
+export type { NodeOptions, PayloadCallback } from "./node.js";
 export type { Image } from "./messages/image.js";
 export { Message } from "./messages/message.js";
 export { Publisher } from "./pubsub/publisher.js";

@@ -1,8 +1,9 @@
 import { EventEmitter } from "node:events";
 import { hostname } from "node:os";
+import { attachment, type Configuration, type DirectConfiguration, directConfiguration, type DirectOptions, type HybridConfiguration } from "./configuration.js";
 import { NepError } from "./errors.js";
 import { Publisher, type PublisherHost, type PublisherOptions } from "./pubsub/publisher.js";
-import { type MessageCallback, type SubscribeOptions, Subscriber, type SubscriberHost } from "./pubsub/subscriber.js";
+import { type MessageCallback, type Attachable, type SubscribeOptions, Subscriber, type SubscriberHost } from "./pubsub/subscriber.js";
 import type { NodeRecord } from "./protocol/requests.js";
 import { Client, type ClientHost, type ClientOptions } from "./services/client.js";
 import { Server, type ServerHost, type ServiceCallback } from "./services/server.js";
@@ -16,6 +17,7 @@ import { checkNodeName, checkTopic } from "./wire/names.js";
 import { isPattern } from "./wire/pattern.js";
 
 const LEAVE_S = 0.3;
+const DIRECT_WAIT_MS = 300; // without a master nobody knows whether there is another side
 
 /** How a node finds its master. */
 export interface NodeOptions {
@@ -24,15 +26,6 @@ export interface NodeOptions {
   /** Seconds that `publisher` and `subscribe` wait for a master; `null` waits until there is one. Default: 2. */
   readonly masterWaitS?: number | null;
 }
-
-/** Connected through a master; made by `Node.hybrid`. */
-export interface HybridConfiguration {
-  readonly kind: "hybrid";
-  readonly master: string;
-}
-
-/** How a publisher or subscriber is connected. */
-export type Configuration = HybridConfiguration;
 
 /** Called with each decoded payload. */
 export type PayloadCallback<T = unknown> = (payload: T) => void;
@@ -126,25 +119,48 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     checkTopic(topic);
     const number = this.nextNumber();
     const id = idFrom(this.record.key, number);
-    const session = this.session(configuration);
-    const host: PublisherHost = {
-      hold: () => this.hold(),
-      warn: (message) => this.warn(message),
-      register: async (owner, transport) => {
-        const { history = 0, latched = false } = options;
-        const record = { id, number, topic, msg_type: owner.type, codec: owner.codecName, latched: latched || history > 0, history };
-        const sessionPublisher = { counts: () => owner.counts(), move: (hosts: readonly string[]) => transport.move(hosts) };
-        return this.patiently(session, waitS, session.addPublisher(record, sessionPublisher, waitS));
-      },
-      reportMissing: (subscribers) => session.reportMissing(id, subscribers),
-      unregister: (owner) => {
-        session.removePublisher(id, BigInt(owner.sent));
-        this.open.delete(owner);
-      },
-    };
+    const common = { hold: () => this.hold(), warn: (message: string) => this.warn(message) };
+    const host: PublisherHost =
+      configuration?.kind === "direct"
+        ? { ...common, ...this.directPublishing(configuration) }
+        : { ...common, ...this.masteredPublishing(this.session(configuration), { id, number, topic }, options, waitS) };
     const publisher = new Publisher<T>({ ...options, id, number, topic }, host);
     this.open.add(publisher);
     return publisher;
+  }
+
+  private masteredPublishing(
+    session: MasterSession,
+    named: { readonly id: bigint; readonly number: number; readonly topic: string },
+    { history = 0, latched = false }: PublisherOptions,
+    waitS: number | undefined,
+  ): Omit<PublisherHost, "hold" | "warn"> {
+    return {
+      register: (owner, transport) => {
+        const record = { ...named, msg_type: owner.type, codec: owner.codecName, latched: latched || history > 0, history };
+        const registered = { counts: () => owner.counts(), move: (hosts: readonly string[]) => transport.move(hosts) };
+        return this.patiently(session, waitS, session.addPublisher(record, registered, waitS));
+      },
+      reportMissing: (subscribers) => session.reportMissing(named.id, subscribers),
+      unregister: (owner) => {
+        session.removePublisher(named.id, BigInt(owner.sent));
+        this.open.delete(owner);
+      },
+    };
+  }
+
+  private directPublishing(direct: DirectConfiguration): Omit<PublisherHost, "hold" | "warn"> {
+    return {
+      ...(direct.wire === "original" && { generation: direct.generation }),
+      register: async (owner, transport) => {
+        const { endpoint, how } = attachment(direct, true);
+        await transport.attach(endpoint, how);
+        await owner.waitForAnybody(DIRECT_WAIT_MS);
+        return { expected: [], hung: [] };
+      },
+      reportMissing: () => undefined,
+      unregister: (owner) => this.open.delete(owner),
+    };
   }
 
   private makeSubscriber<T>(
@@ -158,26 +174,33 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     checkTopic(topic);
     const number = this.nextNumber();
     const id = idFrom(this.record.key, number);
-    const session = this.session(configuration);
-    const pattern = isPattern(topic);
+    const session = configuration?.kind === "direct" ? undefined : this.session(configuration);
+    const record = { id, number, topic, msg_type: options.type ?? "json", pattern: isPattern(topic) };
     const host: SubscriberHost = {
       hold: () => "long",
       warn: (message) => this.warn(message),
+      isOriginal: configuration?.kind === "direct" && configuration.wire === "original",
       register: (owner) => {
         this.holders.add(owner);
         this.wake();
-        const record = { id, number, topic, msg_type: options.type ?? "json", pattern };
-        return this.patiently(session, waitS, session.addSubscriber(record, owner, waitS));
+        if (session) return this.patiently(session, waitS, session.addSubscriber(record, owner, waitS));
+        return this.attachSubscriber(owner, configuration as DirectConfiguration);
       },
       unregister: (owner) => {
         this.holders.delete(owner);
-        session.removeSubscriber(id);
+        session?.removeSubscriber(id);
         this.open.delete(owner as Subscriber);
       },
     };
     const subscriber = new Subscriber<T>({ ...options, id, number, topic }, host, callback);
     if (!subscriber.isClosed) this.open.add(subscriber);
     return subscriber;
+  }
+
+  private async attachSubscriber(owner: Attachable, direct: DirectConfiguration): Promise<void> {
+    const { endpoint, how } = attachment(direct, false);
+    await owner.attach(endpoint, how);
+    if (direct.wire === "native") await owner.waitForAnybody(DIRECT_WAIT_MS);
   }
 
   // ---- services
@@ -294,6 +317,16 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return { kind: "hybrid", master: ip === LOOPBACK ? this.masterOf : masterAddress(ip) };
   }
 
+  /**
+   * Connect to `ip:port` without a master, in the frames of the original NEP unless `options` say otherwise.
+   *
+   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to a proxy.
+   * @throws {NepError} for what is no address, port or mode.
+   */
+  direct(ip = LOOPBACK, port: number | string = 9000, mode = "one2many", options: DirectOptions = {}): DirectConfiguration {
+    return directConfiguration(ip, port, mode, options);
+  }
+
   /** Same as {@link hybrid}. */
   master(ip = LOOPBACK): HybridConfiguration {
     return this.hybrid(ip);
@@ -333,7 +366,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     for (const each of this.open) if (each instanceof Publisher) each.wake();
   }
 
-  private session(configuration?: Configuration): MasterSession {
+  private session(configuration?: HybridConfiguration): MasterSession {
     const address = configuration?.master ?? this.masterOf;
     let session = this.sessions.get(address);
     if (!session) {

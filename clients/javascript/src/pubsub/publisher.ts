@@ -5,6 +5,8 @@ import type { Hold } from "../sockets/socket.js";
 import { nowNs } from "../system/clock.js";
 import { WINDOW_BYTES } from "./byte_window.js";
 import { MAX_HISTORY } from "./history.js";
+import { type Generation, OriginalTransport } from "./original.js";
+import type { PublisherTransport } from "./transports.js";
 import { XpubTransport } from "./xpub_transport.js";
 
 /** Wait for a promise; false when it was rejected or took longer. */
@@ -50,7 +52,9 @@ export interface PublisherHost {
   readonly hold: () => Hold;
   readonly warn: (message: string) => void;
   /** Bind and register; the subscribers to wait for. */
-  register(publisher: Publisher, transport: XpubTransport): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
+  register(publisher: Publisher, transport: PublisherTransport): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
+  /** The wire of the original NEP, if it is used instead of the native one. */
+  readonly generation?: Generation;
   reportMissing(subscribers: readonly bigint[]): void;
   unregister(publisher: Publisher): void;
 }
@@ -76,7 +80,7 @@ export class Publisher<T = unknown> {
   /** Messages and subscriptions that could not be understood. */
   refused = 0;
   private readonly codec: Codec;
-  private readonly transport: XpubTransport;
+  private readonly transport: PublisherTransport;
   private readonly waitedFor = new Map<bigint, string>();
   private early: { readonly encoded: Encoded; readonly stampNs: bigint }[] | undefined = [];
   private earlyBytes = 0;
@@ -93,22 +97,20 @@ export class Publisher<T = unknown> {
     private readonly host: PublisherHost,
   ) {
     this.codec = codecFor(spec.type ?? "json");
-    const history = Math.min(MAX_HISTORY, Math.max(spec.history ?? 0, spec.latched ? 1 : 0));
-    this.transport = new XpubTransport(
-      {
-        id: spec.id,
-        topic: spec.topic,
-        codecNumber: this.codec.number,
-        latched: history > 0,
-        history,
-        batch: spec.batch ?? true,
-      },
-      () => (this.isBusy ? "brief" : host.hold()),
-      () => this.onSubscribers?.(),
-      () => this.refused++,
-    );
+    this.transport = this.makeTransport();
     this.ready = this.begin();
     this.ready.catch(() => undefined); // told by the node's `warning` event, too
+  }
+
+  private makeTransport(): PublisherTransport {
+    const { id, topic, batch = true, latched = false } = this.spec;
+    const hold = (): Hold => (this.isBusy ? "brief" : this.host.hold());
+    const onSubscribers = (): void => this.onSubscribers?.();
+    const { generation } = this.host;
+    if (generation) return new OriginalTransport(topic, this.type, this.codec, generation, hold, onSubscribers);
+    const history = Math.min(MAX_HISTORY, Math.max(this.spec.history ?? 0, latched ? 1 : 0));
+    const spec = { id, topic, codecNumber: this.codec.number, latched: history > 0, history, batch };
+    return new XpubTransport(spec, hold, onSubscribers, () => this.refused++);
   }
 
   get topic(): string {
@@ -132,12 +134,12 @@ export class Publisher<T = unknown> {
 
   /** Number of connected subscribers. */
   get subscribers(): number {
-    return this.transport.subscriptions.greeted.size;
+    return this.transport.subscribers;
   }
 
   /** Names of nodes that subscribe and have not connected: they are starting up or don't respond. */
   get unconnectedSubscribers(): string[] {
-    const names = [...this.waitedFor].filter(([id]) => !this.transport.subscriptions.greeted.has(id)).map(([, name]) => name);
+    const names = [...this.waitedFor].filter(([id]) => !this.transport.hasGreeted(id)).map(([, name]) => name);
     return [...new Set(names)].sort();
   }
 
@@ -169,8 +171,7 @@ export class Publisher<T = unknown> {
   }
 
   private waitForSubscribers(expected: ReadonlySet<bigint>): Promise<bigint[]> {
-    const { greeted } = this.transport.subscriptions;
-    const absent = (): bigint[] => [...expected].filter((each) => !greeted.has(each));
+    const absent = (): bigint[] => [...expected].filter((each) => !this.transport.hasGreeted(each));
     return this.waitUntil(() => absent().length === 0, HANDSHAKE_MS).then(absent);
   }
 
@@ -200,7 +201,7 @@ export class Publisher<T = unknown> {
    */
   publish(payload: T): void {
     if (this.closing) throw new ClosedError(`The publisher of "${this.topic}" is closed.`);
-    const isWanted = this.early || this.spec.latched || this.spec.history || this.spec.strict || this.transport.subscriptions.isHeard;
+    const isWanted = this.early || this.spec.latched || this.spec.history || this.spec.strict || this.transport.isHeard;
     if (!isWanted && performance.now() < this.validatedAt + VALIDATE_INTERVAL_MS) {
       this.transport.skip();
       return;
@@ -294,18 +295,24 @@ export class Publisher<T = unknown> {
       return;
     }
     this.isBusy = true;
-    const { greeted } = this.transport.subscriptions;
     const deadline = performance.now() + timeoutS * 1000;
-    this.transport.sayBye();
-    while (greeted.size > 0 && performance.now() < deadline) {
-      await this.waitUntil(() => greeted.size === 0, Math.min(BYE_AGAIN_MS, deadline - performance.now()));
+    if (this.transport.sayBye()) await this.waitForFarewells(deadline);
+    await this.transport.flush();
+    this.transport.close(Math.max(0, deadline - performance.now()));
+  }
+
+  private async waitForFarewells(deadline: number): Promise<void> {
+    const haveLeft = (): boolean => this.transport.subscribers === 0;
+    while (!haveLeft() && performance.now() < deadline) {
+      await this.waitUntil(haveLeft, Math.min(BYE_AGAIN_MS, deadline - performance.now()));
       this.transport.sayBye(); // a full queue drops it like anything else
     }
-    if (greeted.size > 0) {
-      this.host.warn(`"${this.topic}" closed before ${greeted.size} subscriber(s) took everything.`);
-    }
-    await this.transport.flush();
-    this.transport.close();
+    if (!haveLeft()) this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
+  }
+
+  /** @internal Wait until somebody reads: without a master nobody knows whether there is a subscriber. */
+  waitForAnybody(timeoutMs: number): Promise<void> {
+    return this.waitUntil(() => this.transport.isHeard, timeoutMs);
   }
 
   /** Close at the end of an `await using` block. */

@@ -5,6 +5,7 @@ import type { ReachablePublisher, SessionSubscriber } from "../session/master_se
 import type { Hold } from "../sockets/socket.js";
 import { isPattern } from "../wire/pattern.js";
 import { Inbox } from "./inbox.js";
+import { OriginalReader } from "./original.js";
 import { TopicReader, type TopicReaderHost } from "./topic_reader.js";
 
 const HANDSHAKE_MS = 500;
@@ -33,12 +34,21 @@ export interface SubscriberSpec extends SubscribeOptions {
   readonly topic: string;
 }
 
+/** Can be connected without a master. */
+export interface Attachable {
+  attach(endpoint: string, how: "bind" | "connect"): Promise<void>;
+  /** Wait until a publisher has greeted. */
+  waitForAnybody(timeoutMs: number): Promise<void>;
+}
+
 /** What a subscriber needs from its node. */
 export interface SubscriberHost {
   readonly hold: () => Hold;
   readonly warn: (message: string) => void;
+  /** Whether the wire of the original NEP is used instead of the native one. */
+  readonly isOriginal?: boolean;
   /** Register; calls `connect` with the publishers that are there. */
-  register(subscriber: SessionSubscriber): Promise<void>;
+  register(subscriber: SessionSubscriber & Attachable): Promise<void>;
   unregister(subscriber: SessionSubscriber): void;
 }
 
@@ -54,11 +64,12 @@ export type MessageCallback<T = unknown> = (message: Message<T>) => void;
  *   console.log(message.payload, message.stampNs);
  * }
  */
-export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, SessionSubscriber {
+export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, SessionSubscriber, Attachable {
   /** Resolves when all publishers of the topic are connected, after 0.5 s at most; rejects if it can't be registered. */
   readonly ready: Promise<this>;
   readonly isPattern: boolean;
   private readonly readers = new Map<string, TopicReader>();
+  private readonly original: OriginalReader | undefined;
   private readonly inbox: Inbox;
   private readonly readerHost: TopicReaderHost;
   private readonly waiters: ((message: Message<T> | undefined) => void)[] = [];
@@ -83,10 +94,11 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     this.readerHost = {
       hold: host.hold,
       onMessage: (message, reader) => this.arrived(message as Message<T>, reader),
-      onRefused: (reason) => this.warnRarely(`"${spec.topic}": what came was no message. ${reason}`),
+      onRefused: (reason) => this.warnRefused(reason),
       onGreeted: () => this.onGreeted?.(),
     };
-    if (!this.isPattern) this.reader(spec.topic);
+    this.original = host.isOriginal ? this.originalReader() : undefined;
+    if (!this.original && !this.isPattern) this.reader(spec.topic);
     this.ready = this.begin();
     this.ready.catch(() => undefined); // told by the node's `warning` event, too
     if (spec.signal?.aborted) this.close_();
@@ -147,19 +159,39 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   private waitForEchoes(): Promise<void> {
     const listed = [...this.readers.values()].flatMap((each) => [...each.sources.byId.values()]).filter((each) => each.remote);
-    const isMet = (): boolean => this.isClosed || listed.every((each) => each.hasEchoed || each.problem || each.endsAt !== undefined);
-    if (isMet()) return Promise.resolve();
+    return this.waitUntil(() => listed.every((each) => each.hasEchoed || each.problem || each.endsAt !== undefined), HANDSHAKE_MS);
+  }
+
+  /** @internal */
+  waitForAnybody(timeoutMs: number): Promise<void> {
+    return this.waitUntil(() => this.publishers > 0 || this.received > 0, timeoutMs);
+  }
+
+  private waitUntil(isMet: () => boolean, timeoutMs: number): Promise<void> {
+    if (isMet() || this.isClosed) return Promise.resolve();
     return new Promise((resolve) => {
       const finish = (): void => {
         clearTimeout(timer);
         this.onGreeted = undefined;
         resolve();
       };
-      const timer = setTimeout(finish, HANDSHAKE_MS);
+      const timer = setTimeout(finish, timeoutMs);
       this.onGreeted = () => {
-        if (isMet()) finish();
+        if (isMet() || this.isClosed) finish();
       };
     });
+  }
+
+  private originalReader(): OriginalReader {
+    const onMessage = (message: Message): void => {
+      this.totals.received++;
+      this.arrived(message as Message<T>);
+    };
+    const onRefused = (reason: string): void => {
+      this.totals.refused++;
+      this.warnRefused(reason);
+    };
+    return new OriginalReader(this.topic, this.type, this.host.hold, onMessage, onRefused);
   }
 
   private reader(topic: string): TopicReader {
@@ -173,12 +205,12 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   /** @internal Bind or connect without a master. */
   attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
-    return this.reader(this.topic).attach(endpoint, how);
+    return (this.original ?? this.reader(this.topic)).attach(endpoint, how);
   }
 
   // ---- reading
 
-  private arrived(message: Message<T>, reader: TopicReader): void {
+  private arrived(message: Message<T>, reader?: TopicReader): void {
     if (this.isClosed) return;
     const waiter = this.inbox.length === 0 ? this.waiters.shift() : undefined;
     if (waiter) {
@@ -191,10 +223,19 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     }
     const dropped = this.inbox.put(message as Message);
     if (dropped > 0) {
-      reader.sources.dropped(dropped);
+      this.countDropped(dropped, reader);
       this.warnRarely(`"${this.topic}": messages come faster than they are read; the oldest ones are dropped.`);
     }
     if (this.callback) this.deliverSoon();
+  }
+
+  private countDropped(count: number, reader?: TopicReader): void {
+    if (reader) {
+      reader.sources.dropped(count);
+    } else {
+      this.totals.received -= count;
+      this.totals.lost += count;
+    }
   }
 
   /** Run callbacks now if this turn of the event loop has time left, else in the next one. */
@@ -273,6 +314,10 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   private readonly onClosed: (() => void)[] = [];
 
+  private warnRefused(reason: string): void {
+    this.warnRarely(`"${this.topic}": what came was no message. ${reason}`);
+  }
+
   private warnRarely(message: string): void {
     const now = performance.now();
     if (now < this.warnedAt + WARN_INTERVAL_MS) return;
@@ -335,6 +380,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     this.host.unregister(this);
     this.inbox.clear();
     for (const each of this.readers.values()) each.close();
+    this.original?.close();
     for (const waiter of this.waiters.splice(0)) waiter(undefined);
     for (const each of this.onClosed.splice(0)) each();
     this.onGreeted?.();

@@ -8,6 +8,7 @@ import type { Encoded } from "../messages/codecs.js";
 import { Backlog, BACKLOG_STEP_BYTES, STEP_BYTES } from "./byte_window.js";
 import { History } from "./history.js";
 import { Subscriptions } from "./subscriptions.js";
+import type { PublisherTransport } from "./transports.js";
 
 const SEND_MARK = 50_000;
 const MAX_SUBSCRIPTION_BYTES = 4096;
@@ -32,12 +33,12 @@ export interface XpubSpec {
  * A publisher's XPUB socket with its subscribers: greets them, sends each message in the form that all of them
  * read, and drops messages for those that have no room.
  */
-export class XpubTransport {
+export class XpubTransport implements PublisherTransport {
   /** Messages sent or skipped: the seq of the newest one. */
   count = 0;
   bytes = 0;
   lastStampNs: bigint | undefined;
-  readonly subscriptions: Subscriptions;
+  private readonly subscriptions: Subscriptions;
   private readonly socket: XpubSocket<Entry>;
   private readonly topic: Buffer;
   private readonly history: History;
@@ -58,6 +59,18 @@ export class XpubTransport {
     this.socket = new XpubSocket<Entry>(SEND_MARK, MAX_SUBSCRIPTION_BYTES, (queue) => this.take(queue));
     this.bindings = new Bindings(this.socket);
     this.socket.read((event) => this.noteSubscription(event), hold);
+  }
+
+  get isHeard(): boolean {
+    return this.subscriptions.isHeard;
+  }
+
+  get subscribers(): number {
+    return this.subscriptions.greeted.size;
+  }
+
+  hasGreeted(subscriber: bigint): boolean {
+    return this.subscriptions.greeted.has(subscriber);
   }
 
   // ---- where it is reached
@@ -183,8 +196,9 @@ export class XpubTransport {
   }
 
   /** Tell all subscribers that nothing comes any more. */
-  sayBye(): void {
+  sayBye(): boolean {
     for (const each of this.subscriptions.greeted.values()) this.notify(each.hello, Flag.BYE);
+    return true;
   }
 
   close(lingerMs = 0): void {

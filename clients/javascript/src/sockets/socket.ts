@@ -286,10 +286,16 @@ export class XpubSocket<T> {
    * @param sendMark High-water mark in messages for each connection.
    * @param maxSubscriptionBytes Peers that subscribe to more are disconnected.
    * @param take Takes queued entries, oldest first, and returns the parts of the next message.
+   * @param verbosity Which equal subscriptions are seen: those that come, or also those that go.
    */
-  constructor(sendMark: number, maxSubscriptionBytes: number, take: (queue: T[]) => Buffer[]) {
+  constructor(
+    sendMark: number,
+    maxSubscriptionBytes: number,
+    take: (queue: T[]) => Buffer[],
+    verbosity: "allSubs" | "allSubsUnsubs" = "allSubs",
+  ) {
     this.socket = new XPublisher({ linger: 0, sendHighWaterMark: sendMark, maxMessageSize: maxSubscriptionBytes });
-    this.socket.verbosity = "allSubs";
+    this.socket.verbosity = verbosity;
     this.sender = new Sender<T>(this.socket, take);
   }
 

@@ -1,0 +1,50 @@
+import { NepError } from "./errors.js";
+import type { Generation } from "./pubsub/original.js";
+
+const MODES = ["one2many", "many2one", "many2many"] as const;
+
+/** Connected through a master; made by `Node.hybrid`. */
+export interface HybridConfiguration {
+  readonly kind: "hybrid";
+  readonly master: string;
+}
+
+/** Connected to one address without a master; made by `Node.direct`. */
+export interface DirectConfiguration {
+  readonly kind: "direct";
+  readonly ip: string;
+  readonly port: number;
+  readonly mode: (typeof MODES)[number];
+  readonly generation: Generation;
+  readonly wire: "original" | "native";
+}
+
+/** How a publisher or subscriber is connected. */
+export type Configuration = HybridConfiguration | DirectConfiguration;
+
+/** What a direct connection speaks. */
+export interface DirectOptions {
+  /** Frames that are sent: `A` (default) for the original NEP up to 0.5.4.5, `B` from 0.5.4.8 on. Both are received. */
+  readonly generation?: Generation;
+  /** `original` (default), or the `native` wire. */
+  readonly wire?: "original" | "native";
+}
+
+/** Return a direct configuration. @throws {NepError} for what is no address, port or mode. */
+export function directConfiguration(ip: string, port: number | string, mode: string, options: DirectOptions): DirectConfiguration {
+  const known = MODES.find((each) => each === mode);
+  if (!known) throw new NepError(`"${mode}" is no mode. Use ${MODES.join(", ")}.`);
+  const number = Number(port);
+  if (!Number.isInteger(number) || number < 1 || number > 65535) throw new NepError(`"${port}" is no port. Use a number from 1 to 65535.`);
+  if (!/^[\w.-]+$/.test(ip)) throw new NepError(`"${ip}" is no address of a computer.`);
+  return { kind: "direct", ip, port: number, mode: known, generation: options.generation ?? "A", wire: options.wire ?? "original" };
+}
+
+/** Return where a side of a direct connection binds or connects. In `many2many` a proxy of the original NEP binds both ports. */
+export function attachment(direct: DirectConfiguration, isPublisher: boolean): { endpoint: string; how: "bind" | "connect" } {
+  if (direct.mode === "many2many") {
+    return { endpoint: `tcp://${direct.ip}:${direct.port + (isPublisher ? 0 : 1)}`, how: "connect" };
+  }
+  const binds = isPublisher === (direct.mode === "one2many");
+  return { endpoint: `tcp://${direct.ip}:${direct.port}`, how: binds ? "bind" : "connect" };
+}
