@@ -79,6 +79,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   private closed: Promise<void> | undefined;
   private failure: Error | undefined;
   private problem = "";
+  private refusal = "";
   private warnedAt = -Infinity;
   private readonly totals = { received: 0, lost: 0, refused: 0 };
   private readonly close_ = (): void => void this.close();
@@ -315,6 +316,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   private readonly onClosed: (() => void)[] = [];
 
   private warnRefused(reason: string): void {
+    this.refusal = reason;
     this.warnRarely(`"${this.topic}": what came was no message. ${reason}`);
   }
 
@@ -337,7 +339,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
       id: this.spec.id,
       received: bounded(this.received),
       lost: bounded(this.lost),
-      ...(this.problem && { problem: this.problem }),
+      ...((this.problem || this.refusal) && { problem: this.problem || `${this.refused} could not be read. ${this.refusal}` }),
     };
   }
 

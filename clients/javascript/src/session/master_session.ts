@@ -15,8 +15,9 @@ import { RpcClient } from "./rpc.js";
 
 const RENEW_S = 1;
 const MAX_RENEW_S = 30;
-const ANSWER_MS = 300; // a renewal without an answer is sent again after this ...
-const RECONNECT_MS = 3000; // ... and over a new connection after this
+const ANSWER_MS = 1000; // a renewal without an answer is sent again after this, ...
+const RESEND_MS = 300; // ... then at this interval, ...
+const RECONNECT_MS = 3000; // ... and over a new connection when nothing was heard for so long
 const JOIN_AGAIN_MS = 500;
 const MAX_CPU_RATIO = 1024;
 /** How long `publisher` and `subscriber` wait for a master before they fail or warn. */
@@ -64,6 +65,8 @@ export class MasterSession {
   private revision = 0n;
   private renewS = RENEW_S;
   private timer: NodeJS.Timeout | undefined;
+  /** Whether the newest renewal has no answer yet. */
+  private isUnanswered = false;
   private joinAgainAt = -Infinity;
   private connectedAt = performance.now();
   private servedHosts: readonly string[] = [];
@@ -189,21 +192,28 @@ export class MasterSession {
   private schedule(): void {
     if (this.timer || this.isClosed) return;
     this.connectedAt = performance.now();
-    this.timer = setTimeout(() => this.tick(), RENEW_S * 1000).unref();
+    this.tickAfter(RENEW_S * 1000);
+  }
+
+  private tickAfter(delayMs: number): void {
+    clearTimeout(this.timer);
+    if (!this.isClosed) this.timer = setTimeout(() => this.tick(), delayMs).unref();
   }
 
   private tick(): void {
     const now = performance.now();
-    const isSilent = this.rpc.heardAt < now - this.renewS * 1000 - ANSWER_MS;
-    if (isSilent && Math.max(this.connectedAt, this.rpc.heardAt) < now - RECONNECT_MS) {
-      this.connectedAt = now;
-      this.rpc.reconnect();
-    } else if (isSilent) {
-      this.rpc.resend();
+    if (this.isUnanswered) {
+      if (Math.max(this.connectedAt, this.rpc.heardAt) < now - RECONNECT_MS) {
+        this.connectedAt = now;
+        this.rpc.reconnect();
+      } else {
+        this.rpc.resend();
+      }
     }
     void this.followHosts();
     this.renew();
-    this.timer = setTimeout(() => this.tick(), isSilent ? ANSWER_MS : this.renewS * 1000).unref();
+    this.tickAfter(this.isUnanswered ? RESEND_MS : ANSWER_MS);
+    this.isUnanswered = true;
   }
 
   private renew(): void {
@@ -280,6 +290,7 @@ export class MasterSession {
   }
 
   private renewed(answer: Extract<Answer, { is: "renewed" }>): void {
+    this.isUnanswered = false;
     if (answer.again) {
       this.join();
       return;
@@ -290,6 +301,7 @@ export class MasterSession {
       const remotes = each.publishers.map((remote) => this.inReach(remote));
       for (const subscriber of this.subscribersOf(each.topic)) subscriber.reconcile(each.topic, remotes);
     }
+    this.tickAfter(this.renewS * 1000);
     for (const each of this.subscribers.values()) each.owner.tick(answer.lastSeqs);
   }
 

@@ -11,6 +11,7 @@ const ZMQ_SNDHWM = 23;
 const HELD_RECEIVE_MS = 1000;
 const BRIEF_RECEIVE_MS = 20;
 const POLL_MS = 10;
+const LOOK_INTERVAL_MS = 0.5;
 const MAX_TURN_MS = 10; // then timers run: renewals of the lease above all
 
 const immediate = (): Promise<void> => new Promise((resolve) => setImmediate(resolve));
@@ -92,6 +93,8 @@ class Sender<T> {
     private readonly socket: WritableSocket,
     /** Takes entries from the queue, oldest first, and returns the parts of the next message. */
     private readonly take: (queue: T[]) => Buffer[],
+    /** Whether something is to be read before the next message is taken. */
+    private readonly mustRead: () => boolean = () => false,
   ) {}
 
   get length(): number {
@@ -111,18 +114,26 @@ class Sender<T> {
 
   private pump(): void {
     while ((this.unsent || this.queue.length > 0) && !this.socket.closed) {
+      if (!this.unsent && this.mustRead()) {
+        this.pumpAfter(immediate());
+        return;
+      }
       const parts = this.unsent ?? this.take(this.queue);
       if (!this.trySend(parts)) {
         this.unsent = parts;
         // EBUSY without a send under way: the socket is being bound.
-        this.waiting = (this.isInFlight ? this.last : immediate()).then(() => {
-          this.waiting = undefined;
-          this.pump();
-        });
+        this.pumpAfter(this.isInFlight ? this.last : immediate());
         return;
       }
       this.unsent = undefined;
     }
+  }
+
+  private pumpAfter(event: Promise<void>): void {
+    this.waiting = event.then(() => {
+      this.waiting = undefined;
+      this.pump();
+    });
   }
 
   private trySend(parts: Buffer[]): boolean {
@@ -281,6 +292,7 @@ export class XpubSocket<T> {
   private readonly socket: XPublisher;
   private readonly sender: Sender<T>;
   private reader: Reader | undefined;
+  private lookedAt = -Infinity;
 
   /**
    * @param sendMark High-water mark in messages for each connection.
@@ -296,7 +308,17 @@ export class XpubSocket<T> {
   ) {
     this.socket = new XPublisher({ linger: 0, sendHighWaterMark: sendMark, maxMessageSize: maxSubscriptionBytes });
     this.socket.verbosity = verbosity;
-    this.sender = new Sender<T>(this.socket, take);
+    this.sender = new Sender<T>(this.socket, take, () => this.hasSubscriptions());
+  }
+
+  /** Whether subscriptions wait to be read, which decide about the form of the next message. */
+  private hasSubscriptions(): boolean {
+    const now = performance.now();
+    if (now < this.lookedAt + LOOK_INTERVAL_MS) return false;
+    this.lookedAt = now;
+    if (!this.socket.readable) return false;
+    this.reader?.wake();
+    return true;
   }
 
   get isClosed(): boolean {
