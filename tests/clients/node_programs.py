@@ -59,28 +59,37 @@ def run_npm(*arguments: str) -> None:
 
 def run_script(script: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a CommonJS program that finds nep-js as an installed package, until it ends by itself."""
-    with installed(folder):
-        (folder / "program.cjs").write_text(script, encoding="utf-8")
-        return subprocess.run(
-            [str(node), "program.cjs"],
-            cwd=folder,
-            env={**os.environ, **environment},
-            capture_output=True,
-            text=True,
-            timeout=LONG_S,
-            check=False,
-        )
+    return subprocess.run(
+        prepared(script, folder),
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=LONG_S,
+        check=False,
+    )
 
 
 @contextmanager
-def installed(folder: Path) -> Iterator[None]:
-    """Make nep-js and zeromq importable from a folder."""
+def running_script(script: str, folder: Path, *arguments: str, **environment: str) -> Iterator[None]:
+    """Run such a program in the background; kill it in the end."""
+    command = [*prepared(script, folder), *arguments]
+    process = subprocess.Popen(command, cwd=folder, env={**os.environ, **environment})
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait(LONG_S)
+
+
+def prepared(script: str, folder: Path) -> list[str]:
+    """Write a program into a folder from which nep-js and zeromq are importable; the command that runs it."""
     modules = folder / "node_modules"
     modules.mkdir(exist_ok=True)
     for name, target in (("nep-js", PACKAGE), ("zeromq", PACKAGE / "node_modules" / "zeromq")):
-        if not (modules / name).exists():
-            (modules / name).symlink_to(target, target_is_directory=True)
-    yield
+        (modules / name).symlink_to(target, target_is_directory=True)
+    (folder / "program.cjs").write_text(script, encoding="utf-8")
+    return [str(node), "program.cjs"]
 
 
 class Adapter:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import base64
 import json
 import os
+import socket
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 
@@ -14,6 +16,7 @@ import pytest
 import nep
 from nep.masters.master import Master
 from tests.clients.node_programs import (
+    ADAPTER,
     LONG_S,
     NEEDS_NODE,
     PACKAGE,
@@ -21,6 +24,7 @@ from tests.clients.node_programs import (
     build_package,
     node,
     run_script,
+    running_script,
 )
 
 pytestmark = NEEDS_NODE
@@ -45,6 +49,11 @@ var callback = function (message) {{
 }};
 var subscriber = node.new_callback("test", "json", callback);
 """
+SLOW_RULES = {
+    "again", "bye-again", "closed-is-left", "lost-last-seq", "lost-late", "malformed-named", "next-s",
+    "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
+}  # fmt: skip
+"""They wait for renewals for seconds each; `nep wire check` without --rule has them, too."""
 LARGE_BYTES = 6 * 2**20
 LARGE_COUNT = 50
 
@@ -67,6 +76,17 @@ def program(master: Master) -> Iterator[Adapter]:
 def python(master: Master) -> Iterator[nep.node]:
     with nep.node("python") as own:
         yield own
+
+
+def nep_command(*arguments: str) -> str:
+    command = [sys.executable, "-m", "nep", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False).stdout
+
+
+def free_port() -> int:
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        return bound.getsockname()[1]
 
 
 def wait_until(is_met: Callable[[], bool]) -> None:
@@ -264,3 +284,46 @@ def test_publisher_bounds_what_is_under_way_to_a_slow_subscriber(program, python
         received += 1
     assert received + subscriber.lost == LARGE_COUNT
     assert received >= 24 * 2**20 // LARGE_BYTES
+
+
+DIRECT = """\
+const nep = require("nep-js");
+
+const node = new nep.Node("direct_sample");
+const [toJs, toPython] = process.argv.slice(2).map((port) => Number(port));
+const options = JSON.parse(process.env.DIRECT_OPTIONS);
+const publisher = node.new_pub("answers", "json", node.direct("127.0.0.1", toPython, "many2one", options));
+const asked = node.direct("127.0.0.1", toJs, "one2many", options);
+node.new_sub("questions", "json", (message) => publisher.publish(message), asked);
+"""
+
+
+@pytest.mark.parametrize("options", [{"generation": "A"}, {"generation": "B"}, {"wire": "native"}])
+def test_direct_connections_need_no_master(tmp_path, options):
+    to_js, to_python = free_port(), free_port()
+    with (
+        nep.node("python") as python,
+        running_script(DIRECT, tmp_path, str(to_js), str(to_python), DIRECT_OPTIONS=json.dumps(options)),
+    ):
+        answers = python.new_sub(
+            "answers", "json", python.direct("127.0.0.1", to_python, "many2one", **options)
+        )
+        questions = python.new_pub(
+            "questions", "json", python.direct("127.0.0.1", to_js, "one2many", **options)
+        )
+        wait_until(lambda: questions.subscribers > 0 and answered(questions, answers))
+
+
+def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:
+    questions.publish({"topic": "questions", "text": "grüß dich"})
+    is_there, payload = answers.listen(timeout_s=0.05)
+    assert not is_there or payload == {"topic": "questions", "text": "grüß dich"}
+    return is_there
+
+
+def test_library_conforms_to_the_wire():
+    listed = nep_command("wire", "check", "--list", "--json")
+    rules = [each["id"] for each in json.loads(listed) if each["id"] not in SLOW_RULES]
+    chosen = [word for rule in rules for word in ("--rule", rule)]
+    outcomes = json.loads(nep_command("wire", "check", "--json", *chosen, "--", str(node), str(ADAPTER)))
+    assert {each["id"]: each["status"] for each in outcomes} == dict.fromkeys(rules, "passed")
