@@ -188,6 +188,23 @@ test("what a codec can't carry is refused with a reason", () => {
   assert.throws(() => codecFor("string").decode(Buffer.from([0xff]), {}), { name: "DecodeError" });
 });
 
+test("hostile msgpack is refused without taking memory", () => {
+  const codec = codecFor("msgpack");
+  const huge = Buffer.from("dd01ffffff".repeat(200), "hex");
+  const deep = Buffer.concat([Buffer.alloc(65, 0x91), Buffer.from([0xc0])]);
+  const before = process.memoryUsage().rss;
+  for (const data of [huge, deep, Buffer.from("df7fffffff", "hex"), Buffer.from("a5ab", "hex"), Buffer.from("c0c0", "hex"), Buffer.alloc(0), Buffer.from("c1", "hex"), Buffer.alloc(300_000, 0x91)]) {
+    assert.throws(() => codec.decode(data, {}), { name: "DecodeError" }, data.toString("hex", 0, 10));
+  }
+  assert.ok(process.memoryUsage().rss - before < 100e6);
+  const allowed = Buffer.concat([Buffer.alloc(64, 0x91), Buffer.from([0xc0])]);
+  assert.doesNotThrow(() => codec.decode(allowed, {}));
+  const everything = { n: [null, true, 1, -1, 200, 2 ** 20, 2n ** 63n, -(2n ** 40n), 1.5], text: ["", "a".repeat(40), "b".repeat(300), "c".repeat(70000)], bin: [new Uint8Array(3), new Uint8Array(300), new Uint8Array(70000)], list: Array(70000).fill(0), date: new Date(1234567890123), map: Object.fromEntries(Array.from({ length: 20 }, (_, n) => [`k${n}`, n])) };
+  const decoded = codec.decode(codec.encode(everything).data, {});
+  assert.equal(decoded.list.length, 70000);
+  assert.equal(decoded.date.getTime(), 1234567890123);
+});
+
 test("images keep their bytes and tell their shape", () => {
   const codec = codecFor("image");
   const raw = { data: Buffer.from([1, 2, 3, 4, 5, 6]), encoding: "rgb8", shape: [1, 2, 3] };

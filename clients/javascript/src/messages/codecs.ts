@@ -93,14 +93,11 @@ const msgpack: Codec = {
     }
   },
   decode(data) {
-    let value: unknown;
     try {
-      value = unpack(data);
+      return unpack(data);
     } catch (error) {
       throw new DecodeError(`${data.length} bytes are no msgpack: ${(error as Error).message}`);
     }
-    if (isTooDeep(value)) throw new DecodeError(`The msgpack is refused: ${TOO_DEEP}.`);
-    return value;
   },
 };
 

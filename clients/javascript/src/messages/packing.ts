@@ -1,4 +1,5 @@
 import { decode, encode } from "@msgpack/msgpack";
+import { checkPacked } from "./packed_scan.js";
 
 const DECODE_OPTIONS = {
   useBigInt64: true,
@@ -13,13 +14,15 @@ export function pack(value: unknown): Buffer {
   return Buffer.from(packed.buffer, packed.byteOffset, packed.byteLength);
 }
 
-/** Decode msgpack. 64-bit integers become `bigint`. @throws {RangeError | Error} if it is none. */
+/** Decode msgpack. 64-bit integers become `bigint`. @throws {RangeError | Error} if it is none or nested too deeply. */
 export function unpack(packed: Uint8Array): unknown {
+  checkPacked(packed);
   return decode(packed, DECODE_OPTIONS);
 }
 
 /** Decode msgpack whose maps have text keys only. @throws if it is none. */
 export function unpackWithTextKeys(packed: Uint8Array): unknown {
+  checkPacked(packed);
   return decode(packed, { ...DECODE_OPTIONS, mapKeyConverter: textKey });
 }
 

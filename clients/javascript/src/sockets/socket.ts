@@ -11,6 +11,7 @@ const ZMQ_SNDHWM = 23;
 const HELD_RECEIVE_MS = 1000;
 const BRIEF_RECEIVE_MS = 20;
 const POLL_MS = 10;
+const MAX_UNREAD_CALLS = 100; // of each client, in libzmq; more wait there
 const LOOK_INTERVAL_MS = 0.5;
 const MAX_TURN_MS = 10; // then timers run: renewals of the lease above all
 
@@ -199,7 +200,7 @@ export class RouterSocket {
 
   /** @param maxBytes Peers that send a larger part are disconnected. */
   constructor(maxBytes: number) {
-    this.socket = new Router({ linger: 1000, maxMessageSize: maxBytes });
+    this.socket = new Router({ linger: 1000, maxMessageSize: maxBytes, receiveHighWaterMark: MAX_UNREAD_CALLS });
     this.sender = new Sender<Buffer[]>(this.socket, firstEntry);
   }
 
