@@ -8,8 +8,7 @@ import os
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
@@ -26,6 +25,7 @@ from tests.clients.node_programs import (
     run_script,
     running_script,
 )
+from tests.nep.programs import eventually
 
 pytestmark = NEEDS_NODE
 
@@ -87,13 +87,6 @@ def free_port() -> int:
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))
         return bound.getsockname()[1]
-
-
-def wait_until(is_met: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + LONG_S
-    while not is_met():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def test_own_tests_of_the_package_pass(master):
@@ -254,7 +247,7 @@ def test_killed_program_leaves_the_graph_and_costs_new_publishers_nothing(progra
     publisher = python.new_pub("test", "json")
     assert publisher.subscribers == 1
     program.process.kill()
-    wait_until(lambda: publisher.subscribers == 0)
+    eventually(lambda: publisher.subscribers == 0)
     publisher.publish(1)
 
 
@@ -270,7 +263,7 @@ def test_subscriber_that_reads_nothing_for_a_while_counts_what_it_missed(program
         counts = program.do("counts", sub=sub)
         return int(counts["received"]) + int(counts["lost"]) == LARGE_COUNT
 
-    wait_until(is_complete)
+    eventually(is_complete)
 
 
 def test_publisher_bounds_what_is_under_way_to_a_slow_subscriber(program, python):
@@ -311,7 +304,7 @@ def test_direct_connections_need_no_master(tmp_path, options):
         questions = python.new_pub(
             "questions", "json", python.direct("127.0.0.1", to_js, "one2many", **options)
         )
-        wait_until(lambda: questions.subscribers > 0 and answered(questions, answers))
+        eventually(lambda: questions.subscribers > 0 and answered(questions, answers))
 
 
 def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:

@@ -120,12 +120,14 @@ test("the form of messages follows who subscribes", () => {
   assert.ok(!subscriptions.isHeard);
 });
 
-test("messages that have to wait go together, and everybody gets them all", async () => {
+test("messages that have to wait go together, and everybody gets them all", async (t) => {
   const spec = { id: ID, topic: "t", codecNumber: 1, latched: false, history: 0, batch: true };
   let greeted = 0;
   const transport = new XpubTransport(spec, () => "brief", () => greeted++, assert.fail);
+  t.after(() => transport.close());
   const [endpoint] = await transport.move(["127.0.0.1"]);
   const socket = new Subscriber({ receiveTimeout: 5000 });
+  t.after(() => socket.close());
   socket.subscribe(topicPart("t"));
   socket.subscribe(helloPart({ subscriber: 1n, topic: "t", level: 3 }));
   socket.connect(endpoint);
@@ -142,8 +144,6 @@ test("messages that have to wait go together, and everybody gets them all", asyn
   assert.ok(parts < count, `${parts} parts`);
   assert.deepEqual(received.map((each) => Number(each.payload.toString())), Array.from({ length: count }, (_, index) => index + 1));
   assert.deepEqual(received.map((each) => Number(each.header.seq)), Array.from({ length: count }, (_, index) => index + 1));
-  socket.close();
-  transport.close();
 });
 
 test("frames of the original NEP", () => {

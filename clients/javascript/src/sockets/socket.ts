@@ -27,6 +27,8 @@ export type Hold = "none" | "brief" | "long";
 class Reader {
   private isClosed = false;
   private isReading = false;
+  /** What the socket's receive timeout is set for. */
+  private timedFor: Hold | undefined;
   private timer: NodeJS.Timeout | undefined;
 
   constructor(
@@ -66,7 +68,10 @@ class Reader {
   }
 
   private async receive(hold: Hold): Promise<void> {
-    this.socket.receiveTimeout = hold === "long" ? HELD_RECEIVE_MS : BRIEF_RECEIVE_MS;
+    if (hold !== this.timedFor) {
+      this.timedFor = hold;
+      this.socket.receiveTimeout = hold === "long" ? HELD_RECEIVE_MS : BRIEF_RECEIVE_MS;
+    }
     const turnEnds = performance.now() + MAX_TURN_MS;
     try {
       do {
