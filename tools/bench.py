@@ -35,8 +35,8 @@ NAMES = (
     "blocks_editor",
     "studio_tabs",
 )
-ASKED = ("nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
-"""These run only when they are asked for: they take long, need ROS 1 or a package, or time nothing."""
+ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
+"""These run only when asked for: they take long, need ROS 1, Node.js or a package, or time nothing."""
 
 
 def main() -> int:
