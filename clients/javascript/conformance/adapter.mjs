@@ -4,7 +4,19 @@ import { createInterface } from "node:readline";
 import nep from "../dist/index.mjs";
 
 const { Node } = nep;
-const FEATURES = ["hello1", "hello2", "hello3", "losses", "latched", "history", "patterns", "services", "latest", "statistics", "keys"];
+const FEATURES = [
+  "hello1",
+  "hello2",
+  "hello3",
+  "losses",
+  "latched",
+  "history",
+  "patterns",
+  "services",
+  "latest",
+  "statistics",
+  "keys",
+];
 const publishers = new Map();
 const subscribers = new Map();
 const clients = new Map();
@@ -19,7 +31,9 @@ function write(value) {
 function jsonForm(message) {
   if (message.codec === "bytes" || message.codec === "image") return undefined;
   try {
-    return JSON.parse(JSON.stringify(message.payload, (_key, value) => (typeof value === "bigint" ? String(value) : value)));
+    return JSON.parse(
+      JSON.stringify(message.payload, (_key, value) => (typeof value === "bigint" ? String(value) : value)),
+    );
   } catch {
     return undefined;
   }
@@ -28,7 +42,17 @@ function jsonForm(message) {
 function report(sub, message) {
   const { topic, codec, seq, stampNs, publisher, data } = message;
   const payload = data.toString("base64");
-  write({ event: "message", sub, topic, codec, seq: String(seq), stamp_ns: String(stampNs), publisher: String(publisher), payload, value: jsonForm(message) });
+  write({
+    event: "message",
+    sub,
+    topic,
+    codec,
+    seq: String(seq),
+    stamp_ns: String(stampNs),
+    publisher: String(publisher),
+    payload,
+    value: jsonForm(message),
+  });
 }
 
 function payloadOf({ value, text, bytes }) {
@@ -54,7 +78,8 @@ const actions = {
 
   publish({ pub, count, ...given }) {
     const payload = payloadOf(given);
-    const isMap = payload !== null && typeof payload === "object" && !Buffer.isBuffer(payload) && !Array.isArray(payload);
+    const isMap =
+      payload !== null && typeof payload === "object" && !Buffer.isBuffer(payload) && !Array.isArray(payload);
     for (let n = 1; n <= (count ?? 1); n++) {
       publishers.get(pub).publish(count !== undefined && isMap ? { ...payload, n } : payload);
     }
@@ -63,7 +88,9 @@ const actions = {
 
   async subscriber({ topic, type, latest = false }) {
     const sub = ++lastNumber;
-    const subscriber = node.subscribe(topic, { type, keep: latest ? "latest" : "all" }, (message) => report(sub, message));
+    const subscriber = node.subscribe(topic, { type, keep: latest ? "latest" : "all" }, (message) =>
+      report(sub, message),
+    );
     subscribers.set(sub, subscriber);
     await subscriber.ready;
     return { sub };

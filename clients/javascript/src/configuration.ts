@@ -31,17 +31,33 @@ export interface DirectOptions {
 }
 
 /** Return a direct configuration. @throws {NepError} for what is no address, port or mode. */
-export function directConfiguration(ip: string, port: number | string, mode: string, options: DirectOptions): DirectConfiguration {
+export function directConfiguration(
+  ip: string,
+  port: number | string,
+  mode: string,
+  options: DirectOptions,
+): DirectConfiguration {
   const known = MODES.find((each) => each === mode);
   if (!known) throw new NepError(`"${mode}" is no mode. Use ${MODES.join(", ")}.`);
   const number = Number(port);
-  if (!Number.isInteger(number) || number < 1 || number > 65535) throw new NepError(`"${port}" is no port. Use a number from 1 to 65535.`);
+  if (!Number.isInteger(number) || number < 1 || number > 65535)
+    throw new NepError(`"${port}" is no port. Use a number from 1 to 65535.`);
   if (!/^[\w.-]+$/.test(ip)) throw new NepError(`"${ip}" is no address of a computer.`);
-  return { kind: "direct", ip, port: number, mode: known, generation: options.generation ?? "A", wire: options.wire ?? "original" };
+  return {
+    kind: "direct",
+    ip,
+    port: number,
+    mode: known,
+    generation: options.generation ?? "A",
+    wire: options.wire ?? "original",
+  };
 }
 
 /** Return where a side of a direct connection binds or connects. In `many2many` a proxy of the original NEP binds both ports. */
-export function attachment(direct: DirectConfiguration, isPublisher: boolean): { endpoint: string; how: "bind" | "connect" } {
+export function attachment(
+  direct: DirectConfiguration,
+  isPublisher: boolean,
+): { endpoint: string; how: "bind" | "connect" } {
   if (direct.mode === "many2many") {
     return { endpoint: `tcp://${direct.ip}:${direct.port + (isPublisher ? 0 : 1)}`, how: "connect" };
   }

@@ -1,9 +1,22 @@
 import { EventEmitter } from "node:events";
 import { hostname } from "node:os";
-import { attachment, type Configuration, type DirectConfiguration, directConfiguration, type DirectOptions, type HybridConfiguration } from "./configuration.js";
+import {
+  attachment,
+  type Configuration,
+  type DirectConfiguration,
+  directConfiguration,
+  type DirectOptions,
+  type HybridConfiguration,
+} from "./configuration.js";
 import { NepError } from "./errors.js";
 import { Publisher, type PublisherHost, type PublisherOptions } from "./pubsub/publisher.js";
-import { type MessageCallback, type Attachable, type SubscribeOptions, Subscriber, type SubscriberHost } from "./pubsub/subscriber.js";
+import {
+  type MessageCallback,
+  type Attachable,
+  type SubscribeOptions,
+  Subscriber,
+  type SubscriberHost,
+} from "./pubsub/subscriber.js";
 import type { NodeRecord } from "./protocol/requests.js";
 import { Client, type ClientHost, type ClientOptions } from "./services/client.js";
 import { Server, type ServerHost, type ServiceCallback } from "./services/server.js";
@@ -80,7 +93,15 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     this.masterWaitS = masterWaitS ?? undefined;
     const key = newKey();
     this.id = nodeIdFrom(key);
-    this.record = { id: this.id, name: checkNodeName(name), host: hostname(), pid: process.pid, language: "JavaScript", since_ns: nowNs(), key };
+    this.record = {
+      id: this.id,
+      name: checkNodeName(name),
+      host: hostname(),
+      pid: process.pid,
+      language: "JavaScript",
+      since_ns: nowNs(),
+      key,
+    };
     openNodes.add(this);
   }
 
@@ -109,12 +130,21 @@ export class Node extends EventEmitter<{ warning: [string] }> {
    */
   subscribe<T = unknown>(topic: string, options?: SubscribeOptions, callback?: MessageCallback<T>): Subscriber<T>;
   subscribe<T = unknown>(topic: string, callback: MessageCallback<T>): Subscriber<T>;
-  subscribe<T = unknown>(topic: string, second: SubscribeOptions | MessageCallback<T> = {}, callback?: MessageCallback<T>): Subscriber<T> {
+  subscribe<T = unknown>(
+    topic: string,
+    second: SubscribeOptions | MessageCallback<T> = {},
+    callback?: MessageCallback<T>,
+  ): Subscriber<T> {
     const [options, onMessage] = typeof second === "function" ? [{}, second] : [second, callback];
     return this.makeSubscriber<T>(topic, options, onMessage, this.masterWaitS);
   }
 
-  private makePublisher<T>(topic: string, options: PublisherOptions, waitS: number | undefined, configuration?: Configuration): Publisher<T> {
+  private makePublisher<T>(
+    topic: string,
+    options: PublisherOptions,
+    waitS: number | undefined,
+    configuration?: Configuration,
+  ): Publisher<T> {
     this.checkOpen();
     checkTopic(topic);
     const number = this.nextNumber();
@@ -123,7 +153,10 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     const host: PublisherHost =
       configuration?.kind === "direct"
         ? { ...common, ...this.directPublishing(configuration) }
-        : { ...common, ...this.masteredPublishing(this.session(configuration), { id, number, topic }, options, waitS) };
+        : {
+            ...common,
+            ...this.masteredPublishing(this.session(configuration), { id, number, topic }, options, waitS),
+          };
     const publisher = new Publisher<T>({ ...options, id, number, topic }, host);
     this.open.add(publisher);
     return publisher;
@@ -137,8 +170,17 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   ): Omit<PublisherHost, "hold" | "warn"> {
     return {
       register: (owner, transport) => {
-        const record = { ...named, msg_type: owner.type, codec: owner.codecName, latched: latched || history > 0, history };
-        const registered = { counts: () => owner.counts(), move: (hosts: readonly string[]) => transport.move(hosts) };
+        const record = {
+          ...named,
+          msg_type: owner.type,
+          codec: owner.codecName,
+          latched: latched || history > 0,
+          history,
+        };
+        const registered = {
+          counts: () => owner.counts(),
+          move: (hosts: readonly string[]) => transport.move(hosts),
+        };
         return this.patiently(session, waitS, session.addPublisher(record, registered, waitS));
       },
       reportMissing: (subscribers) => session.reportMissing(named.id, subscribers),
@@ -210,7 +252,10 @@ export class Node extends EventEmitter<{ warning: [string] }> {
    *
    * @throws {MasterUnreachableError | BadTopicError | RequestRefusedError}
    */
-  serve<Request = unknown, Answer = unknown>(service: string, callback: ServiceCallback<Request, Answer>): Promise<Server> {
+  serve<Request = unknown, Answer = unknown>(
+    service: string,
+    callback: ServiceCallback<Request, Answer>,
+  ): Promise<Server> {
     return this.makeServer(service, callback as ServiceCallback, this.masterWaitS).ready;
   }
 
@@ -253,7 +298,11 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     const host: ClientHost = {
       warn: (message) => this.warn(message),
       register: (owner) =>
-        this.patiently(session, this.masterWaitS, session.addSubscriber({ id, number, topic, msg_type: SERVICE_TYPE }, owner, this.masterWaitS)),
+        this.patiently(
+          session,
+          this.masterWaitS,
+          session.addSubscriber({ id, number, topic, msg_type: SERVICE_TYPE }, owner, this.masterWaitS),
+        ),
       unregister: (owner) => {
         session.removeSubscriber(id);
         this.open.delete(owner as Client);
@@ -267,7 +316,9 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   /** Warn when there is no master, and when registering fails. */
   private async patiently<R>(session: MasterSession, waitS: number | undefined, registered: Promise<R>): Promise<R> {
     const warnAfter = (): void =>
-      this.warn(`No master answers at ${session.address}; waiting for one. Start it with "nep master", or set NEP_MASTER to its address.`);
+      this.warn(
+        `No master answers at ${session.address}; waiting for one. Start it with "nep master", or set NEP_MASTER to its address.`,
+      );
     const timer = waitS === undefined ? setTimeout(warnAfter, MASTER_WAIT_S * 1000) : undefined;
     try {
       return await registered;
@@ -292,23 +343,39 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   }
 
   /** Subscribe; `callback` gets each decoded payload. Waits for a master as long as there is none. */
-  new_sub<T = unknown>(topic: string, type = "json", callback?: PayloadCallback<T>, configuration?: Configuration): Subscriber<T> {
+  new_sub<T = unknown>(
+    topic: string,
+    type = "json",
+    callback?: PayloadCallback<T>,
+    configuration?: Configuration,
+  ): Subscriber<T> {
     const onMessage = callback && ((message: { readonly payload: T }): void => callback(message.payload));
     return this.makeSubscriber<T>(topic, { type }, onMessage, undefined, configuration);
   }
 
   /** Same as {@link new_sub}, with a callback. */
-  new_callback<T = unknown>(topic: string, type: string, callback: PayloadCallback<T>, configuration?: Configuration): Subscriber<T> {
+  new_callback<T = unknown>(
+    topic: string,
+    type: string,
+    callback: PayloadCallback<T>,
+    configuration?: Configuration,
+  ): Subscriber<T> {
     return this.new_sub<T>(topic, type, callback, configuration);
   }
 
   /** Answer the calls of a service. Waits for a master as long as there is none. */
-  new_server<Request = unknown, Answer = unknown>(service: string, callback: ServiceCallback<Request, Answer>): Server {
+  new_server<Request = unknown, Answer = unknown>(
+    service: string,
+    callback: ServiceCallback<Request, Answer>,
+  ): Server {
     return this.makeServer(service, callback as ServiceCallback, undefined);
   }
 
   /** Same as {@link client}. */
-  new_client<Request = unknown, Answer = unknown>(service: string, options: ClientOptions = {}): Client<Request, Answer> {
+  new_client<Request = unknown, Answer = unknown>(
+    service: string,
+    options: ClientOptions = {},
+  ): Client<Request, Answer> {
     return this.client<Request, Answer>(service, options);
   }
 
@@ -323,7 +390,12 @@ export class Node extends EventEmitter<{ warning: [string] }> {
    * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to a proxy.
    * @throws {NepError} for what is no address, port or mode.
    */
-  direct(ip = LOOPBACK, port: number | string = 9000, mode = "one2many", options: DirectOptions = {}): DirectConfiguration {
+  direct(
+    ip = LOOPBACK,
+    port: number | string = 9000,
+    mode = "one2many",
+    options: DirectOptions = {},
+  ): DirectConfiguration {
     return directConfiguration(ip, port, mode, options);
   }
 
@@ -370,7 +442,12 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     const address = configuration?.master ?? this.masterOf;
     let session = this.sessions.get(address);
     if (!session) {
-      session = new MasterSession(address, this.record, (message) => this.warn(`Master at ${hostOf(address)}: ${message}`), () => this.holders.size > 0);
+      session = new MasterSession(
+        address,
+        this.record,
+        (message) => this.warn(`Master at ${hostOf(address)}: ${message}`),
+        () => this.holders.size > 0,
+      );
       this.sessions.set(address, session);
     }
     return session;

@@ -52,7 +52,8 @@ test("the latest message replaces those that nobody read", hasMaster, async (t) 
   const subscriber = await node.subscribe("newest", { keep: "latest" }).ready;
   const other = await node.subscribe("newest", { maxMessages: 3 }).ready;
   for (let n = 1; n <= 100; n++) publisher.publish(n);
-  while (other.received + other.lost < 100 || subscriber.received < 100) await new Promise((resolve) => setImmediate(resolve));
+  while (other.received + other.lost < 100 || subscriber.received < 100)
+    await new Promise((resolve) => setImmediate(resolve));
   assert.equal((await subscriber.receive(1)).payload, 100);
   assert.equal(subscriber.lost, 0);
   assert.deepEqual([other.received, other.lost], [3, 97]);

@@ -72,13 +72,19 @@ test("a send window closes at its bound and opens with what was read", () => {
 });
 
 test("the inbox drops its oldest messages", () => {
-  const message = (seq) => new Message("t", Buffer.alloc(10), codecFor("bytes"), "bytes", BigInt(seq), 0n, ID, {}, false);
+  const message = (seq) =>
+    new Message("t", Buffer.alloc(10), codecFor("bytes"), "bytes", BigInt(seq), 0n, ID, {}, false);
   const byCount = new Inbox(true, 3, 1000);
   const byBytes = new Inbox(true, 1000, 25);
   const latest = new Inbox(false, 1000, 1000);
-  const dropped = [byCount, byBytes, latest].map((each) => [1, 2, 3, 4, 5].reduce((sum, seq) => sum + each.put(message(seq)), 0));
+  const dropped = [byCount, byBytes, latest].map((each) =>
+    [1, 2, 3, 4, 5].reduce((sum, seq) => sum + each.put(message(seq)), 0),
+  );
   assert.deepEqual(dropped, [2, 3, 0]);
-  assert.deepEqual([byCount, byBytes, latest].map((each) => each.take().seq), [3n, 4n, 5n]);
+  assert.deepEqual(
+    [byCount, byBytes, latest].map((each) => each.take().seq),
+    [3n, 4n, 5n],
+  );
   for (let seq = 0; seq < 5000; seq++) {
     byCount.put(message(seq));
     assert.ok(byCount.take());
@@ -88,7 +94,10 @@ test("the inbox drops its oldest messages", () => {
 test("a history is bounded in messages and bytes", () => {
   const history = new History(3);
   for (let n = 0; n < 5; n++) history.add([Buffer.from([n])], 1);
-  assert.deepEqual(history.kept.map((each) => each.parts[0][0]), [2, 3, 4]);
+  assert.deepEqual(
+    history.kept.map((each) => each.parts[0][0]),
+    [2, 3, 4],
+  );
   history.add([Buffer.alloc(0)], 65 * 2 ** 20);
   assert.equal(history.kept.length, 1);
 });
@@ -98,7 +107,12 @@ test("the form of messages follows who subscribes", () => {
   const subscriptions = new Subscriptions("t", ID, (reason) => refused.push(reason));
   const note = (isAdded, filter) => subscriptions.note(Buffer.concat([Buffer.from([isAdded ? 1 : 0]), filter]));
   const hello = (level, topic = "t", subscriber = BigInt(level + 1)) => helloPart({ subscriber, topic, level });
-  const forms = () => [subscriptions.isHeard, subscriptions.readsOnePart, subscriptions.readsBatches, subscriptions.tellsAll];
+  const forms = () => [
+    subscriptions.isHeard,
+    subscriptions.readsOnePart,
+    subscriptions.readsBatches,
+    subscriptions.tellsAll,
+  ];
   note(true, topicPart("t"));
   assert.equal(note(true, hello(3)), 4n);
   assert.deepEqual(forms(), [true, true, true, true]);
@@ -123,7 +137,12 @@ test("the form of messages follows who subscribes", () => {
 test("messages that have to wait go together, and everybody gets them all", async (t) => {
   const spec = { id: ID, topic: "t", codecNumber: 1, latched: false, history: 0, batch: true };
   let greeted = 0;
-  const transport = new XpubTransport(spec, () => "brief", () => greeted++, assert.fail);
+  const transport = new XpubTransport(
+    spec,
+    () => "brief",
+    () => greeted++,
+    assert.fail,
+  );
   t.after(() => transport.close());
   const [endpoint] = await transport.move(["127.0.0.1"]);
   const socket = new Subscriber({ receiveTimeout: 5000 });
@@ -142,8 +161,14 @@ test("messages that have to wait go together, and everybody gets them all", asyn
     parts++;
   }
   assert.ok(parts < count, `${parts} parts`);
-  assert.deepEqual(received.map((each) => Number(each.payload.toString())), Array.from({ length: count }, (_, index) => index + 1));
-  assert.deepEqual(received.map((each) => Number(each.header.seq)), Array.from({ length: count }, (_, index) => index + 1));
+  assert.deepEqual(
+    received.map((each) => Number(each.payload.toString())),
+    Array.from({ length: count }, (_, index) => index + 1),
+  );
+  assert.deepEqual(
+    received.map((each) => Number(each.header.seq)),
+    Array.from({ length: count }, (_, index) => index + 1),
+  );
 });
 
 test("frames of the original NEP", () => {
@@ -151,7 +176,8 @@ test("frames of the original NEP", () => {
   assert.equal(String(toFrame("t", "A", "json", "json", data)), 't {"a":1}');
   assert.equal(String(toFrame("t", "B", "json", "json", data)), '{"a":1}');
   assert.equal(String(toFrame("t", "B", "dictionary", "json", data)), 't {"a":1}');
-  for (const generation of ["A", "B"]) assert.deepEqual(fromFrame("t", "json", "json", toFrame("t", generation, "json", "json", data)), data);
+  for (const generation of ["A", "B"])
+    assert.deepEqual(fromFrame("t", "json", "json", toFrame("t", generation, "json", "json", data)), data);
   assert.equal(fromFrame("x", "json", "json", Buffer.from('y {"a":1}')), undefined);
   assert.deepEqual(fromFrame("t", "image", "image", toFrame("t", "A", "image", "image", data)), data);
   assert.throws(() => fromFrame("t", "image", "image", Buffer.from("t !!")), { code: "malformed" });
@@ -163,5 +189,6 @@ test("the nearest endpoint depends on where the master is", () => {
   assert.equal(nearestEndpoint(endpoints, "10.0.0.5:7780"), "tcp://10.0.0.5:2000");
   assert.equal(nearestEndpoint(["udp://a:1", "tcp://a:99999"], "127.0.0.1:7780"), undefined);
   assert.equal(masterAddress("10.0.0.5"), "10.0.0.5:7780");
-  for (const wrong of ["a b", "host:0", "::1", "host:70000"]) assert.throws(() => masterAddress(wrong), { name: "NepError" });
+  for (const wrong of ["a b", "host:0", "::1", "host:70000"])
+    assert.throws(() => masterAddress(wrong), { name: "NepError" });
 });

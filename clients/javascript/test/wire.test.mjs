@@ -15,7 +15,15 @@ import { bytes, codeOf, integersAsText, vectors } from "./support/vectors.mjs";
 
 function described({ header, payload, extension }) {
   const { codec, flags, seq, stampNs, publisher } = header;
-  return { codec, flags, seq: String(seq), stamp_ns: String(stampNs), publisher: String(publisher), payload: payload.toString("hex"), extension };
+  return {
+    codec,
+    flags,
+    seq: String(seq),
+    stamp_ns: String(stampNs),
+    publisher: String(publisher),
+    payload: payload.toString("hex"),
+    extension,
+  };
 }
 
 test("messages are read as the vectors say", () => {
@@ -39,8 +47,15 @@ test("messages are written as the vectors say", () => {
     const flags = means.flags & ~Flag.EXTENSION;
     const header = { codec, flags, size, seq: BigInt(seq), stampNs: BigInt(stamp_ns), publisher: BigInt(publisher) };
     const payload = bytes(means.payload);
-    const written = parts.length === 1 ? [onePart(topicPart(topic), header, payload)] : joinParts(topic, header, payload, extension);
-    assert.deepEqual(written.slice(0, 3).map((each) => each.toString("hex")), parts.slice(0, 3), name);
+    const written =
+      parts.length === 1
+        ? [onePart(topicPart(topic), header, payload)]
+        : joinParts(topic, header, payload, extension);
+    assert.deepEqual(
+      written.slice(0, 3).map((each) => each.toString("hex")),
+      parts.slice(0, 3),
+      name,
+    );
     if (written[3]) assert.deepEqual(unpack(written[3]), extension, name);
   }
 });
@@ -62,7 +77,11 @@ test("batches are read and written as the vectors say", () => {
 
 test("each of the malformed messages is refused with its code", () => {
   for (const [code, ...parts] of vectors("malformed")) {
-    assert.equal(codeOf(() => readParts(parts.map(bytes))), code, parts.join(" "));
+    assert.equal(
+      codeOf(() => readParts(parts.map(bytes))),
+      code,
+      parts.join(" "),
+    );
   }
 });
 
@@ -94,7 +113,14 @@ test("notices are read and written as the vectors say", () => {
     assert.equal(String(parseHello(first).subscriber), means.subscriber, name);
     if (payload) continue; // a message like any other
     const { codec, flags, seq, stamp_ns, publisher, generation } = means;
-    const written = packHeader({ codec, flags, size: Number(generation ?? 0), seq: BigInt(seq), stampNs: BigInt(stamp_ns), publisher: BigInt(publisher) });
+    const written = packHeader({
+      codec,
+      flags,
+      size: Number(generation ?? 0),
+      seq: BigInt(seq),
+      stampNs: BigInt(stamp_ns),
+      publisher: BigInt(publisher),
+    });
     assert.equal(written.toString("hex"), head.toString("hex"), name);
   }
 });
@@ -115,7 +141,8 @@ test("answers and pushes of the master are read as the vectors say", () => {
     assert.equal(read.is, answer_means.is, name);
     if (answer_means.what.epoch) assert.equal(String(read.epoch), answer_means.what.epoch, name);
     if (answer_means.what.code) assert.equal(read.code, answer_means.what.code, name);
-    for (const [id, seq] of Object.entries(answer_means.what.last_seqs ?? {})) assert.equal(String(read.lastSeqs.get(BigInt(id))), seq, name);
+    for (const [id, seq] of Object.entries(answer_means.what.last_seqs ?? {}))
+      assert.equal(String(read.lastSeqs.get(BigInt(id))), seq, name);
   }
 });
 
@@ -124,7 +151,14 @@ test("requests are written as the vectors say", () => {
     if (typeof value === "string" && /^-?\d+$/.test(value)) return BigInt(value);
     if (Array.isArray(value)) return value.map(toIntegers);
     if (value === null || typeof value !== "object") return value;
-    return Object.fromEntries(Object.entries(value).map(([key, each]) => [key, ["key", "name", "id"].includes(key) && typeof each === "string" && !/^\d{17,}$/.test(each) ? each : toIntegers(each)]));
+    return Object.fromEntries(
+      Object.entries(value).map(([key, each]) => [
+        key,
+        ["key", "name", "id"].includes(key) && typeof each === "string" && !/^\d{17,}$/.test(each)
+          ? each
+          : toIntegers(each),
+      ]),
+    );
   };
   for (const { name, request } of vectors("master").asked) {
     const means = unpack(bytes(request));
@@ -139,34 +173,71 @@ test("calls of services are read and written as the vectors say", () => {
     if (!parts) continue; // plain TCP
     const kind = Number(bytes(parts[0])[1]) === CallKind.CALL ? "call" : "answer";
     if (error) {
-      assert.equal(codeOf(() => readCall(parts.map(bytes), kind)), error, name);
+      assert.equal(
+        codeOf(() => readCall(parts.map(bytes), kind)),
+        error,
+        name,
+      );
       continue;
     }
     const read = readCall(parts.map(bytes), kind);
-    assert.deepEqual({ ...read, number: String(read.number), payload: read.payload.toString("hex") }, { kind: means.kind, codec: means.codec, timeoutMs: means.timeout_ms, number: means.number, payload: means.payload }, name);
-    assert.deepEqual(packCall(read).map((each) => each.toString("hex")), parts, name);
+    assert.deepEqual(
+      { ...read, number: String(read.number), payload: read.payload.toString("hex") },
+      {
+        kind: means.kind,
+        codec: means.codec,
+        timeoutMs: means.timeout_ms,
+        number: means.number,
+        payload: means.payload,
+      },
+      name,
+    );
+    assert.deepEqual(
+      packCall(read).map((each) => each.toString("hex")),
+      parts,
+      name,
+    );
   }
 });
 
 test("names follow the grammar", () => {
-  for (const topic of ["a", "/robot/camera", "größe", "😀", "a*b", "x".repeat(200)]) assert.equal(checkTopic(topic), topic);
+  for (const topic of ["a", "/robot/camera", "größe", "😀", "a*b", "x".repeat(200)])
+    assert.equal(checkTopic(topic), topic);
   for (const topic of ["", "a b", "a\u3000b", "a{b", "a\u0085", "a\u001c", "a\u200b", "\ud800", "x".repeat(201)]) {
     assert.throws(() => checkTopic(topic), { name: "BadTopicError" }, JSON.stringify(topic));
   }
   assert.equal(checkNodeName("my node"), "my node");
-  for (const name of ["", "a\nb", "\ufeffa", "x\udc00"]) assert.throws(() => checkNodeName(name), { name: "BadNameError" });
+  for (const name of ["", "a\nb", "\ufeffa", "x\udc00"])
+    assert.throws(() => checkNodeName(name), { name: "BadNameError" });
 });
 
 test("patterns match whole levels", () => {
-  const matching = [["/*/camera", "/a/camera"], ["**", "a/b/c"], ["/robot/**", "/robot"], ["a/**/z", "a/z"], ["a/**/z", "a/b/c/z"], ["a*b", "a*b"]];
-  const others = [["/*/camera", "//camera"], ["/*/camera", "/a/b/camera"], ["a/**/z", "a/b"], ["a*b", "axb"], ["*", "a/b"]];
+  const matching = [
+    ["/*/camera", "/a/camera"],
+    ["**", "a/b/c"],
+    ["/robot/**", "/robot"],
+    ["a/**/z", "a/z"],
+    ["a/**/z", "a/b/c/z"],
+    ["a*b", "a*b"],
+  ];
+  const others = [
+    ["/*/camera", "//camera"],
+    ["/*/camera", "/a/b/camera"],
+    ["a/**/z", "a/b"],
+    ["a*b", "axb"],
+    ["*", "a/b"],
+  ];
   for (const [pattern, topic] of matching) assert.ok(matchesPattern(pattern, topic), `${pattern} ${topic}`);
   for (const [pattern, topic] of others) assert.ok(!matchesPattern(pattern, topic), `${pattern} ${topic}`);
   assert.deepEqual(["a*b", "/a/*", "**"].map(isPattern), [false, true, true]);
 });
 
 test("payloads survive their codec", () => {
-  const payloads = { json: { a: [1, "ü", null] }, string: "grüß", msgpack: { big: 2n ** 60n, small: 2 ** 40, bytes: new Uint8Array([1, 2]), nan: NaN } };
+  const payloads = {
+    json: { a: [1, "ü", null] },
+    string: "grüß",
+    msgpack: { big: 2n ** 60n, small: 2 ** 40, bytes: new Uint8Array([1, 2]), nan: NaN },
+  };
   for (const [name, payload] of Object.entries(payloads)) {
     const codec = codecFor(name);
     const decoded = codec.decode(codec.encode(payload).data, {});
@@ -180,11 +251,21 @@ test("payloads survive their codec", () => {
 test("what a codec can't carry is refused with a reason", () => {
   let deep = [];
   for (let level = 0; level < 64; level++) deep = [deep];
-  for (const [type, payload] of [["json", { n: 1n }], ["json", undefined], ["json", { a: "x".repeat(200), deep }], ["string", 5], ["bytes", "text"], ["msgpack", deep], ["image", { data: Buffer.alloc(5), encoding: "mono8", shape: [2, 2, 1] }]]) {
+  for (const [type, payload] of [
+    ["json", { n: 1n }],
+    ["json", undefined],
+    ["json", { a: "x".repeat(200), deep }],
+    ["string", 5],
+    ["bytes", "text"],
+    ["msgpack", deep],
+    ["image", { data: Buffer.alloc(5), encoding: "mono8", shape: [2, 2, 1] }],
+  ]) {
     assert.throws(() => codecFor(type).encode(payload), { name: "EncodeError" }, type);
   }
   assert.equal(codecFor("json").encode({ a: NaN, b: [Infinity, 1, null] }).nonFinite, 2);
-  assert.throws(() => codecFor("json").decode(Buffer.from("[".repeat(65) + "]".repeat(65)), {}), { name: "DecodeError" });
+  assert.throws(() => codecFor("json").decode(Buffer.from("[".repeat(65) + "]".repeat(65)), {}), {
+    name: "DecodeError",
+  });
   assert.throws(() => codecFor("string").decode(Buffer.from([0xff]), {}), { name: "DecodeError" });
 });
 
@@ -193,13 +274,29 @@ test("hostile msgpack is refused without taking memory", () => {
   const huge = Buffer.from("dd01ffffff".repeat(200), "hex");
   const deep = Buffer.concat([Buffer.alloc(65, 0x91), Buffer.from([0xc0])]);
   const before = process.memoryUsage().rss;
-  for (const data of [huge, deep, Buffer.from("df7fffffff", "hex"), Buffer.from("a5ab", "hex"), Buffer.from("c0c0", "hex"), Buffer.alloc(0), Buffer.from("c1", "hex"), Buffer.alloc(300_000, 0x91)]) {
+  for (const data of [
+    huge,
+    deep,
+    Buffer.from("df7fffffff", "hex"),
+    Buffer.from("a5ab", "hex"),
+    Buffer.from("c0c0", "hex"),
+    Buffer.alloc(0),
+    Buffer.from("c1", "hex"),
+    Buffer.alloc(300_000, 0x91),
+  ]) {
     assert.throws(() => codec.decode(data, {}), { name: "DecodeError" }, data.toString("hex", 0, 10));
   }
   assert.ok(process.memoryUsage().rss - before < 100e6);
   const allowed = Buffer.concat([Buffer.alloc(64, 0x91), Buffer.from([0xc0])]);
   assert.doesNotThrow(() => codec.decode(allowed, {}));
-  const everything = { n: [null, true, 1, -1, 200, 2 ** 20, 2n ** 63n, -(2n ** 40n), 1.5], text: ["", "a".repeat(40), "b".repeat(300), "c".repeat(70000)], bin: [new Uint8Array(3), new Uint8Array(300), new Uint8Array(70000)], list: Array(70000).fill(0), date: new Date(1234567890123), map: Object.fromEntries(Array.from({ length: 20 }, (_, n) => [`k${n}`, n])) };
+  const everything = {
+    n: [null, true, 1, -1, 200, 2 ** 20, 2n ** 63n, -(2n ** 40n), 1.5],
+    text: ["", "a".repeat(40), "b".repeat(300), "c".repeat(70000)],
+    bin: [new Uint8Array(3), new Uint8Array(300), new Uint8Array(70000)],
+    list: Array(70000).fill(0),
+    date: new Date(1234567890123),
+    map: Object.fromEntries(Array.from({ length: 20 }, (_, n) => [`k${n}`, n])),
+  };
   const decoded = codec.decode(codec.encode(everything).data, {});
   assert.equal(decoded.list.length, 70000);
   assert.equal(decoded.date.getTime(), 1234567890123);

@@ -37,7 +37,8 @@ const json: Codec = {
       throw new EncodeError(`The payload has no form in JSON: ${(error as Error).message}`);
     }
     if (text === undefined) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
-    if (text.length > 2 * MAX_LEVELS && isTooDeep(payload)) throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
+    if (text.length > 2 * MAX_LEVELS && isTooDeep(payload))
+      throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
     const data = Buffer.from(text, "utf8");
     const nonFinite = data.includes(NULL) ? countNonFinite(payload) : 0;
     return { data, nonFinite };
@@ -58,7 +59,8 @@ const string: Codec = {
   name: "string",
   number: 2,
   encode(payload) {
-    if (typeof payload !== "string") throw new EncodeError(`A topic of type "string" takes strings, not "${typeof payload}".`);
+    if (typeof payload !== "string")
+      throw new EncodeError(`A topic of type "string" takes strings, not "${typeof payload}".`);
     return { data: Buffer.from(payload, "utf8") };
   },
   decode(data) {
@@ -105,9 +107,10 @@ const image: Codec = { name: "image", number: 5, encode: encodeImage, decode: de
 
 const CODECS: readonly Codec[] = [json, string, bytes, msgpack, image];
 
-/** Return the codec of a message type: its own name, else JSON. */
+/** Return the codec of a message type: that of its name, `image` for `images`, else JSON. */
 export function codecFor(msgType: string): Codec {
-  return CODECS.find((each) => each.name === msgType) ?? json;
+  const name = msgType === "images" ? "image" : msgType;
+  return CODECS.find((each) => each.name === name) ?? json;
 }
 
 /** Return the codec with this number on the wire, if there is one. */
@@ -117,7 +120,11 @@ export function codecNumbered(number: number): Codec | undefined {
 
 /** Return a copy: the caller may go on writing into its own bytes while the message is queued. */
 export function copyOf(payload: unknown): Buffer {
-  if (ArrayBuffer.isView(payload)) return Buffer.from(Buffer.from(payload.buffer, payload.byteOffset, payload.byteLength));
-  if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer) return Buffer.from(new Uint8Array(payload));
-  throw new EncodeError(`A topic of type "bytes" takes a Buffer, typed array or ArrayBuffer, not "${typeof payload}".`);
+  if (ArrayBuffer.isView(payload))
+    return Buffer.from(Buffer.from(payload.buffer, payload.byteOffset, payload.byteLength));
+  if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer)
+    return Buffer.from(new Uint8Array(payload));
+  throw new EncodeError(
+    `A topic of type "bytes" takes a Buffer, typed array or ArrayBuffer, not "${typeof payload}".`,
+  );
 }

@@ -13,10 +13,26 @@ export interface Image {
 }
 
 const NAMED: Readonly<Record<string, readonly [bytes: number, channels: number]>> = {
-  mono8: [1, 1], bgr8: [1, 3], rgb8: [1, 3], bgra8: [1, 4], rgba8: [1, 4],
-  mono16: [2, 1], bgr16: [2, 3], rgb16: [2, 3], bgra16: [2, 4], rgba16: [2, 4],
+  mono8: [1, 1],
+  bgr8: [1, 3],
+  rgb8: [1, 3],
+  bgra8: [1, 4],
+  rgba8: [1, 4],
+  mono16: [2, 1],
+  bgr16: [2, 3],
+  rgb16: [2, 3],
+  bgra16: [2, 4],
+  rgba16: [2, 4],
 };
-const NUMBER_BYTES: Readonly<Record<string, number>> = { "8U": 1, "8S": 1, "16U": 2, "16S": 2, "32S": 4, "32F": 4, "64F": 8 };
+const NUMBER_BYTES: Readonly<Record<string, number>> = {
+  "8U": 1,
+  "8S": 1,
+  "16U": 2,
+  "16S": 2,
+  "32S": 4,
+  "32F": 4,
+  "64F": 8,
+};
 const PNG_SIGNATURE = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 
 /** Return bytes for each number and channels for each pixel of a raw layout; undefined if there is none of this name. */
@@ -35,7 +51,9 @@ export function fileKind(data: Uint8Array): "jpeg" | "png" | undefined {
 export function encodeImage(payload: unknown): { data: Buffer; extension: Extension } {
   const image = (ArrayBuffer.isView(payload) ? { data: payload } : payload) as Partial<Image> | null;
   if (!(image?.data instanceof Uint8Array)) {
-    throw new EncodeError("A topic of type \"image\" takes the bytes of a JPEG or PNG file, or {data, encoding, shape}.");
+    throw new EncodeError(
+      'A topic of type "image" takes the bytes of a JPEG or PNG file, or {data, encoding, shape}.',
+    );
   }
   const data = Buffer.from(image.data);
   const kind = fileKind(data);
@@ -44,7 +62,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
     return { data, extension: shape ? { shape, encoding: kind } : { encoding: kind } };
   }
   const layout = rawLayout(image.encoding ?? "");
-  if (!layout || !image.shape) throw new EncodeError("Raw pixels need a known encoding such as \"rgb8\" and a shape.");
+  if (!layout || !image.shape) throw new EncodeError('Raw pixels need a known encoding such as "rgb8" and a shape.');
   const [height, width, channels] = image.shape;
   if (channels !== layout[1] || height * width * channels * layout[0] !== data.length) {
     throw new EncodeError(`${data.length} bytes are no "${image.encoding}" of ${height} × ${width} × ${channels}.`);
@@ -59,7 +77,8 @@ export function decodeImage(data: Buffer, extension: Extension): Image {
   if (kind) return { data, encoding: kind, ...(shape && { shape }) };
   const encoding = extension["encoding"];
   const layout = typeof encoding === "string" ? rawLayout(encoding) : undefined;
-  if (!layout || !shape || typeof encoding !== "string") throw new DecodeError(`${data.length} bytes are no picture.`);
+  if (!layout || !shape || typeof encoding !== "string")
+    throw new DecodeError(`${data.length} bytes are no picture.`);
   if (shape[2] !== layout[1] || shape[0] * shape[1] * shape[2] * layout[0] !== data.length) {
     throw new DecodeError(`${data.length} bytes are no "${encoding}" of ${shape.join(" × ")}.`);
   }
@@ -69,7 +88,9 @@ export function decodeImage(data: Buffer, extension: Extension): Image {
 function readShape(value: unknown): [number, number, number] | undefined {
   if (!Array.isArray(value) || value.length !== 3) return undefined;
   const numbers = value.map(Number);
-  return numbers.every((each) => Number.isSafeInteger(each) && each > 0) ? (numbers as [number, number, number]) : undefined;
+  return numbers.every((each) => Number.isSafeInteger(each) && each > 0)
+    ? (numbers as [number, number, number])
+    : undefined;
 }
 
 function pngShape(data: Buffer): [number, number, number] | undefined {

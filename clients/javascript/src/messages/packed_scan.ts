@@ -26,7 +26,8 @@ export function checkPacked(packed: Uint8Array): void {
     if (items < 0) continue;
     open.push(missing);
     missing = items;
-    if (open.length > MAX_LEVELS) throw new RangeError(`Lists and maps are nested more than ${MAX_LEVELS} levels deep.`);
+    if (open.length > MAX_LEVELS)
+      throw new RangeError(`Lists and maps are nested more than ${MAX_LEVELS} levels deep.`);
   }
   if (at !== view.byteLength) throw new RangeError("Something follows the value.");
 }

@@ -4,7 +4,8 @@ import { checkPacked } from "./packed_scan.js";
 const DECODE_OPTIONS = {
   useBigInt64: true,
   // Maps with integer keys (`last_seqs`) decode to bigint keys, which objects don't have.
-  mapKeyConverter: (key: unknown): string | number => (typeof key === "string" || typeof key === "number" ? key : String(key)),
+  mapKeyConverter: (key: unknown): string | number =>
+    typeof key === "string" || typeof key === "number" ? key : String(key),
 };
 const MAX_DEPTH = 65; // one more than the wire allows: `isTooDeep` gives the reason
 
@@ -33,7 +34,13 @@ function textKey(key: unknown): string {
 
 /** Whether a decoded value is a map. */
 export function isMap(value: unknown): value is Record<string, unknown> {
-  return value !== null && typeof value === "object" && !Array.isArray(value) && !(value instanceof Uint8Array) && !(value instanceof Date);
+  return (
+    value !== null &&
+    typeof value === "object" &&
+    !Array.isArray(value) &&
+    !(value instanceof Uint8Array) &&
+    !(value instanceof Date)
+  );
 }
 
 /** Return a value whose integers beyond 32 bits are `bigint`: msgpack would have them as floats. */

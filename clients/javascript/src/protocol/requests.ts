@@ -2,8 +2,12 @@
 import { WireError } from "../errors.js";
 import { isMap, pack, unpack, withWideIntegers } from "../messages/packing.js";
 
-/** Largest value of a counter: larger ones are told as this. */
-export const MAX_COUNT = 2n ** 63n - 1n;
+const MAX_PROBLEM_LETTERS = 500;
+
+/** Return a sentence about a problem as statistics carry it. */
+export function problemText(sentence: string): string {
+  return sentence.slice(0, MAX_PROBLEM_LETTERS);
+}
 
 export interface NodeRecord {
   readonly id: string;
@@ -75,7 +79,12 @@ export type Request =
       readonly subscribers: readonly SubscriberCount[];
       readonly cpu_ratio?: number;
     }
-  | { readonly do: "missing"; readonly node_id: string; readonly publisher_id: bigint; readonly subscriber_ids: readonly bigint[] }
+  | {
+      readonly do: "missing";
+      readonly node_id: string;
+      readonly publisher_id: bigint;
+      readonly subscriber_ids: readonly bigint[];
+    }
   | { readonly do: "ping" };
 
 /** A publisher with its node: what a subscriber needs to connect. */
@@ -105,8 +114,18 @@ interface FromMaster {
 export type Answer = FromMaster &
   (
     | { readonly is: "done" | "probe" | "seen" }
-    | { readonly is: "added"; readonly expected: ExpectedSubscriber[]; readonly hung: ExpectedSubscriber[]; readonly hosts: string[] }
-    | { readonly is: "found"; readonly publishers: RemotePublisher[]; readonly hosts: string[]; readonly pattern: boolean }
+    | {
+        readonly is: "added";
+        readonly expected: ExpectedSubscriber[];
+        readonly hung: ExpectedSubscriber[];
+        readonly hosts: string[];
+      }
+    | {
+        readonly is: "found";
+        readonly publishers: RemotePublisher[];
+        readonly hosts: string[];
+        readonly pattern: boolean;
+      }
     | {
         readonly is: "renewed";
         readonly again: boolean;
@@ -117,7 +136,13 @@ export type Answer = FromMaster &
       }
     | { readonly is: "refused"; readonly reason: string; readonly code: string }
     | { readonly is: "publisher+"; readonly publisher: RemotePublisher }
-    | { readonly is: "publisher-"; readonly id: bigint; readonly topic: string; readonly isClosed: boolean; readonly lastSeq: bigint }
+    | {
+        readonly is: "publisher-";
+        readonly id: bigint;
+        readonly topic: string;
+        readonly isClosed: boolean;
+        readonly lastSeq: bigint;
+      }
   );
 
 /** Return the body of a request. */
@@ -152,15 +177,29 @@ function readAnswer(name: string, what: Fields): Answer | undefined {
     case "seen":
       return { is: name, ...common };
     case "added":
-      return { is: name, ...common, expected: what.maps("expected").map(readExpected), hung: what.maps("hung").map(readExpected), hosts: what.texts("hosts") };
+      return {
+        is: name,
+        ...common,
+        expected: what.maps("expected").map(readExpected),
+        hung: what.maps("hung").map(readExpected),
+        hosts: what.texts("hosts"),
+      };
     case "found":
-      return { is: name, ...common, publishers: what.maps("publishers").map(readRemote), hosts: what.texts("hosts"), pattern: what.flag("pattern") };
+      return {
+        is: name,
+        ...common,
+        publishers: what.maps("publishers").map(readRemote),
+        hosts: what.texts("hosts"),
+        pattern: what.flag("pattern"),
+      };
     case "renewed":
       return {
         is: name,
         ...common,
         again: what.flag("again"),
-        topics: what.maps("topics").map((each) => ({ topic: each.text("topic"), publishers: each.maps("publishers").map(readRemote) })),
+        topics: what
+          .maps("topics")
+          .map((each) => ({ topic: each.text("topic"), publishers: each.maps("publishers").map(readRemote) })),
         lastSeqs: what.integers("last_seqs"),
         hosts: what.texts("hosts"),
         nextS: what.number("next_s", 1),
@@ -170,7 +209,14 @@ function readAnswer(name: string, what: Fields): Answer | undefined {
     case "publisher+":
       return { is: name, ...common, publisher: readRemote(what.map("publisher")) };
     case "publisher-":
-      return { is: name, ...common, id: what.integer("id"), topic: what.text("topic"), isClosed: what.flag("is_closed"), lastSeq: what.integer("last_seq", 0n) };
+      return {
+        is: name,
+        ...common,
+        id: what.integer("id"),
+        topic: what.text("topic"),
+        isClosed: what.flag("is_closed"),
+        lastSeq: what.integer("last_seq", 0n),
+      };
     default:
       return undefined;
   }
@@ -205,12 +251,20 @@ class Fields {
   }
 
   number(name: string, fallback: number): number {
-    const value = this.typed<number | bigint>(name, fallback, (each) => typeof each === "number" || typeof each === "bigint");
+    const value = this.typed<number | bigint>(
+      name,
+      fallback,
+      (each) => typeof each === "number" || typeof each === "bigint",
+    );
     return Number(value);
   }
 
   integer(name: string, fallback?: bigint): bigint {
-    const value = this.typed<number | bigint>(name, fallback, (each) => typeof each === "bigint" || Number.isInteger(each));
+    const value = this.typed<number | bigint>(
+      name,
+      fallback,
+      (each) => typeof each === "bigint" || Number.isInteger(each),
+    );
     return BigInt(value);
   }
 

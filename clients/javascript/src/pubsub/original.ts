@@ -131,7 +131,7 @@ export class OriginalReader {
     private readonly onMessage: (message: Message) => void,
     private readonly onRefused: (reason: string) => void,
   ) {
-    this.codec = codecFor(type === "images" ? "image" : type);
+    this.codec = codecFor(type);
     this.socket.filter(Buffer.alloc(0));
     this.socket.read((parts) => this.read(parts), hold);
   }
@@ -143,9 +143,14 @@ export class OriginalReader {
 
   private read(parts: Buffer[]): void {
     try {
-      if (parts.length !== 1) throw new WireError("part-count", `A message of the original NEP has one part, this one has ${parts.length}.`);
+      if (parts.length !== 1)
+        throw new WireError(
+          "part-count",
+          `A message of the original NEP has one part, this one has ${parts.length}.`,
+        );
       const data = fromFrame(this.topic, this.type, this.codec.name, parts[0]!);
-      if (data) this.onMessage(new Message(this.topic, data, this.codec, this.type, 0n, nowNs(), 0n, NO_EXTENSION, false));
+      if (data)
+        this.onMessage(new Message(this.topic, data, this.codec, this.type, 0n, nowNs(), 0n, NO_EXTENSION, false));
     } catch (error) {
       if (!(error instanceof WireError)) throw error;
       this.onRefused(error.message);

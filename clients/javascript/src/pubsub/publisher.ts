@@ -1,6 +1,6 @@
 import { ClosedError, EncodeError } from "../errors.js";
 import { type Codec, codecFor, type Encoded } from "../messages/codecs.js";
-import type { ExpectedSubscriber, PublisherCount } from "../protocol/requests.js";
+import { type ExpectedSubscriber, problemText, type PublisherCount } from "../protocol/requests.js";
 import type { Hold } from "../sockets/socket.js";
 import { nowNs } from "../system/clock.js";
 import { WINDOW_BYTES } from "./byte_window.js";
@@ -13,10 +13,12 @@ import { XpubTransport } from "./xpub_transport.js";
 function within(timeoutMs: number, awaited: Promise<unknown>): Promise<boolean> {
   return new Promise((resolve) => {
     const timer = setTimeout(() => resolve(false), timeoutMs);
-    awaited.then(
-      () => resolve(true),
-      () => resolve(false),
-    ).finally(() => clearTimeout(timer));
+    awaited
+      .then(
+        () => resolve(true),
+        () => resolve(false),
+      )
+      .finally(() => clearTimeout(timer));
   });
 }
 
@@ -52,7 +54,10 @@ export interface PublisherHost {
   readonly hold: () => Hold;
   readonly warn: (message: string) => void;
   /** Bind and register; the subscribers to wait for. */
-  register(publisher: Publisher, transport: PublisherTransport): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
+  register(
+    publisher: Publisher,
+    transport: PublisherTransport,
+  ): Promise<{ expected: ExpectedSubscriber[]; hung: ExpectedSubscriber[] }>;
   /** The wire of the original NEP, if it is used instead of the native one. */
   readonly generation?: Generation;
   reportMissing(subscribers: readonly bigint[]): void;
@@ -201,7 +206,8 @@ export class Publisher<T = unknown> {
    */
   publish(payload: T): void {
     if (this.closing) throw new ClosedError(`The publisher of "${this.topic}" is closed.`);
-    const isWanted = this.early || this.spec.latched || this.spec.history || this.spec.strict || this.transport.isHeard;
+    const isWanted =
+      this.early || this.spec.latched || this.spec.history || this.spec.strict || this.transport.isHeard;
     if (!isWanted && performance.now() < this.validatedAt + VALIDATE_INTERVAL_MS) {
       this.transport.skip();
       return;
@@ -263,7 +269,7 @@ export class Publisher<T = unknown> {
       bytes: BigInt(bytes),
       last_seq: BigInt(count),
       ...(lastStampNs !== undefined && { last_stamp_ns: lastStampNs }),
-      ...(this.problem && { problem: this.problem }),
+      ...(this.problem && { problem: problemText(this.problem) }),
     };
   }
 
@@ -307,7 +313,8 @@ export class Publisher<T = unknown> {
       await this.waitUntil(haveLeft, Math.min(BYE_AGAIN_MS, deadline - performance.now()));
       this.transport.sayBye(); // a full queue drops it like anything else
     }
-    if (!haveLeft()) this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
+    if (!haveLeft())
+      this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
   }
 
   /** @internal Wait until somebody reads: without a master nobody knows whether there is a subscriber. */

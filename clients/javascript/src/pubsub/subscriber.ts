@@ -1,6 +1,6 @@
 import { ClosedError, DecodeError } from "../errors.js";
 import type { Message } from "../messages/message.js";
-import { MAX_COUNT, type SubscriberCount } from "../protocol/requests.js";
+import { problemText, type SubscriberCount } from "../protocol/requests.js";
 import type { ReachablePublisher, SessionSubscriber } from "../session/master_session.js";
 import type { Hold } from "../sockets/socket.js";
 import { isPattern } from "../wire/pattern.js";
@@ -159,8 +159,13 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   }
 
   private waitForEchoes(): Promise<void> {
-    const listed = [...this.readers.values()].flatMap((each) => [...each.sources.byId.values()]).filter((each) => each.remote);
-    return this.waitUntil(() => listed.every((each) => each.hasEchoed || each.problem || each.endsAt !== undefined), HANDSHAKE_MS);
+    const listed = [...this.readers.values()]
+      .flatMap((each) => [...each.sources.byId.values()])
+      .filter((each) => each.remote);
+    return this.waitUntil(
+      () => listed.every((each) => each.hasEchoed || each.problem || each.endsAt !== undefined),
+      HANDSHAKE_MS,
+    );
   }
 
   /** @internal */
@@ -264,9 +269,12 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   private deliver(message: Message<T>): void {
     try {
       this.callback!(message);
+      this.problem = "";
     } catch (error) {
       if (error instanceof DecodeError) this.problem = error.message;
-      this.warnRarely(`"${this.topic}": the callback failed. ${error instanceof Error ? (error.stack ?? error.message) : String(error)}`);
+      this.warnRarely(
+        `"${this.topic}": the callback failed. ${error instanceof Error ? (error.stack ?? error.message) : String(error)}`,
+      );
     }
   }
 
@@ -331,15 +339,14 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   /** @internal */
   counts(): SubscriberCount {
-    const bounded = (count: number): bigint => {
-      const value = BigInt(Math.max(0, count));
-      return value > MAX_COUNT ? MAX_COUNT : value;
-    };
+    const bounded = (count: number): bigint => BigInt(Math.max(0, count));
+    const refusal = this.refusal && `${this.refused} could not be read. ${this.refusal}`;
+    const problem = problemText(this.problem || refusal);
     return {
       id: this.spec.id,
       received: bounded(this.received),
       lost: bounded(this.lost),
-      ...((this.problem || this.refusal) && { problem: this.problem || `${this.refused} could not be read. ${this.refusal}` }),
+      ...(problem && { problem }),
     };
   }
 

@@ -67,7 +67,8 @@ export class Subscriptions {
     }
     const read = parseRead(filter);
     if (read) {
-      if (isAdded && read.publisher === this.publisher) this.greeted.get(read.subscriber)?.window?.read(read.seq, read.boundBytes);
+      if (isAdded && read.publisher === this.publisher)
+        this.greeted.get(read.subscriber)?.window?.read(read.seq, read.boundBytes);
     } else if (!parseShares(filter)) {
       this.notePlain(filter, isAdded);
     }

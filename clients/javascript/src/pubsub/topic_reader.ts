@@ -154,7 +154,10 @@ export class TopicReader {
     const type = this.sources.byId.get(publisher)?.remote?.msgType ?? this.type;
     const codec = codecNumbered(header.codec)!;
     const isLatched = (flags & Flag.LATCHED) !== 0;
-    this.host.onMessage(new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched), this);
+    this.host.onMessage(
+      new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched),
+      this,
+    );
   }
 
   /** An echo, or the last word of a publisher that closes. */

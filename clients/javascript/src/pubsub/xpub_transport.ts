@@ -17,7 +17,8 @@ const MAX_SENT_TOGETHER = 64;
 const FULL_BATCH_BYTES = 65_536;
 
 /** A message that waits for the socket and goes out alone or in a batch, or finished parts. */
-type Entry = { readonly payload: Buffer; readonly seq: number; readonly stampNs: bigint } | { readonly parts: Buffer[] };
+type Entry =
+  { readonly payload: Buffer; readonly seq: number; readonly stampNs: bigint } | { readonly parts: Buffer[] };
 
 export interface XpubSpec {
   readonly id: bigint;
@@ -122,7 +123,14 @@ export class XpubTransport implements PublisherTransport {
   }
 
   private header(flags: number, size: number, seq: number, stampNs: bigint): Buffer {
-    return packHeader({ codec: this.spec.codecNumber, flags, size, seq: BigInt(seq), stampNs, publisher: this.spec.id });
+    return packHeader({
+      codec: this.spec.codecNumber,
+      flags,
+      size,
+      seq: BigInt(seq),
+      stampNs,
+      publisher: this.spec.id,
+    });
   }
 
   /** To all at once; while somebody has no room, to everybody else alone. */
@@ -152,11 +160,16 @@ export class XpubTransport implements PublisherTransport {
   private take(queue: Entry[]): Buffer[] {
     const first = queue.shift()!;
     if ("parts" in first) return first.parts;
-    if (!this.subscriptions.readsOnePart) return [this.topic, ...this.tail(first.payload, undefined, first.seq, first.stampNs)];
+    if (!this.subscriptions.readsOnePart)
+      return [this.topic, ...this.tail(first.payload, undefined, first.seq, first.stampNs)];
     const together = [first];
     let bytes = first.payload.length;
     const most = this.spec.batch && this.subscriptions.readsBatches ? Math.min(MAX_SENT_TOGETHER, MAX_BATCH) : 1;
-    for (let next = queue[0]; next && "payload" in next && together.length < most && bytes < FULL_BATCH_BYTES; next = queue[0]) {
+    for (
+      let next = queue[0];
+      next && "payload" in next && together.length < most && bytes < FULL_BATCH_BYTES;
+      next = queue[0]
+    ) {
       if (next.seq !== first.seq + together.length) break;
       together.push(next);
       bytes += next.payload.length;
@@ -164,7 +177,9 @@ export class XpubTransport implements PublisherTransport {
     }
     const header = { codec: this.spec.codecNumber, seq: BigInt(first.seq), publisher: this.spec.id };
     if (together.length > 1) return [packBatch(this.topic, header, together)];
-    return [onePart(this.topic, { ...header, flags: 0, size: first.payload.length, stampNs: first.stampNs }, first.payload)];
+    return [
+      onePart(this.topic, { ...header, flags: 0, size: first.payload.length, stampNs: first.stampNs }, first.payload),
+    ];
   }
 
   /** Resolves when everything is handed to libzmq. */
@@ -178,7 +193,8 @@ export class XpubTransport implements PublisherTransport {
     const subscriber = this.subscriptions.note(event);
     if (subscriber !== undefined) this.greet(subscriber);
     if (this.settleAt === 0) {
-      for (const each of this.subscriptions.greeted.values()) if (each.window?.takeMissed()) this.notify(each.hello, 0);
+      for (const each of this.subscriptions.greeted.values())
+        if (each.window?.takeMissed()) this.notify(each.hello, 0);
     }
     this.onSubscribers();
   }

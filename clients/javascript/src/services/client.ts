@@ -13,7 +13,16 @@ import { codecFor, codecNumbered } from "../messages/codecs.js";
 import type { SubscriberCount } from "../protocol/requests.js";
 import type { ReachablePublisher, SessionSubscriber } from "../session/master_session.js";
 import { DealerSocket } from "../sockets/socket.js";
-import { CallKind, type CallParts, MAX_PAYLOAD_BYTES, packCall, readCall, readFailure, SERVICE_TYPE, timeoutMs } from "./wire.js";
+import {
+  CallKind,
+  type CallParts,
+  MAX_PAYLOAD_BYTES,
+  packCall,
+  readCall,
+  readFailure,
+  SERVICE_TYPE,
+  timeoutMs,
+} from "./wire.js";
 
 const DEFAULT_TIMEOUT_S = 5;
 const IDLE_MS = 200; // then the connection is closed: it would keep the process alive
@@ -117,7 +126,8 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
       if (this.closed) throw new ClosedError(`The client of "${this.service}" is closed.`);
       options.signal?.throwIfAborted();
       const payload = codec.encode(request).data;
-      if (payload.length > MAX_PAYLOAD_BYTES) throw new EncodeError(`The request has ${payload.length} bytes, 64 MiB are allowed.`);
+      if (payload.length > MAX_PAYLOAD_BYTES)
+        throw new EncodeError(`The request has ${payload.length} bytes, 64 MiB are allowed.`);
       const { timeoutS = this.options.timeoutS === undefined ? DEFAULT_TIMEOUT_S : this.options.timeoutS } = options;
       const pending: PendingCall = {
         number: ++this.lastNumber,
@@ -145,7 +155,9 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   private expire(pending: PendingCall): void {
     const name = `"${this.service}"`;
     const error = pending.connection
-      ? new ServiceTimeoutError(`${name} did not answer within ${pending.timeoutS} s; it may still carry the call out.`)
+      ? new ServiceTimeoutError(
+          `${name} did not answer within ${pending.timeoutS} s; it may still carry the call out.`,
+        )
       : new NoServerError(`No server of ${name} was reached within ${pending.timeoutS} s.`);
     this.fail(pending, error);
   }
@@ -202,7 +214,9 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   }
 
   private ended(connection: Connection): void {
-    const error = new ServerGoneError(`The server of "${this.service}" ended; it may or may not have carried the call out.`);
+    const error = new ServerGoneError(
+      `The server of "${this.service}" ended; it may or may not have carried the call out.`,
+    );
     for (const each of [...connection.calls.values()]) this.fail(each, error);
     this.drop(connection);
   }
@@ -223,7 +237,10 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
       return;
     }
     if (answer.kind === CallKind.REFUSED) {
-      this.fail(pending, new RequestRefusedError(`The server of "${this.service}" refused: ${readFailure(answer.payload).reason}`));
+      this.fail(
+        pending,
+        new RequestRefusedError(`The server of "${this.service}" refused: ${readFailure(answer.payload).reason}`),
+      );
       return;
     }
     this.answered++;
@@ -237,7 +254,8 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     }
     try {
       const codec = codecNumbered(answer.codec);
-      if (!codec) throw new WireError("codec", `The answer has codec ${answer.codec}, which this nep-js does not know.`);
+      if (!codec)
+        throw new WireError("codec", `The answer has codec ${answer.codec}, which this nep-js does not know.`);
       return { answer: codec.decode(answer.payload, {}) };
     } catch (error) {
       return { error: error as Error };
@@ -281,7 +299,8 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
 
   private finish(): Promise<void> {
     this.host.unregister(this);
-    for (const each of [...this.waiting]) this.fail(each, new ClosedError(`The client of "${this.service}" is closed.`));
+    for (const each of [...this.waiting])
+      this.fail(each, new ClosedError(`The client of "${this.service}" is closed.`));
     for (const each of [...this.connections.values()]) this.drop(each);
     return Promise.resolve();
   }

@@ -118,14 +118,17 @@ export class Server {
     try {
       const answer = (await this.callback(request)) ?? {};
       const encoded = codec.encode(answer);
-      if (encoded.data.length > MAX_PAYLOAD_BYTES) throw new EncodeError(`The answer has ${encoded.data.length} bytes, 64 MiB are allowed.`);
+      if (encoded.data.length > MAX_PAYLOAD_BYTES)
+        throw new EncodeError(`The answer has ${encoded.data.length} bytes, 64 MiB are allowed.`);
       this.calls++;
       this.send(client, call, CallKind.ANSWER, encoded);
     } catch (error) {
       this.calls++;
       this.errors++;
       const { name = "Error", message = String(error) } = error instanceof Error ? error : {};
-      this.host.warn(`"${this.service}": a call failed. ${error instanceof Error ? (error.stack ?? message) : message}`);
+      this.host.warn(
+        `"${this.service}": a call failed. ${error instanceof Error ? (error.stack ?? message) : message}`,
+      );
       this.send(client, call, CallKind.ERROR, { data: packFailure(name, message) });
     }
   }

@@ -50,12 +50,21 @@ export function readCall(parts: readonly Buffer[], expected: "call" | "answer"):
   }
   const version = header![0];
   if (version !== VERSION) {
-    throw new WireError("call-version", `The call has version ${version} of services, which this nep-js does not know. Update nep-js.`);
+    throw new WireError(
+      "call-version",
+      `The call has version ${version} of services, which this nep-js does not know. Update nep-js.`,
+    );
   }
   const kind = header![1]!;
   const isRight = expected === "call" ? kind === CallKind.CALL : kind >= CallKind.ANSWER && kind <= CallKind.REFUSED;
   if (!isRight) throw new WireError("call-kind", `Kind ${kind} is no ${expected} of a service.`);
-  return { kind, codec: header!.readUInt16LE(2), timeoutMs: header!.readUInt32LE(4), number: header!.readBigUInt64LE(8), payload };
+  return {
+    kind,
+    codec: header!.readUInt16LE(2),
+    timeoutMs: header!.readUInt32LE(4),
+    number: header!.readBigUInt64LE(8),
+    payload,
+  };
 }
 
 /** Return the payload of an error or refusal. `kind` is the error's class, empty when the call was refused. */
@@ -80,7 +89,9 @@ export function readFailure(payload: Buffer): { kind: string; reason: string } {
 export function topicOfService(service: string): string {
   checkTopic(service);
   if (service.startsWith(SERVICE_PREFIX) || service.startsWith(SURVEY_PREFIX)) {
-    throw new BadTopicError(`"${service}" is no service: nep itself puts "${SERVICE_PREFIX}" and "${SURVEY_PREFIX}" before names.`);
+    throw new BadTopicError(
+      `"${service}" is no service: nep itself puts "${SERVICE_PREFIX}" and "${SURVEY_PREFIX}" before names.`,
+    );
   }
   return checkTopic(SERVICE_PREFIX + service);
 }

@@ -82,7 +82,12 @@ export class MasterSession {
     private readonly warn: (message: string) => void,
     isHeld: () => boolean,
   ) {
-    this.rpc = new RpcClient(address, (answer) => this.obey(answer), (error) => warn(error.message), isHeld);
+    this.rpc = new RpcClient(
+      address,
+      (answer) => this.obey(answer),
+      (error) => warn(error.message),
+      isHeld,
+    );
   }
 
   /** Whether the master has answered at all. */
@@ -117,7 +122,11 @@ export class MasterSession {
     for (;;) {
       const registered = { record: { ...record, endpoints }, owner, isConfirmed: false };
       this.publishers.set(record.id, registered);
-      const added = await this.register(() => this.rpc.ask({ do: "publisher+", node: this.node, publisher: registered.record }, waitS), this.publishers, record.id);
+      const added = await this.register(
+        () => this.rpc.ask({ do: "publisher+", node: this.node, publisher: registered.record }, waitS),
+        this.publishers,
+        record.id,
+      );
       registered.isConfirmed = true;
       const moved = await owner.move(await this.hosts());
       if (String(moved) === String(endpoints)) {
@@ -341,7 +350,9 @@ export class MasterSession {
     }
     for (const { record, owner } of this.subscribers.values()) {
       if (!record.pattern) owner.reconcile(record.topic, byTopic.get(record.topic) ?? []);
-      else for (const [topic, remotes] of byTopic) if (matchesPattern(record.topic, topic)) owner.reconcile(topic, remotes);
+      else
+        for (const [topic, remotes] of byTopic)
+          if (matchesPattern(record.topic, topic)) owner.reconcile(topic, remotes);
     }
   }
 

@@ -80,7 +80,8 @@ class Reader {
       if (performance.now() >= turnEnds) await immediate();
     } catch (error) {
       const { code } = error as NodeJS.ErrnoException;
-      if (code === "EBUSY") await immediate(); // the socket is being bound
+      if (code === "EBUSY")
+        await immediate(); // the socket is being bound
       else if (code !== "EAGAIN") throw error;
     }
   }

@@ -63,6 +63,8 @@ export function hostTowards(address: string): Promise<string> {
       resolve(host);
     };
     socket.once("error", () => finish(LOOPBACK));
-    socket.connect(Number(address.slice(address.lastIndexOf(":") + 1)), hostOf(address), () => finish(socket.address().address));
+    socket.connect(Number(address.slice(address.lastIndexOf(":") + 1)), hostOf(address), () =>
+      finish(socket.address().address),
+    );
   });
 }

@@ -16,7 +16,11 @@ export interface BatchEntry {
  * @param first Codec, publisher and seq of the first message; the others count on from it.
  * @param entries 1 to 256 messages.
  */
-export function packBatch(topic: Buffer, first: Pick<Header, "codec" | "seq" | "publisher">, entries: readonly BatchEntry[]): Buffer {
+export function packBatch(
+  topic: Buffer,
+  first: Pick<Header, "codec" | "seq" | "publisher">,
+  entries: readonly BatchEntry[],
+): Buffer {
   const tableBytes = 4 + 12 * entries.length;
   const size = entries.reduce((sum, each) => sum + each.payload.length, tableBytes);
   const part = Buffer.allocUnsafe(topic.length + HEADER_BYTES + size);

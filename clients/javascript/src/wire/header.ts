@@ -59,7 +59,10 @@ export function readHeaderPart(part: Buffer): Header {
   }
   const version = part[0];
   if (version !== VERSION) {
-    throw new WireError("version", `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`);
+    throw new WireError(
+      "version",
+      `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`,
+    );
   }
   return {
     codec: part[1]!,

@@ -39,7 +39,9 @@ export function checkNodeName(name: string): string {
   }
   const found = CONTROL.exec(name);
   if (found) {
-    throw new BadNameError(`"${shortened(name)}" is no node name: the character ${escaped(found[0])} is not allowed.`);
+    throw new BadNameError(
+      `"${shortened(name)}" is no node name: the character ${escaped(found[0])} is not allowed.`,
+    );
   }
   return name;
 }
@@ -49,5 +51,7 @@ function shortened(text: string): string {
 }
 
 function escaped(letter: string): string {
-  return letter === "{" || letter === " " ? `"${letter}"` : `U+${letter.charCodeAt(0).toString(16).toUpperCase().padStart(4, "0")}`;
+  return letter === "{" || letter === " "
+    ? `"${letter}"`
+    : `U+${letter.charCodeAt(0).toString(16).toUpperCase().padStart(4, "0")}`;
 }

@@ -69,7 +69,10 @@ export function splitParts(parts: readonly Buffer[]): { first: Buffer; rest: rea
   if (cut === 0 || first.length < cut + HEADER_BYTES) {
     throw new WireError("part-count", "A message has 3 or 4 parts, this one has 1.");
   }
-  return { first: first.subarray(0, cut), rest: [first.subarray(cut, cut + HEADER_BYTES), first.subarray(cut + HEADER_BYTES)] };
+  return {
+    first: first.subarray(0, cut),
+    rest: [first.subarray(cut, cut + HEADER_BYTES), first.subarray(cut + HEADER_BYTES)],
+  };
 }
 
 /**
@@ -85,9 +88,13 @@ export function readRest(rest: readonly Buffer[], isOnePart: boolean): WireMessa
   if (rest.length !== expected || !payload) {
     throw new WireError("part-count", `The message has ${rest.length + 1} parts, its flags ask for ${expected + 1}.`);
   }
-  const found = header.flags & Flag.BATCH ? readBatch(header, payload, isOnePart) : [readOne(header, payload, packed)];
+  const found =
+    header.flags & Flag.BATCH ? readBatch(header, payload, isOnePart) : [readOne(header, payload, packed)];
   if (!codecNumbered(header.codec)) {
-    throw new WireError("codec", `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`);
+    throw new WireError(
+      "codec",
+      `The message has codec ${header.codec}, which this nep-js does not know. Update nep-js.`,
+    );
   }
   return found;
 }
@@ -100,7 +107,8 @@ function readOne(header: Header, payload: Buffer, packed: Buffer | undefined): W
 }
 
 function readBatch(header: Header, body: Buffer, isOnePart: boolean): WireMessage[] {
-  if (!isOnePart || header.flags !== Flag.BATCH) throw new WireError("batch-form", "A batch is one part and has no other flags.");
+  if (!isOnePart || header.flags !== Flag.BATCH)
+    throw new WireError("batch-form", "A batch is one part and has no other flags.");
   if (header.size !== body.length) {
     throw new WireError("payload-size", `The header says ${header.size} bytes, the batch has ${body.length}.`);
   }
