@@ -37,7 +37,7 @@ hypothesis.settings.load_profile("nep")
 pytest.register_assert_rewrite("tests.robots.whose_words_count")  # a contract: others hold to it
 os.environ["NEP_LANG"] = "en"  # what tests read is English, also on a computer that is set to something else
 WITH_FIXED_PORTS = ("tests/interop/", "tests/e2e/test_rize.py")
-MOSTLY_WAITING = ("tests/nep/", "tests/core/", "tests/robots/", "tests/blocks/")
+MOSTLY_WAITING = ("tests/nep/", "tests/clients/", "tests/core/", "tests/robots/", "tests/blocks/")
 """They open no window, and wait for timeouts and other processes for two thirds of their time and more."""
 USUAL_S, USUAL_OF_STUDIO_S = 0.2, 12.0
 """What a test takes, all in all, and one that starts Studio, ..."""
@@ -65,6 +65,7 @@ LONG_S = {
     "tests/nep/cli/test_streams.py": 28.0,
     "tests/nep/services/test_bad_days.py": 24.0,
     "tests/nep/cli/test_command.py": 23.0,
+    "tests/clients/test_javascript.py": 30.0,
     "tests/nep/nodes/test_processes.py": 17.0,
     "tests/robots/driver/test_process.py": 20.0,
     "tests/robots/virtual/test_simulated.py": 20.0,

@@ -82,14 +82,15 @@ def running_script(script: str, folder: Path, *arguments: str, **environment: st
         process.wait(LONG_S)
 
 
-def prepared(script: str, folder: Path) -> list[str]:
+def prepared(script: str, folder: Path, name: str = "program.cjs") -> list[str]:
     """Write a program into a folder from which nep-js and zeromq are importable; the command that runs it."""
     modules = folder / "node_modules"
     modules.mkdir(exist_ok=True)
-    for name, target in (("nep-js", PACKAGE), ("zeromq", PACKAGE / "node_modules" / "zeromq")):
-        (modules / name).symlink_to(target, target_is_directory=True)
-    (folder / "program.cjs").write_text(script, encoding="utf-8")
-    return [str(node), "program.cjs"]
+    for package, target in (("nep-js", PACKAGE), ("zeromq", PACKAGE / "node_modules" / "zeromq")):
+        if not (modules / package).exists():
+            (modules / package).symlink_to(target, target_is_directory=True)
+    (folder / name).write_text(script, encoding="utf-8")
+    return [str(node), name]
 
 
 class Adapter:

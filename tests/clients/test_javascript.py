@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -22,10 +23,11 @@ from tests.clients.node_programs import (
     Adapter,
     build_package,
     node,
+    prepared,
     run_script,
     running_script,
 )
-from tests.nep.programs import eventually
+from tests.nep.programs import eventually, running
 
 pytestmark = NEEDS_NODE
 
@@ -54,6 +56,13 @@ SLOW_RULES = {
     "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
 }  # fmt: skip
 """They wait for renewals for seconds each; `nep wire check` without --rule has them, too."""
+MORTAL_SERVER = """
+import os, signal, threading, nep
+node = nep.node("mortal")
+node.new_server("/die", lambda request: os.kill(os.getpid(), signal.SIGKILL), threads=1)
+print("ready", flush=True)
+threading.Event().wait()
+"""
 LARGE_BYTES = 6 * 2**20
 LARGE_COUNT = 50
 
@@ -209,6 +218,28 @@ def test_services_are_called_both_ways(program, python):
     assert failed["error"] == "LookupError: no such joint"
     nobody = program.reply(program.begin("call", service="/nobody", value=1, timeout_s=0.05))
     assert "/nobody" in nobody["error"]
+
+
+def test_call_ends_when_its_server_is_killed(program):
+    with running(MORTAL_SERVER) as server:
+        assert server.line() == "ready"
+        ended = program.reply(program.begin("call", service="/die", value=1, timeout_s=LONG_S))
+    assert "ended" in ended["error"]
+
+
+def test_programs_of_the_readme_talk_to_each_other(python, tmp_path):
+    readme = (PACKAGE / "README.md").read_text(encoding="utf-8")
+    programs = dict(re.findall(r"```js\n// (\w+\.mjs)\n(.*?)```", readme, re.DOTALL))
+    commands = {name: prepared(text, tmp_path, name) for name, text in programs.items()}
+    subscriber = subprocess.Popen(commands["subscriber.mjs"], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    try:
+        with python.new_pub("temperature", "json") as publisher:
+            eventually(lambda: publisher.subscribers == 1)
+        subprocess.run(commands["publisher.mjs"], cwd=tmp_path, timeout=LONG_S, check=True)
+        assert subscriber.stdout.readline() == "{ celsius: 21.5 }\n"
+    finally:
+        subscriber.kill()
+        subscriber.communicate()
 
 
 def test_master_that_is_restarted_under_traffic_loses_nothing(monkeypatch):
