@@ -427,6 +427,11 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     return this.close();
   }
 
+  /** Begin to close at the end of a `using` block. */
+  [Symbol.dispose](): void {
+    void this.close();
+  }
+
   // ---- inside
 
   private hold(): Hold {

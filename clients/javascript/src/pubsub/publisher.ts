@@ -326,4 +326,9 @@ export class Publisher<T = unknown> {
   [Symbol.asyncDispose](): Promise<void> {
     return this.close();
   }
+
+  /** Begin to close at the end of a `using` block. */
+  [Symbol.dispose](): void {
+    void this.close();
+  }
 }

@@ -400,4 +400,9 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   [Symbol.asyncDispose](): Promise<void> {
     return this.close();
   }
+
+  /** Begin to close at the end of a `using` block. */
+  [Symbol.dispose](): void {
+    void this.close();
+  }
 }

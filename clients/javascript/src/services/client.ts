@@ -309,4 +309,9 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   [Symbol.asyncDispose](): Promise<void> {
     return this.close();
   }
+
+  /** Begin to close at the end of a `using` block. */
+  [Symbol.dispose](): void {
+    void this.close();
+  }
 }

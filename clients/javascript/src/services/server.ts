@@ -174,4 +174,9 @@ export class Server {
   [Symbol.asyncDispose](): Promise<void> {
     return this.close();
   }
+
+  /** Begin to close at the end of a `using` block. */
+  [Symbol.dispose](): void {
+    void this.close();
+  }
 }
