@@ -30,7 +30,7 @@ import { checkNodeName, checkTopic } from "./wire/names.js";
 import { isPattern } from "./wire/pattern.js";
 
 const LEAVE_S = 0.3;
-const DIRECT_WAIT_MS = 300; // without a master nobody knows whether there is another side
+const DIRECT_WAIT_MS = 300; // without a master the number of peers is unknown
 
 /** How a node finds its master. */
 export interface NodeOptions {
@@ -58,8 +58,8 @@ process.on("beforeExit", () => {
  * A program's place in the graph: makes publishers and subscribers, and keeps its lease with the master.
  *
  * A program that only publishes ends when everything is delivered; one that subscribes stays until `close`.
- * Before `process.exit()`, await `close()`. Problems that are no errors of a call are told by the event `warning`
- * with one sentence; without a listener they go to `process.emitWarning`.
+ * Before `process.exit()`, await `close()`. Problems that no call can report are emitted as the event
+ * `warning`, one sentence each; without a listener they go to `process.emitWarning`.
  *
  * @example
  * import { Node } from "nep-js";

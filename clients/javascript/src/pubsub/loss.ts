@@ -21,7 +21,7 @@ export class Source {
   endsAt: number | undefined;
   /** Until then at most, what comes before the echo is left out. */
   earlyUntil: number | undefined;
-  /** The newest message that the master, or its last word of it, has told of. */
+  /** Highest seq that the master has reported. */
   promised = 0n;
   /** Messages in this range were counted as lost because they were promised, and may still come. */
   lateFrom = 0n;

@@ -1,6 +1,6 @@
 /**
  * The wire of the original NEP, for direct connections: one part, without header. Up to version 0.5.4.5 (generation A)
- * the topic stands in front (`topic {"a":1}`), from 0.5.4.8 on (B) it does not. Nobody numbers these messages.
+ * the topic stands in front (`topic {"a":1}`), from 0.5.4.8 on (B) it does not. Messages have no sequence numbers, so losses can't be counted.
  */
 import { WireError } from "../errors.js";
 import { type Codec, codecFor, type Encoded } from "../messages/codecs.js";

@@ -67,7 +67,7 @@ export interface PublisherHost {
 /**
  * Publishes messages on one topic; made by `Node.publisher` and `Node.new_pub`.
  *
- * A payload that can't be encoded is dropped, counted in `rejected` and named by the node's `warning` event.
+ * A payload that can't be encoded is dropped, counted in `rejected` and reported by the node's `warning` event.
  *
  * @example
  * const publisher = await node.publisher("odometry", { type: "json" });
@@ -82,7 +82,7 @@ export class Publisher<T = unknown> {
   nanCount = 0;
   /** Messages dropped before the handshake was over, for lack of room. */
   dropped = 0;
-  /** Messages and subscriptions that could not be understood. */
+  /** Malformed subscriptions. */
   refused = 0;
   private readonly codec: Codec;
   private readonly transport: PublisherTransport;
@@ -104,7 +104,7 @@ export class Publisher<T = unknown> {
     this.codec = codecFor(spec.type ?? "json");
     this.transport = this.makeTransport();
     this.ready = this.begin();
-    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+    this.ready.catch(() => undefined); // also reported by the node's `warning` event
   }
 
   private makeTransport(): PublisherTransport {
@@ -132,7 +132,7 @@ export class Publisher<T = unknown> {
     return this.codec.name;
   }
 
-  /** Messages published so far, also those that nobody was there to receive. */
+  /** Messages published so far, with or without subscribers. */
   get sent(): number {
     return this.transport.count + (this.early?.length ?? 0);
   }
@@ -317,7 +317,7 @@ export class Publisher<T = unknown> {
       this.host.warn(`"${this.topic}" closed before ${this.subscribers} subscriber(s) took everything.`);
   }
 
-  /** @internal Wait until somebody reads: without a master nobody knows whether there is a subscriber. */
+  /** @internal Wait for the first subscriber; without a master the number to expect is unknown. */
   waitForAnybody(timeoutMs: number): Promise<void> {
     return this.waitUntil(() => this.transport.isHeard, timeoutMs);
   }

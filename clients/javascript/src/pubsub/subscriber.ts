@@ -101,7 +101,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     this.original = host.isOriginal ? this.originalReader() : undefined;
     if (!this.original && !this.isPattern) this.reader(spec.topic);
     this.ready = this.begin();
-    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+    this.ready.catch(() => undefined); // also reported by the node's `warning` event
     if (spec.signal?.aborted) this.close_();
     else spec.signal?.addEventListener("abort", this.close_, { once: true });
   }
@@ -124,7 +124,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     return this.sum((each) => each.sources.lost, this.totals.lost);
   }
 
-  /** What came and was no message of the wire. */
+  /** Received data that is not a message of the wire. */
   get refused(): number {
     return this.sum((each) => each.refused, this.totals.refused);
   }
@@ -325,7 +325,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   private warnRefused(reason: string): void {
     this.refusal = reason;
-    this.warnRarely(`"${this.topic}": what came was no message. ${reason}`);
+    this.warnRarely(`"${this.topic}": received a malformed message. ${reason}`);
   }
 
   private warnRarely(message: string): void {
@@ -370,7 +370,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     for (const [topic, reader] of this.readers) {
       reader.tick(lastSeqs);
       if (!this.isPattern || reader.sources.byId.size > 0) continue;
-      this.readers.delete(topic); // nobody publishes it any more
+      this.readers.delete(topic); // the topic has no publishers any more
       this.totals.received += reader.sources.received;
       this.totals.lost += reader.sources.lost;
       this.totals.refused += reader.refused;

@@ -13,10 +13,10 @@ interface Greeted {
   readonly window: SendWindow | undefined;
 }
 
-/** Who reads at a publisher's port, from the subscriptions that come in there. */
+/** A publisher's subscribers, from the subscriptions that its XPUB socket receives. */
 export class Subscriptions {
   readonly greeted = new Map<bigint, Greeted>();
-  /** Number of filters by which others read, who did not say that they read messages of one part. */
+  /** Topic filters of subscribers that don't read messages of one part, with their number. */
   private readonly plainFilters = new Map<string, number>();
   private readonly topicPart: Buffer;
   private readonly topicFilter: string;
@@ -30,24 +30,24 @@ export class Subscriptions {
     this.topicFilter = this.topicPart.toString("latin1");
   }
 
-  /** Whether anybody reads. */
+  /** Whether the topic has subscribers, with or without a hello. */
   get isHeard(): boolean {
     return this.greeted.size > 0 || this.plainFilters.size > 0;
   }
 
-  /** Whether all who read take messages of one part. */
+  /** Whether all subscribers read messages of one part. */
   get readsOnePart(): boolean {
     return this.plainFilters.size === 0;
   }
 
-  /** Whether all who read take several messages in one part. */
+  /** Whether all subscribers read batches. */
   get readsBatches(): boolean {
     if (this.plainFilters.size > 0) return false;
     for (const each of this.greeted.values()) if (!each.readsBatches) return false;
     return true;
   }
 
-  /** Whether all who read tell what they have read. */
+  /** Whether all subscribers answer echoes. */
   get tellsAll(): boolean {
     if (this.plainFilters.size > 0) return false;
     for (const each of this.greeted.values()) if (!each.window) return false;
@@ -60,7 +60,7 @@ export class Subscriptions {
     const filter = event.subarray(1);
     const hello = parseHello(filter);
     if (hello) {
-      if (hello.topic !== this.topic) return undefined; // a subscriber of whoever had this port before
+      if (hello.topic !== this.topic) return undefined; // a subscriber of the program that had this port before
       if (isAdded) return this.greet(hello.subscriber, hello.level, filter);
       this.greeted.delete(hello.subscriber);
       return undefined;
@@ -89,7 +89,7 @@ export class Subscriptions {
     return subscriber;
   }
 
-  /** Each filter that comes is told, and only the last of its kind that goes (XPUB_VERBOSE). */
+  /** With XPUB_VERBOSE each addition of a filter is reported, but only the last removal of equal ones. */
   private notePlain(filter: Buffer, isAdded: boolean): void {
     if (!this.topicPart.subarray(0, filter.length).equals(filter)) {
       this.refuse(`${filter.length} bytes that are no subscription of it`);

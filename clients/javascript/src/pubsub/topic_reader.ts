@@ -139,7 +139,7 @@ export class TopicReader {
     const { first, rest } = splitParts(parts);
     const isAlone = first.equals(this.hello);
     if (!isAlone && !first.equals(this.topicPart)) {
-      throw new WireError("first-part", "A message begins with something else than its topic.");
+      throw new WireError("first-part", "The first part is neither the topic nor the hello.");
     }
     for (const each of readRest(rest, parts.length === 1)) this.message(each, isAlone);
   }

@@ -7,9 +7,9 @@ export interface PublisherTransport {
   readonly count: number;
   readonly bytes: number;
   readonly lastStampNs: bigint | undefined;
-  /** Whether anybody reads. */
+  /** Whether the topic has subscribers, with or without a hello. */
   readonly isHeard: boolean;
-  /** Number of subscribers that are known. */
+  /** Number of connected subscribers. */
   readonly subscribers: number;
   /** Whether this subscriber is connected. */
   hasGreeted(subscriber: bigint): boolean;
@@ -19,10 +19,10 @@ export interface PublisherTransport {
   attach(endpoint: string, how: "bind" | "connect"): Promise<void>;
   /** Read subscriptions now. */
   wake(): void;
-  /** Count a message that nobody reads. */
+  /** Count a message without sending it: the topic has no subscribers. */
   skip(): void;
   send(encoded: Encoded, stampNs?: bigint): void;
-  /** Tell subscribers that nothing comes any more. Returns false if the wire has no way to say so. */
+  /** Announce the end to all subscribers. Returns false if the wire has no bye. */
   sayBye(): boolean;
   /** Resolves when everything is handed to libzmq. */
   flush(): Promise<void>;

@@ -93,7 +93,7 @@ export class XpubTransport implements PublisherTransport {
 
   // ---- sending
 
-  /** Count a message that nobody reads. */
+  /** Count a message without sending it: the topic has no subscribers. */
   skip(): void {
     this.count++;
     this.lastStampNs = nowNs();

@@ -228,7 +228,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     } catch (error) {
       if (!(error instanceof WireError)) throw error;
       this.late++;
-      this.host.warn(`"${this.service}": what came was no answer. ${error.message}`);
+      this.host.warn(`"${this.service}": received a malformed answer. ${error.message}`);
       return;
     }
     const pending = connection.calls.get(answer.number);

@@ -35,7 +35,7 @@ export class Server {
   errors = 0;
   /** Calls that were refused: closing, too many under way, or not decodable. */
   refused = 0;
-  /** What came and was no call. */
+  /** Received messages that are not calls. */
   unreadable = 0;
   private readonly socket = new RouterSocket(MAX_PAYLOAD_BYTES);
   private readonly bindings = new Bindings(this.socket);
@@ -56,7 +56,7 @@ export class Server {
       () => "long",
     );
     this.ready = this.begin();
-    this.ready.catch(() => undefined); // told by the node's `warning` event, too
+    this.ready.catch(() => undefined); // also reported by the node's `warning` event
   }
 
   private async begin(): Promise<this> {
@@ -79,7 +79,7 @@ export class Server {
     } catch (error) {
       if (!(error instanceof WireError)) throw error;
       this.unreadable++;
-      this.host.warn(`"${this.service}": what came was no call. ${error.message}`);
+      this.host.warn(`"${this.service}": received a malformed call. ${error.message}`);
       return;
     }
     const reason = this.refusal(call);

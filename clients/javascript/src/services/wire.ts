@@ -6,7 +6,7 @@ export const SERVICE_PREFIX = "nep.service:";
 const SURVEY_PREFIX = "survey:";
 /** Type and codec under which the master lists servers and clients. */
 export const SERVICE_TYPE = "service";
-/** Whoever sends a larger call or answer is disconnected. */
+/** Largest call or answer; peers that send more are disconnected. */
 export const MAX_PAYLOAD_BYTES = 64 * 2 ** 20;
 
 const VERSION = 1;
@@ -37,7 +37,7 @@ export function packCall(call: CallParts): Buffer[] {
   return [header, call.payload];
 }
 
-/** Return a time limit as it is told to the server: at least a millisecond, 0 for ever. */
+/** Return the timeout field of a call: milliseconds, at least 1; 0 means no limit. */
 export function timeoutMs(timeoutS: number | null): number {
   return timeoutS === null ? 0 : Math.max(1, Math.min(MAX_TIMEOUT_MS, Math.round(timeoutS * 1000)));
 }

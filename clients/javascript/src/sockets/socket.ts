@@ -100,7 +100,7 @@ class Sender<T> {
     private readonly socket: WritableSocket,
     /** Takes entries from the queue, oldest first, and returns the parts of the next message. */
     private readonly take: (queue: T[]) => Buffer[],
-    /** Whether something is to be read before the next message is taken. */
+    /** Whether input must be read before the next message is taken. */
     private readonly mustRead: () => boolean = () => false,
   ) {}
 
@@ -145,7 +145,7 @@ class Sender<T> {
 
   private trySend(parts: Buffer[]): boolean {
     try {
-      // A ROUTER's EHOSTUNREACH, and a socket that is being closed: nobody is there to read it.
+      // A ROUTER's EHOSTUNREACH, and a socket that is being closed: there is no peer any more.
       this.isInFlight = true;
       this.last = (this.socket as XPublisher)
         .send(parts)
@@ -256,7 +256,7 @@ export class SubSocket {
     this.reader?.wake();
   }
 
-  /** Whether something waits to be read. */
+  /** Whether input is pending. */
   get hasInput(): boolean {
     return !this.socket.closed && this.socket.readable;
   }
@@ -265,7 +265,7 @@ export class SubSocket {
     this.socket.subscribe(filter);
   }
 
-  /** Tell all publishers something by a filter that is taken back at once. */
+  /** Send a notice to all publishers: subscribe to a filter and unsubscribe at once. */
   say(filter: Buffer): void {
     if (this.socket.closed) return;
     this.socket.subscribe(filter);

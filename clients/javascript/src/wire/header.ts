@@ -30,11 +30,11 @@ export interface Header {
   readonly stampNs: bigint;
   /** The publisher's id. */
   readonly publisher: bigint;
-  /** Payload size in bytes; 0 if not told. */
+  /** Payload size in bytes; 0 if unknown. */
   readonly size: number;
 }
 
-/** Write a header into `buffer` at `offset`. A size beyond 32 bits is written as 0 ("not told"). */
+/** Write a header into `buffer` at `offset`. A size beyond 32 bits is written as 0 ("unknown"). */
 export function writeHeader(buffer: Buffer, offset: number, header: Header): void {
   buffer[offset] = VERSION;
   buffer[offset + 1] = header.codec;
