@@ -15,6 +15,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
+from nep.messages.image_codec import raw_image
 from tests.clients.node_programs import (
     ADAPTER,
     LONG_S,
@@ -161,6 +162,22 @@ def test_payloads_arrive_unchanged_both_ways(program, python, msg_type, payload)
     given = {"bytes": base64.b64encode(payload).decode()} if msg_type == "bytes" else {"value": payload}
     program.do("publish", pub=published["pub"], **given)
     assert subscriber.listen(True) == (True, payload)
+
+
+def test_pictures_arrive_both_ways(program, python):
+    numpy, cv2 = pytest.importorskip("numpy"), pytest.importorskip("cv2")
+    picture = numpy.arange(48, dtype="uint8").reshape(4, 4, 3)
+    program.do("subscriber", topic="to_js", type="image")
+    python.new_pub("to_js", "image").publish(raw_image(picture))
+    assert program.wait(lambda messages: len(messages) == 1)
+    assert base64.b64decode(program.messages[0]["payload"]) == picture.tobytes()
+    subscriber = python.new_sub("to_py", "image")
+    pub = program.do("publisher", topic="to_py", type="image")["pub"]
+    png = cv2.imencode(".png", picture)[1].tobytes()
+    program.do("publish", pub=pub, bytes=base64.b64encode(png).decode())
+    is_there, received = subscriber.listen(True)
+    assert is_there
+    assert numpy.array_equal(received, picture)
 
 
 def test_bursts_arrive_in_order_both_ways(program, python):
