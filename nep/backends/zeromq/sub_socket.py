@@ -375,7 +375,13 @@ class SubSocket:
                         continue
                     if form & BATCH_FORM:
                         got, new = self._read_batch(first, into)
-                        count, others, room, first = count + got, others + got - new, room - len(first), None
+                        # A rejected batch takes no room: who gets nothing waits as for an empty socket.
+                        count, others, room, first = (
+                            count + got,
+                            others + got - new,
+                            room - (len(first) if got else 0),
+                            None,
+                        )
                         continue
                     other = self._read_shared(first) if form & SHARED_FORM else None
                 else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 from collections.abc import Iterator
 from time import monotonic
 
@@ -254,3 +255,24 @@ def test_a_publisher_that_has_another_port_is_followed(context: zmq.Context[zmq.
         eventually(lambda: sub.read([]) is None and sub.sources.get(7).has_echoed)
     for each in (first, second, sub):
         each.close()
+
+
+def test_message_behind_a_rejected_batch_is_read_at_once(context: zmq.Context[zmq.Socket[bytes]]) -> None:
+    """Whoever gets nothing waits for the descriptor, which does not tell again of what is there already."""
+    spec = SubscriberSpec(5, "t", "bytes", Hybrid("x", "many2many"), None)
+    socket, there = context.socket(zmq.SUB), context.socket(zmq.XPUB)
+    sub = SubSocket(socket, spec)
+    there.bind("inproc://there")
+    socket.connect("inproc://there")
+    assert there.recv() == b"\1t\0"
+    batch = wire.Header(3, wire.BATCH, 1, 1, 7, 4).pack() + bytes(4)  # it tells of no message
+    for _number in range(3):
+        there.send(b"t\0" + batch)
+    there.send_multipart(wire.join("t", wire.Header(3, 0, 1, 1, 7), b"good"))
+    assert sub.has_input
+    message = sub.read(deque())
+    assert message is not None
+    assert bytes(message.data) == b"good"
+    assert sub.refusals.count == 3
+    sub.close()
+    there.close(0)

@@ -29,6 +29,7 @@ DATA = Path(__file__).parents[2] / "data" / "wire"
 VECTORS: list[dict[str, Any]] = json.loads((DATA / "messages.json").read_text("utf-8"))
 GOOD = [each for each in VECTORS if "means" in each]
 BATCHES: list[dict[str, Any]] = json.loads((DATA / "batches.json").read_text("utf-8"))
+MALFORMED: list[list[str]] = json.loads((DATA / "malformed.json").read_text("utf-8"))
 BAD = [each for each in VECTORS if "error" in each]
 MASTER: dict[str, Any] = json.loads((DATA / "master.json").read_text("utf-8"))
 LONG_MS = 30_000
@@ -189,6 +190,27 @@ def test_a_subscriber_refuses_what_is_none_and_reads_on(
     assert message is not None
     assert bytes(message.data).hex() == GOOD[0]["means"]["payload"]
     assert subscriber.refused == int(passes)
+
+
+def test_subscriber_rejects_and_counts_malformed_messages(
+    node: nep.Node, their: Callable[[int], zmq.Socket[bytes]]
+) -> None:
+    theirs = their(zmq.XPUB)
+    port = theirs.bind_to_random_port("tcp://127.0.0.1")
+    direct = node.direct(port=port, mode="one2many", wire="native")
+    subscriber = node.new_sub("example", "json", direct)
+    assert theirs.recv() == b"\1" + wire.topic_part("example")
+    count = 0
+    for _code, *vector in MALFORMED:
+        parts = [bytes.fromhex(part) for part in vector]
+        if parts and parts[0].startswith(wire.topic_part("example")):  # others do not pass its filter
+            theirs.send_multipart(parts)
+            count += 1
+    theirs.send_multipart(wire.join("example", wire.Header(1, 0, 1, 1, 9), b"{}"))
+    message = subscriber.receive(LONG_MS / 1000)
+    assert message is not None
+    assert (message.publisher, bytes(message.data)) == (9, b"{}")
+    assert (subscriber.refused, subscriber.received, subscriber.lost) == (count, 1, 0)
 
 
 # ---- the master
