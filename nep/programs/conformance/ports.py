@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import threading
 import time
 from typing import Any
@@ -22,6 +21,6 @@ def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
             socket.bind(endpoint)
             return
         except zmq.ZMQError as error:
-            if error.errno != errno.EADDRINUSE or time.monotonic() >= deadline:
+            if error.errno != zmq.EADDRINUSE or time.monotonic() >= deadline:
                 raise
         threading.Event().wait(0.005)
