@@ -18,7 +18,7 @@ from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 from nep.text import escaped, shortened
 
-__all__ = ["Definition", "parse"]
+__all__ = ["Definition", "Field", "FieldKind", "parse"]
 
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
@@ -73,19 +73,27 @@ class _Reader:
 
 
 @dataclass(frozen=True)
-class _Kind:
-    """How a value is written and read. It has `least` bytes or more."""
+class FieldKind:
+    """Type of a field: how its values are written and read. A value has `least` bytes or more.
+
+    `fields` are those of a message; `element` is what an array consists of, `length` the size of a fixed one.
+    """
 
     name: str
     write: Callable[[object, str, bytearray], None]
     read: Callable[[_Reader, str], object]
     least: int
+    fields: tuple[Field, ...] = ()
+    element: FieldKind | None = None
+    length: int | None = None
 
 
 @dataclass(frozen=True)
-class _Field:
+class Field:
+    """Field of a message."""
+
     name: str
-    kind: _Kind
+    kind: FieldKind
 
 
 @dataclass(frozen=True)
@@ -94,7 +102,7 @@ class Definition:
 
     name: str
     text: str
-    fields: tuple[_Field, ...]
+    fields: tuple[Field, ...]
     has_header: bool
     """Whether its first field is a header: then the bytes begin with seq, secs and nsecs."""
 
@@ -154,12 +162,12 @@ class _Parser:
     def __init__(self, name: str, texts: Mapping[str, str]) -> None:
         self._name = name
         self._texts = texts
-        self._known: dict[str, _Kind] = {}
+        self._known: dict[str, FieldKind] = {}
         self._count = 0
         self.has_header = False
 
-    def fields_of(self, name: str, depth: int) -> tuple[_Field, ...]:
-        fields: list[_Field] = []
+    def fields_of(self, name: str, depth: int) -> tuple[Field, ...]:
+        fields: list[Field] = []
         names: set[str] = set()
         for line in self._texts[name].splitlines():
             stripped = line.partition("#")[0].strip()
@@ -175,10 +183,10 @@ class _Parser:
             kind = self._kind(name, found[1], depth)
             if found[2]:
                 kind = _array(kind, int(found[3]) if found[3] else None)
-            fields.append(_Field(found[4], kind))
+            fields.append(Field(found[4], kind))
         return tuple(fields)
 
-    def _kind(self, inside: str, written: str, depth: int) -> _Kind:
+    def _kind(self, inside: str, written: str, depth: int) -> FieldKind:
         basic = _basic(written)
         if basic is not None:
             return basic
@@ -213,7 +221,7 @@ class _Parser:
 # ---- kinds of values
 
 
-def _basic(name: str) -> _Kind | None:
+def _basic(name: str) -> FieldKind | None:
     if name in _INTEGERS:
         return _integer(name)
     if name in _FLOATS:
@@ -221,13 +229,13 @@ def _basic(name: str) -> _Kind | None:
     if name in _TIMES:
         return _time(name)
     if name == "bool":
-        return _Kind(name, _write_bool, lambda reader, _path: reader.take(1)[0] != 0, 1)
+        return FieldKind(name, _write_bool, lambda reader, _path: reader.take(1)[0] != 0, 1)
     if name == "string":
-        return _Kind(name, _write_string, _read_string, 4)
+        return FieldKind(name, _write_string, _read_string, 4)
     return None
 
 
-def _integer(name: str) -> _Kind:
+def _integer(name: str) -> FieldKind:
     packing = struct.Struct(f"<{_INTEGERS[name]}")
     bits = 8 * packing.size
     is_signed = _INTEGERS[name].islower()
@@ -246,12 +254,12 @@ def _integer(name: str) -> _Kind:
             )
         out += packing.pack(number)
 
-    return _Kind(
+    return FieldKind(
         name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
     )
 
 
-def _float(name: str) -> _Kind:
+def _float(name: str) -> FieldKind:
     packing = struct.Struct(f"<{_FLOATS[name]}")
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -265,12 +273,12 @@ def _float(name: str) -> _Kind:
                 path, _("is {value}, which is no '{name}'").format(value=_shown(value), name=name)
             ) from None
 
-    return _Kind(
+    return FieldKind(
         name, write, lambda reader, _path: packing.unpack(reader.take(packing.size))[0], packing.size
     )
 
 
-def _time(name: str) -> _Kind:
+def _time(name: str) -> FieldKind:
     packing = _TIMES[name]
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -285,7 +293,7 @@ def _time(name: str) -> _Kind:
         secs, nsecs = packing.unpack(reader.take(8))
         return {"secs": secs, "nsecs": nsecs}
 
-    return _Kind(name, write, read, 8)
+    return FieldKind(name, write, read, 8)
 
 
 def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
@@ -326,7 +334,7 @@ def _read_string(reader: _Reader, _path: str) -> object:
     return str(reader.take(reader.length()), "utf-8", "replace")
 
 
-def _array(kind: _Kind, length: int | None) -> _Kind:
+def _array(kind: FieldKind, length: int | None) -> FieldKind:
     name = f"{kind.name}[{'' if length is None else length}]"
     if kind.name in _BYTES:
         write = _writes_bytes(name, length)
@@ -338,12 +346,12 @@ def _array(kind: _Kind, length: int | None) -> _Kind:
         def read_all(reader: _Reader, path: str) -> object:
             return read(reader, path, reader.length())
 
-        return _Kind(name, write, read_all, 4)
+        return FieldKind(name, write, read_all, 4, element=kind)
 
     def read_fixed(reader: _Reader, path: str) -> object:
         return read(reader, path, length)
 
-    return _Kind(name, write, read_fixed, length * kind.least)
+    return FieldKind(name, write, read_fixed, length * kind.least, element=kind, length=length)
 
 
 def _writes_bytes(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
@@ -378,7 +386,7 @@ def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
     return bytes(reader.take(count))
 
 
-def _writes_list(name: str, kind: _Kind, length: int | None) -> Callable[[object, str, bytearray], None]:
+def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
     letter = _LETTERS.get(kind.name, "") if kind.name != "bool" else ""
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -399,7 +407,7 @@ def _writes_list(name: str, kind: _Kind, length: int | None) -> Callable[[object
     return write
 
 
-def _reads_list(kind: _Kind) -> Callable[[_Reader, str, int], object]:
+def _reads_list(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
     letter = _LETTERS.get(kind.name, "")
     size = struct.calcsize(f"<{letter}")
 
@@ -422,17 +430,17 @@ def _write_length(count: int, length: int | None, path: str, out: bytearray) -> 
         raise _FieldError(path, _("has {count} elements; give {length}").format(count=count, length=length))
 
 
-def _nested(name: str, fields: tuple[_Field, ...]) -> _Kind:
+def _nested(name: str, fields: tuple[Field, ...]) -> FieldKind:
     def write(value: object, path: str, out: bytearray) -> None:
         _write_fields(name, fields, value, path, out)
 
     def read(reader: _Reader, path: str) -> object:
         return _read_fields(fields, reader, path)
 
-    return _Kind(name, write, read, sum(each.kind.least for each in fields))
+    return FieldKind(name, write, read, sum(each.kind.least for each in fields), fields)
 
 
-def _write_fields(name: str, fields: tuple[_Field, ...], payload: object, path: str, out: bytearray) -> None:
+def _write_fields(name: str, fields: tuple[Field, ...], payload: object, path: str, out: bytearray) -> None:
     if not isinstance(payload, Mapping):
         if not path:
             raise _FieldError("", _not_a_map(fields))
@@ -447,7 +455,7 @@ def _write_fields(name: str, fields: tuple[_Field, ...], payload: object, path: 
         raise _unknown(path, next(key for key in payload if key not in names), names)
 
 
-def _read_fields(fields: tuple[_Field, ...], reader: _Reader, path: str) -> dict[str, object]:
+def _read_fields(fields: tuple[Field, ...], reader: _Reader, path: str) -> dict[str, object]:
     made: dict[str, object] = {}
     reader.messages_left -= 1
     if reader.messages_left < 0:
@@ -474,7 +482,7 @@ def _whole(value: object) -> int | None:
     return None if index is None else int(index(value))
 
 
-def _not_a_map(fields: tuple[_Field, ...]) -> str:
+def _not_a_map(fields: tuple[Field, ...]) -> str:
     names = ", ".join(f"'{each.name}'" for each in fields[:6])
     return _("publish a 'dict' with its fields {names}").format(names=names or "{}")
 

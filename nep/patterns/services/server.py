@@ -6,6 +6,8 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nep.backends.services import CallQueue, IncomingCall, ServerTransport
@@ -29,15 +31,20 @@ SLICE_S = 0.1
 _END_S = 2.0
 
 Callback = Callable[[object], object]
-"""Takes the request and gives the answer; None is answered as an empty map."""
+"""Takes the request and returns the answer, or a `concurrent.futures.Future` of it.
+
+None is answered as an empty map.
+"""
 
 
 class Server:
     """Answers calls: by its callback, or by `listen_info` and `send_info`. May be used from any thread.
 
     A callback runs in the thread that spins its node, or with `threads` in so many threads of the server's
-    own. What it raises becomes the client's `ServiceError`, and is logged. With types of its own a request
-    that does not fit is refused, which the client gets as `RequestRefusedError`, and no callback is called.
+    own. What it raises becomes the client's `ServiceError`, and is logged. A callback that returns a
+    `concurrent.futures.Future` does not block the next call: the call is answered when the future is done,
+    by the thread that ends it. With types of its own a request that does not fit is refused, which the client
+    gets as `RequestRefusedError`, and no callback is called.
     """
 
     def __init__(
@@ -130,18 +137,33 @@ class Server:
             return
         try:
             answer = self._callback(request) if self._callback is not None else None
+            if isinstance(answer, Future):
+                answer.add_done_callback(partial(self._answer_later, call))
+                return
             reply = self._encoded(answer, call.codec)
-        except Exception as error:
-            self._failures += 1
-            if is_logged(self._failures):
-                _logger.warning(
-                    "the callback of '%s' failed (%d so far)", self.service, self._failures, exc_info=True
-                )
-            reply = _failed(error)
+        except Exception as error:  # noqa: BLE001 - it is the client's `ServiceError`
+            reply = self._failure(error)
         except BaseException as error:  # Ctrl+C: who waits is told, and it comes out of `spin`
             call.answer(_failed(error))
             raise
         call.answer(reply)
+
+    def _answer_later(self, call: IncomingCall, done: Future[object]) -> None:
+        """Answer a call whose callback returned a future."""
+        try:
+            reply = self._encoded(done.result(), call.codec)
+        except BaseException as error:  # noqa: BLE001 - also a future that was cancelled
+            reply = self._failure(error)
+        call.answer(reply)
+
+    def _failure(self, error: BaseException) -> Reply:
+        """What the client of a callback that raised is told; it is logged rarely."""
+        self._failures += 1
+        if is_logged(self._failures):
+            _logger.warning(
+                "the callback of '%s' failed (%d so far)", self.service, self._failures, exc_info=error
+            )
+        return _failed(error)
 
     def _decoded(self, call: IncomingCall) -> object:
         codec = codec_numbered(call.codec)

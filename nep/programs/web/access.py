@@ -1,0 +1,133 @@
+"""Who may connect: the origin of the page, the token, and rosbridge's ``auth``. Pure.
+
+Any web page that a browser of this computer shows can open a WebSocket to 127.0.0.1. The browser tells the
+page's origin, so only pages of this computer and those that were allowed by name are let in. Programs send no
+origin; where other computers can connect they need the token.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from ipaddress import ip_address
+from urllib.parse import parse_qs, urlsplit
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.programs.web.operations import Auth
+from nep.text import quotable
+
+__all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token"]
+
+_CLOCK_TOLERANCE_S = 5
+"""As rosauth has it: so much may the clocks of the two sides differ."""
+_MAX_REMEMBERED = 1_000
+
+
+def new_token() -> str:
+    """Return a random token that can stand in a URL."""
+    return secrets.token_urlsafe(24)
+
+
+def is_own_host(host: str) -> bool:
+    """Return whether a host name means this computer: localhost or a loopback address."""
+    if host == "localhost" or host.endswith(".localhost"):
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def checked_origin(origin: str) -> str:
+    """Return `origin` as browsers write it. Raises `NepError` for what is none.
+
+    "null" is the origin of pages that were opened as files, and of every sandboxed frame of any page.
+    """
+    if origin == "null":
+        return origin
+    try:
+        parts = urlsplit(origin)
+        is_origin = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.path in {"", "/"}
+        port = parts.port
+    except ValueError:
+        is_origin, parts, port = False, urlsplit(""), None
+    if not is_origin or parts.query or parts.fragment or parts.username:
+        raise NepError(
+            _("'{origin}' is no origin of a page; write it as 'http://192.168.1.5:8000'").format(
+                origin=quotable(origin)
+            )
+        )
+    is_usual = port is None or port == {"http": 80, "https": 443}[parts.scheme]
+    host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
+    return f"{parts.scheme}://{host}" if is_usual else f"{parts.scheme}://{host}:{port}"
+
+
+@dataclass(frozen=True)
+class Access:
+    """Who may connect.
+
+    `origins`: origins of pages besides those of this computer. `token`: what a page or program must know, ""
+    when nothing.
+    """
+
+    origins: Collection[str] = ()
+    token: str = ""
+
+    def origin_refusal(self, origin: str | None) -> str:
+        """Return why a page of this origin may not connect; "" when it may. None: a program without one."""
+        if origin is None:
+            return ""
+        try:
+            known = checked_origin(origin)
+            if known in self.origins or is_own_host(urlsplit(known).hostname or ""):
+                return ""
+        except NepError:
+            pass
+        return _("pages of '{origin}' may not connect; allow them with --origin {option}").format(
+            origin=quotable(origin), option=quotable(origin)
+        )
+
+    def is_given(self, path: str, authorization: str | None) -> bool | None:
+        """Return whether the token in the URL or in the header is right, None when there is none.
+
+        ``ws://host:9090/?token=TOKEN`` or ``Authorization: Bearer TOKEN``.
+        """
+        given = [*parse_qs(urlsplit(path).query, max_num_fields=20).get("token", ())]
+        scheme, _space, value = (authorization or "").partition(" ")
+        if scheme.lower() == "bearer" and value:
+            given.append(value.strip())
+        if not given:
+            return None
+        return sum(map(self._is_right, given)) > 0
+
+    def _is_right(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode("utf-8", "replace"), self.token.encode())
+
+
+class AuthCheck:
+    """Checks rosbridge's ``auth`` operations, each of which is valid once and for some seconds."""
+
+    def __init__(self, token: str, clock: Callable[[], float] = time.time) -> None:
+        self._token = token
+        self._clock = clock
+        self._used: dict[str, None] = {}
+
+    def is_right(self, auth: Auth) -> bool:
+        """Return whether the MAC is rosauth's with the token as its secret, of now and not used before."""
+        parts = (self._token, auth.client, auth.dest, auth.rand, auth.time_s, auth.level, auth.end_s)
+        text = "".join(map(str, parts)).encode("utf-8", "replace")
+        mac = hashlib.sha512(text).hexdigest()
+        is_right = hmac.compare_digest(mac.encode(), auth.mac.lower().encode("utf-8", "replace"))
+        now = self._clock()
+        is_now = abs(now - auth.time_s) <= _CLOCK_TOLERANCE_S and auth.end_s > now
+        if not (is_right and is_now) or mac in self._used:
+            return False
+        self._used[mac] = None
+        while len(self._used) > _MAX_REMEMBERED:
+            del self._used[next(iter(self._used))]
+        return True

@@ -1,0 +1,70 @@
+"""What the parts of a page share: its node, its outbox, its thread, and how it is told of problems."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from typing import ParamSpec, TypeVar
+
+from nep.nodes.node import Node
+from nep.programs.robots.guard import MotionGuard
+from nep.programs.web.operations import LEVELS, Level, OperationId
+from nep.programs.web.outbox import Outbox
+from nep.programs.web.outgoing import Form, operation_frames
+
+__all__ = ["PageContext", "WebCounts"]
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+@dataclass
+class WebCounts:
+    """What a server has done since it was started. Written in its event loop's thread."""
+
+    opened: int = 0
+    """Connections that were let in."""
+    turned_away: int = 0
+    """Connections that were not: of another origin, without the token, or too many."""
+    operations: int = 0
+    rejected: int = 0
+    """Operations that could not be carried out; each was answered by a status."""
+    motions_refused: int = 0
+    """Messages that would have moved a robot."""
+    sent: int = 0
+    dropped: int = 0
+    """Messages that pages were too slow for."""
+
+    def as_map(self) -> Mapping[str, int]:
+        """The counts by their names."""
+        return asdict(self)
+
+
+class PageContext:
+    """See the module."""
+
+    def __init__(
+        self, node: Node, outbox: Outbox, thread: Executor, guard: MotionGuard, counts: WebCounts
+    ) -> None:
+        self.node = node
+        self.outbox = outbox
+        self.guard = guard
+        self.counts = counts
+        self.level: Level = "error"
+        self._thread = thread
+
+    async def in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
+        """Call what waits for the network in the page's own thread; calls keep their order."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
+
+    def tell(self, level: Level, sentence: str, id_: OperationId = None) -> None:
+        """Send a status, unless the page wants none of this level."""
+        if LEVELS.index(level) < LEVELS.index(self.level):
+            return
+        status: dict[str, object] = {"op": "status", "level": level, "msg": sentence}
+        if id_ is not None:
+            status["id"] = id_
+        self.outbox.put(operation_frames(status, Form()))

@@ -1,0 +1,64 @@
+"""Fragments of operations: put together within limits, and cut for pages that ask for it. Pure."""
+
+from __future__ import annotations
+
+from nep.i18n import _
+from nep.programs.web.limits import MAX_FRAGMENTED, MAX_MESSAGE_BYTES
+from nep.programs.web.operations import Fragment, OperationError, OperationId, Png
+
+__all__ = ["FragmentBuffer", "cut"]
+
+
+class FragmentBuffer:
+    """Incomplete operations of one page, oldest first; a new one takes the place of the oldest."""
+
+    def __init__(self) -> None:
+        self._parts: dict[OperationId, dict[int, str]] = {}
+        self._totals: dict[OperationId, int] = {}
+        self._size = 0
+
+    def __len__(self) -> int:
+        return len(self._parts)
+
+    def add(self, part: Fragment | Png) -> str | None:
+        """Add a part; return the whole text once it is complete.
+
+        Raises `OperationError` for a part without id, and for one that does not belong to the others or makes
+        them too long: these are forgotten then.
+        """
+        if part.total == 1:
+            return part.data
+        if part.id is None:
+            raise OperationError(_("a fragment needs an 'id'"))
+        if self._totals.setdefault(part.id, part.total) != part.total:
+            self._forget(part.id)
+            raise OperationError(
+                _("the fragments of '{id}' differ in 'total'; they are forgotten").format(id=part.id), part.id
+            )
+        parts = self._parts.setdefault(part.id, {})
+        self._size += len(part.data) - len(parts.get(part.number, ""))
+        parts[part.number] = part.data
+        while len(self._parts) > MAX_FRAGMENTED or (self._size > MAX_MESSAGE_BYTES and len(self._parts) > 1):
+            self._forget(next(each for each in self._parts if each != part.id))
+        if self._size > MAX_MESSAGE_BYTES:
+            self._forget(part.id)
+            raise OperationError(
+                _("the fragments of '{id}' have more than {most} characters; they are forgotten").format(
+                    id=part.id, most=MAX_MESSAGE_BYTES
+                ),
+                part.id,
+            )
+        if len(parts) < part.total:
+            return None
+        whole = "".join(parts[number] for number in range(part.total))
+        self._forget(part.id)
+        return whole
+
+    def _forget(self, id_: OperationId) -> None:
+        self._totals.pop(id_, None)
+        self._size -= sum(map(len, self._parts.pop(id_, {}).values()))
+
+
+def cut(text: str, size: int) -> list[str]:
+    """Return `text` in pieces of at most `size` characters."""
+    return [text[at : at + size] for at in range(0, len(text), size)] or [""]

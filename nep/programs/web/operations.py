@@ -1,0 +1,454 @@
+"""Operations of the rosbridge v2 protocol that a page sends: bytes to typed values. Pure.
+
+Whatever a page sends, `parse` returns an operation or raises `OperationError` with a sentence for the page.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, cast
+
+import orjson
+
+from nep.errors import BadTopicError, NepError, did_you_mean
+from nep.i18n import _, listed
+from nep.messages.nesting import json_is_too_deep, too_deep
+from nep.programs.web.limits import (
+    CALL_TIMEOUT_S,
+    MAX_CALL_TIMEOUT_S,
+    MAX_FRAGMENTS,
+    MAX_MESSAGE_BYTES,
+    MAX_NAME_LENGTH,
+    MAX_QUEUED_MESSAGES,
+    MAX_VALUES,
+    MIN_FRAGMENT_SIZE,
+)
+from nep.protocol.wire import check_topic
+from nep.text import bounded_str, escaped, quotable
+
+__all__ = [
+    "COMPRESSIONS",
+    "LEVELS",
+    "Advertise",
+    "AdvertiseService",
+    "Auth",
+    "CallService",
+    "Compression",
+    "Fragment",
+    "Level",
+    "Operation",
+    "OperationError",
+    "OperationId",
+    "Png",
+    "Publish",
+    "ServiceResponse",
+    "SetLevel",
+    "Status",
+    "Subscribe",
+    "Unadvertise",
+    "UnadvertiseService",
+    "Unsubscribe",
+    "parse",
+    "shown",
+]
+
+OperationId = str | int | None
+Compression = Literal["none", "png", "cbor", "cbor-raw"]
+Level = Literal["info", "warning", "error", "none"]
+COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
+"""In the order in which they win when two subscriptions of a page to one topic differ."""
+LEVELS: tuple[Level, ...] = ("info", "warning", "error", "none")
+_MAX_NUMBER = 2**53
+_MAX_THROTTLE_MS = 3_600_000
+
+
+class OperationError(NepError):
+    """An operation can't be carried out. The sentence is for the page; `id` is the operation's."""
+
+    def __init__(self, sentence: str, id: OperationId = None, level: Level = "error") -> None:
+        self.id = id
+        self.level = level
+        super().__init__(sentence)
+
+
+@dataclass(frozen=True, slots=True)
+class Advertise:
+    """Announce messages on a topic."""
+
+    id: OperationId
+    topic: str
+    ros_type: str
+    is_latched: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Unadvertise:
+    """End the announcement with this id, or all of the topic without one."""
+
+    id: OperationId
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """Publish a message."""
+
+    id: OperationId
+    topic: str
+    msg: object
+
+
+@dataclass(frozen=True, slots=True)
+class Subscribe:
+    """Subscribe to a topic. `ros_type` is "" when the page leaves it to the topic."""
+
+    id: OperationId
+    topic: str
+    ros_type: str = ""
+    throttle_s: float = 0.0
+    queue_length: int = 0
+    fragment_size: int | None = None
+    compression: Compression = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class Unsubscribe:
+    """End the subscription with this id, or all of the topic without one."""
+
+    id: OperationId
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class CallService:
+    """Call a service."""
+
+    id: OperationId
+    service: str
+    args: object
+    timeout_s: float = CALL_TIMEOUT_S
+    fragment_size: int | None = None
+    compression: Compression = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class AdvertiseService:
+    """Serve a service."""
+
+    id: OperationId
+    service: str
+    ros_type: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnadvertiseService:
+    """Serve it no more."""
+
+    id: OperationId
+    service: str
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceResponse:
+    """Answer a call that the page was asked."""
+
+    id: OperationId
+    service: str
+    values: object
+    is_success: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Fragment:
+    """One part of an operation's text."""
+
+    id: OperationId
+    data: str
+    number: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class Png:
+    """An operation's text as the pixels of a PNG file, in base64; perhaps one part of that."""
+
+    id: OperationId
+    data: str
+    number: int
+    total: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetLevel:
+    """Report from this level on."""
+
+    id: OperationId
+    level: Level
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A note of the page, for the log."""
+
+    id: OperationId
+    level: Level
+    msg: str
+
+
+@dataclass(frozen=True, slots=True)
+class Auth:
+    """Credentials of rosauth: `mac` is a SHA-512 of the token and the other fields."""
+
+    id: OperationId
+    mac: str
+    client: str
+    dest: str
+    rand: str
+    time_s: int
+    level: str
+    end_s: int
+
+
+Operation = (
+    Advertise
+    | Unadvertise
+    | Publish
+    | Subscribe
+    | Unsubscribe
+    | CallService
+    | AdvertiseService
+    | UnadvertiseService
+    | ServiceResponse
+    | Fragment
+    | Png
+    | SetLevel
+    | Status
+    | Auth
+)
+
+
+def parse(data: bytes) -> Operation:
+    """Return the operation in one message of a page. Raises `OperationError`."""
+    if len(data) > MAX_MESSAGE_BYTES:
+        raise OperationError(
+            _("an operation has {count} bytes; {most} are allowed").format(
+                count=len(data), most=MAX_MESSAGE_BYTES
+            )
+        )
+    if json_is_too_deep(data):
+        raise OperationError(_("an operation is refused: {reason}").format(reason=too_deep()))
+    if len(data) > MAX_VALUES and sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
+        raise OperationError(
+            _("an operation has more than {most} values; send less at once").format(most=MAX_VALUES)
+        )
+    try:
+        fields = orjson.loads(data)
+    except orjson.JSONDecodeError as error:
+        raise OperationError(
+            _("an operation is no JSON text: {reason}").format(reason=quotable(str(error)))
+        ) from None
+    if not isinstance(fields, dict):
+        raise OperationError(_("an operation is a JSON object with an 'op'"))
+    return _operation(_Fields(fields))
+
+
+def shown(text: str) -> str:
+    """Return a page's own words as a log may have them."""
+    return escaped(bounded_str(text, 1_000))
+
+
+class _Fields:
+    """The fields of an operation, each checked when it is read."""
+
+    def __init__(self, fields: Mapping[str, object]) -> None:
+        self._fields = fields
+        given = fields.get("id")
+        is_id = isinstance(given, str | int) and not isinstance(given, bool)
+        self.id = cast("str | int", given) if is_id and len(str(given)) <= MAX_NAME_LENGTH else None
+        self.op = self.text("op")
+
+    def get(self, name: str, default: object = None) -> object:
+        """The value as it is."""
+        return self._fields.get(name, default)
+
+    def text(self, name: str, default: str | None = None, *, most: int = MAX_NAME_LENGTH) -> str:
+        """A text; required without a default."""
+        value = self._fields.get(name)
+        if value is None and default is not None:
+            return default
+        if not isinstance(value, str):
+            raise self.wrong(name, _("a text"))
+        if len(value) > most:
+            raise self.error(
+                _("'{name}' has {count} characters; {most} are allowed").format(
+                    name=name, count=len(value), most=most
+                )
+            )
+        return value
+
+    def topic(self, name: str) -> str:
+        """The name of a topic or a service."""
+        try:
+            return check_topic(self.text(name))
+        except BadTopicError as error:
+            raise self.error(str(error)) from None
+
+    def number(self, name: str, default: int | None, least: int, most: int) -> int:
+        """A whole number, also as the float that some programs send; required without a default."""
+        value = self._fields.get(name)
+        if value is None and default is not None:
+            return default
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not math.isfinite(cast("float", value)):
+            raise self.wrong(name, _("a number"))
+        number = int(cast("float", value))
+        if not least <= number <= most:
+            raise self.error(
+                _("'{name}' is {number}; from {least} to {most} is allowed").format(
+                    name=name, number=bounded_str(number, 40), least=least, most=most
+                )
+            )
+        return number
+
+    def choice(self, name: str, default: str | None, choices: tuple[str, ...]) -> str:
+        """One of these words."""
+        value = self.text(name, default)
+        if value not in choices:
+            raise self.wrong(name, listed([f"'{each}'" for each in choices], "or"))
+        return value
+
+    def compression(self) -> Compression:
+        """The compression of what the page gets."""
+        return cast("Compression", self.choice("compression", "none", COMPRESSIONS))
+
+    def fragment_size(self) -> int | None:
+        """The most characters of one message to the page."""
+        if self._fields.get("fragment_size") is None:
+            return None
+        return max(MIN_FRAGMENT_SIZE, self.number("fragment_size", None, 1, _MAX_NUMBER))
+
+    def parts(self) -> tuple[int, int]:
+        """The number of a fragment, and how many there are."""
+        total = self.number("total", 1, 1, MAX_FRAGMENTS)
+        return self.number("num", 0, 0, total - 1), total
+
+    def error(self, sentence: str) -> OperationError:
+        """What to raise for this operation."""
+        return OperationError(sentence, self.id)
+
+    def wrong(self, name: str, wanted: str) -> OperationError:
+        """What to raise for a field that is something else than `wanted`."""
+        op = quotable(self._fields.get("op"))
+        if name not in self._fields:
+            return self.error(_("'{op}' needs '{name}', {wanted}").format(op=op, name=name, wanted=wanted))
+        return self.error(
+            _("'{name}' of '{op}' is {given}; give {wanted}").format(
+                name=name, op=op, given=escaped(bounded_str(self._fields[name], 60)), wanted=wanted
+            )
+        )
+
+
+def _operation(fields: _Fields) -> Operation:
+    known = _READERS.get(fields.op)
+    if known is None:
+        said = did_you_mean(fields.op, tuple(_READERS))
+        raise fields.error(
+            _("there is no operation '{op}'; {did_you_mean}").format(
+                op=quotable(fields.op), did_you_mean=said
+            )
+        )
+    return known(fields)
+
+
+def _advertise(fields: _Fields) -> Operation:
+    is_latched = fields.get("latch") is True
+    return Advertise(fields.id, fields.topic("topic"), fields.text("type"), is_latched)
+
+
+def _publish(fields: _Fields) -> Operation:
+    return Publish(fields.id, fields.topic("topic"), fields.get("msg", {}))
+
+
+def _subscribe(fields: _Fields) -> Operation:
+    return Subscribe(
+        fields.id,
+        fields.topic("topic"),
+        fields.text("type", ""),
+        fields.number("throttle_rate", 0, 0, _MAX_THROTTLE_MS) / 1000,
+        min(fields.number("queue_length", 0, 0, _MAX_NUMBER), MAX_QUEUED_MESSAGES),
+        fields.fragment_size(),
+        fields.compression(),
+    )
+
+
+def _call_service(fields: _Fields) -> Operation:
+    service, mark, id_in_name = fields.topic("service").partition("#")
+    args = fields.get("args")
+    timeout = fields.get("timeout")
+    is_time = isinstance(timeout, int | float) and not isinstance(timeout, bool) and timeout > 0
+    return CallService(
+        id_in_name if mark and fields.id is None else fields.id,
+        service,
+        {} if args in (None, []) else args,
+        min(float(cast("float", timeout)), MAX_CALL_TIMEOUT_S) if is_time else CALL_TIMEOUT_S,
+        fields.fragment_size(),
+        fields.compression(),
+    )
+
+
+def _service_response(fields: _Fields) -> Operation:
+    is_success = fields.get("result", True)
+    if not isinstance(is_success, bool):
+        raise fields.wrong("result", _("true or false"))
+    values = fields.get("values")
+    return ServiceResponse(fields.id, fields.topic("service"), {} if values is None else values, is_success)
+
+
+def _fragment(fields: _Fields) -> Operation:
+    number, total = fields.parts()
+    return Fragment(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
+
+
+def _png(fields: _Fields) -> Operation:
+    number, total = fields.parts()
+    return Png(fields.id, fields.text("data", most=MAX_MESSAGE_BYTES), number, total)
+
+
+def _status(fields: _Fields) -> Operation:
+    level = cast("Level", fields.choice("level", "info", LEVELS))
+    return Status(fields.id, level, fields.text("msg", "", most=MAX_MESSAGE_BYTES))
+
+
+def _auth(fields: _Fields) -> Operation:
+    return Auth(
+        fields.id,
+        fields.text("mac"),
+        fields.text("client"),
+        fields.text("dest"),
+        fields.text("rand"),
+        fields.number("t", None, 0, _MAX_NUMBER),
+        fields.text("level"),
+        fields.number("end", None, 0, _MAX_NUMBER),
+    )
+
+
+_READERS = {
+    "advertise": _advertise,
+    "unadvertise": lambda fields: Unadvertise(fields.id, fields.topic("topic")),
+    "publish": _publish,
+    "subscribe": _subscribe,
+    "unsubscribe": lambda fields: Unsubscribe(fields.id, fields.topic("topic")),
+    "call_service": _call_service,
+    "advertise_service": lambda fields: AdvertiseService(
+        fields.id, fields.topic("service"), fields.text("type", "")
+    ),
+    "unadvertise_service": lambda fields: UnadvertiseService(fields.id, fields.topic("service")),
+    "service_response": _service_response,
+    "fragment": _fragment,
+    "png": _png,
+    "set_level": lambda fields: SetLevel(fields.id, cast("Level", fields.choice("level", None, LEVELS))),
+    "status": _status,
+    "auth": _auth,
+}

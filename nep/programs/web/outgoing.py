@@ -1,0 +1,164 @@
+"""What goes to a page: operations as WebSocket messages, compressed or cut as it asked for. Pure."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import time
+from array import array
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import orjson
+
+from nep.backends.ros.definition import Definition, FieldKind
+from nep.errors import EncodeError
+from nep.messages.message import Message
+from nep.messages.nesting import json_is_too_deep
+from nep.programs.web.fragments import cut
+from nep.programs.web.operations import Compression
+from nep.programs.web.payloads import ros_bytes, ros_type_of, to_ros
+from nep.programs.web.png import text_as_png
+from nep.programs.web.ros_definitions import bare_type, definition_of
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    import cbor2
+else:
+    cbor2 = lazy_module("cbor2")
+
+__all__ = ["Form", "Frame", "operation_frames", "publish_frames"]
+
+_NS = 1_000_000_000
+_TYPED_ARRAYS = {
+    "int8": (72, "b"), "uint16": (69, "H"), "uint32": (70, "I"), "uint64": (71, "Q"), "int16": (77, "h"),
+    "int32": (78, "i"), "int64": (79, "q"), "float32": (85, "f"), "float64": (86, "d"),
+}  # fmt: skip
+"""Tags of little-endian typed arrays (RFC 8746), and the letters of `array`."""
+_fragment_numbers = itertools.count(1)
+
+
+class Frame(NamedTuple):
+    """One WebSocket message."""
+
+    data: bytes
+    is_text: bool
+
+
+class Form(NamedTuple):
+    """How a page wants a message."""
+
+    compression: Compression = "none"
+    fragment_size: int | None = None
+    as_pixels: bool = False
+
+
+def publish_frames(topic: str, message: Message, form: Form) -> list[Frame]:
+    """Return a message of a topic as its subscriber gets it.
+
+    Raises `NepError` for a message that can't be read, or doesn't have that form.
+    """
+    if form.compression == "cbor-raw":
+        secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS)
+        raw = {"secs": secs, "nsecs": nsecs, "bytes": ros_bytes(message, as_pixels=form.as_pixels)}
+        return [Frame(cbor2.dumps({"op": "publish", "topic": topic, "msg": raw}), is_text=False)]
+    if form.compression == "cbor":
+        msg = to_ros(message, as_pixels=form.as_pixels)
+        definition = definition_of(bare_type(ros_type_of(message.msg_type)))
+        if definition is not None and message.codec == "json" and isinstance(msg, Mapping):
+            msg = _with_typed_arrays(msg, definition)
+        return [Frame(_cbor({"op": "publish", "topic": topic, "msg": msg}), is_text=False)]
+    body = _json_payload(message) if message.codec == "json" else None
+    if body is None:
+        text = _json({"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)})
+    else:
+        text = b'{"op":"publish","topic":%b,"msg":%b}' % (orjson.dumps(topic), body)
+    return _text_frames(text, form)
+
+
+def operation_frames(operation: Mapping[str, object], form: Form) -> list[Frame]:
+    """Return another operation, such as a service's answer. Raises `EncodeError`."""
+    if form.compression in {"cbor", "cbor-raw"}:
+        return [Frame(_cbor(operation), is_text=False)]
+    return _text_frames(_json(operation), form)
+
+
+def _text_frames(text: bytes, form: Form) -> list[Frame]:
+    if form.compression == "png":
+        text = _json({"op": "png", "data": text_as_png(text)})
+    if form.fragment_size is None or len(text) <= form.fragment_size:
+        return [Frame(text, is_text=True)]
+    pieces = cut(text.decode(), form.fragment_size)
+    id_ = f"fragment:{next(_fragment_numbers)}"
+    return [
+        Frame(
+            _json({"op": "fragment", "id": id_, "data": piece, "num": number, "total": len(pieces)}),
+            is_text=True,
+        )
+        for number, piece in enumerate(pieces)
+    ]
+
+
+def _json_payload(message: Message) -> bytes | None:
+    """A payload of JSON without decoding it into Python for longer than a check; None when that can't be."""
+    data = bytes(message.data)
+    if json_is_too_deep(data):
+        return None
+    try:
+        orjson.loads(data)
+    except orjson.JSONDecodeError:
+        return None  # NaN of the original NEP: decoded and encoded again
+    return data
+
+
+def _json(value: object) -> bytes:
+    try:
+        return orjson.dumps(value, _as_text, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
+    except (TypeError, RecursionError) as error:
+        raise EncodeError("json", type(value).__name__, str(error.__cause__ or error)) from error
+
+
+def _as_text(value: object) -> object:
+    if isinstance(value, bytes | bytearray | memoryview):
+        return base64.b64encode(value).decode()
+    raise TypeError(type(value).__name__)
+
+
+def _cbor(value: object) -> bytes:
+    try:
+        return cbor2.dumps(value)
+    except (cbor2.CBOREncodeError, OverflowError, RecursionError, UnicodeError) as error:
+        raise EncodeError("cbor", type(value).__name__, str(error)) from error
+
+
+def _with_typed_arrays(msg: Mapping[str, object], definition: Definition) -> object:
+    return {**msg, **_typed(msg, [(each.name, each.kind) for each in definition.fields])}
+
+
+def _typed(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
+    """The fields of a map that are arrays of numbers, packed, and the messages that have such inside."""
+    packed: dict[str, object] = {}
+    if not isinstance(value, Mapping):
+        return packed
+    for name, kind in kinds:
+        if name not in value:
+            continue
+        inside = value[name]
+        if kind.element is not None and kind.element.name in _TYPED_ARRAYS:
+            packed[name] = _packed(inside, kind.element.name)
+        elif kind.fields and isinstance(inside, Mapping):
+            packed[name] = {**inside, **_typed(inside, [(each.name, each.kind) for each in kind.fields])}
+    return packed
+
+
+def _packed(values: object, kind: str) -> object:
+    """A list of numbers as a typed array; `null`, as JSON has NaN, is NaN again."""
+    tag, letter = _TYPED_ARRAYS[kind]
+    if not isinstance(values, list):
+        return values
+    if letter in "fd" and None in values:
+        values = [float("nan") if each is None else each for each in values]
+    try:
+        return cbor2.CBORTag(tag, array(letter, values).tobytes())
+    except (TypeError, OverflowError, ValueError):
+        return values

@@ -1,0 +1,202 @@
+"""Page: one connection, with a node of its own in the graph, gone when it closes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.nodes.loop_wait import give_way
+from nep.nodes.node import Node
+from nep.programs.robots.guard import MotionGuard
+from nep.programs.web import operations as op
+from nep.programs.web.access import AuthCheck
+from nep.programs.web.context import PageContext, WebCounts
+from nep.programs.web.fragments import FragmentBuffer
+from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
+from nep.programs.web.outbox import Outbox, Queued
+from nep.programs.web.outgoing import Frame, publish_frames
+from nep.programs.web.page_services import PageServices
+from nep.programs.web.page_topics import PageTopics
+from nep.programs.web.png import text_in_png
+from nep.system.lazy_import import lazy_module
+from nep.system.log_rarely import is_logged
+
+if TYPE_CHECKING:
+    from websockets import exceptions as ws_exceptions
+    from websockets.asyncio.server import ServerConnection
+else:
+    ws_exceptions = lazy_module("websockets.exceptions")
+
+__all__ = ["Page", "authenticate"]
+
+_logger = logging.getLogger("nep.programs.web")
+_POLICY_VIOLATION = 1008
+_NODE_CLOSE_S = 2.0
+
+
+class Page:
+    """See the module. `name` is that of its node. Lives in the server's event loop."""
+
+    def __init__(
+        self,
+        connection: ServerConnection,
+        name: str,
+        new_node: Callable[[str], Node],
+        guard: MotionGuard,
+        counts: WebCounts,
+    ) -> None:
+        self.name = name
+        self._connection = connection
+        self._counts = counts
+        self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
+        self._node = new_node(name)
+        self._outbox = Outbox(asyncio.get_running_loop().time)
+        self._context = PageContext(self._node, self._outbox, self._thread, guard, counts)
+        self._topics = PageTopics(self._context)
+        self._services = PageServices(self._context)
+        self._fragments = FragmentBuffer()
+        self._rejected = 0
+        self._carriers: dict[type, Callable[[Any], Awaitable[None] | None]] = {
+            op.Publish: self._topics.publish,
+            op.Advertise: self._topics.advertise,
+            op.Unadvertise: self._topics.unadvertise,
+            op.Subscribe: self._topics.subscribe,
+            op.Unsubscribe: self._topics.unsubscribe,
+            op.CallService: self._services.call,
+            op.AdvertiseService: self._services.advertise,
+            op.UnadvertiseService: self._services.unadvertise,
+            op.ServiceResponse: self._services.respond,
+            op.SetLevel: self._set_level,
+            op.Status: self._log_status,
+            op.Auth: _ignore,
+        }
+
+    # ---- the connection
+
+    async def run(self) -> None:
+        """Serve the page until it goes; then close its node."""
+        writer = asyncio.create_task(self._write())
+        try:
+            await self._context.in_thread(self._announce)
+            while True:
+                data = await self._connection.recv(decode=False)
+                await self.handle(bytes(data))
+                await give_way()  # other pages have their turn
+        except ws_exceptions.ConnectionClosed:
+            return
+        finally:
+            writer.cancel()
+            self._topics.cancel()
+            self._services.cancel()
+            self._thread.submit(self._node.close, _NODE_CLOSE_S)
+            await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
+
+    def _announce(self) -> None:
+        """In the page's thread: a node is in the graph once it has something, if only its log."""
+        self._node.log.info("the page connected from %s", self._connection.remote_address)
+
+    async def _write(self) -> None:
+        """Send what waits, as fast as the page takes it."""
+        try:
+            while True:
+                next_up = await self._outbox.take()
+                frames = [next_up] if isinstance(next_up, Frame) else self._frames_of(next_up)
+                for frame in frames:
+                    await self._connection.send(frame.data, text=frame.is_text)
+                self._counts.sent += 1
+        except ws_exceptions.ConnectionClosed:
+            return
+        except Exception:
+            _logger.exception("the page '%s' is closed because of an error", self.name)
+            await self._connection.close(1011, "internal error")
+
+    def _frames_of(self, queued: Queued) -> list[Frame]:
+        feed = queued.feed
+        if feed.dropped_count:
+            self._tell_dropped(feed.topic, feed.dropped_count)
+            feed.dropped_count = 0
+        try:
+            return publish_frames(feed.topic, queued.message, feed.form)
+        except NepError as error:
+            self._reject(op.OperationError(f"'{feed.topic}': {error}", level="warning"))
+            return []
+
+    def _tell_dropped(self, topic: str, count: int) -> None:
+        self._counts.dropped += count
+        said = _("this page is too slow: {count} messages of '{topic}' were dropped")
+        self._context.tell("warning", said.format(count=count, topic=topic))
+
+    async def close(self, code: int, reason: str) -> None:
+        """Close the connection; `run` ends."""
+        await self._connection.close(code, reason)
+
+    # ---- operations
+
+    async def handle(self, data: bytes) -> None:
+        """Carry out one message of the page. Whatever it is, nothing is raised."""
+        self._counts.operations += 1
+        try:
+            await self._carry_out(op.parse(data))
+        except op.OperationError as error:
+            self._reject(error)
+        except NepError as error:
+            self._reject(op.OperationError(str(error)))
+        except Exception:
+            _logger.exception("an operation of the page '%s' failed", self.name)
+            self._reject(op.OperationError(_("an operation failed because of an error in the server")))
+        if self._outbox.is_overfull:
+            await self._connection.close(_POLICY_VIOLATION, "the page does not read what it asked for")
+
+    async def _carry_out(self, operation: op.Operation) -> None:
+        for _nested in range(MAX_NESTED_OPERATIONS):
+            if not isinstance(operation, op.Fragment | op.Png):
+                break
+            whole = self._fragments.add(operation)
+            if whole is None:
+                return
+            text = text_in_png(whole) if isinstance(operation, op.Png) else whole.encode("utf-8", "replace")
+            operation = op.parse(text)
+        carry_out = self._carriers.get(type(operation))
+        if carry_out is None:
+            raise op.OperationError(_("an operation is in too many fragments of fragments"), operation.id)
+        try:
+            done = carry_out(operation)
+            if done is not None:
+                await done
+        except op.OperationError:
+            raise
+        except NepError as error:
+            raise op.OperationError(str(error), operation.id) from error
+
+    def _set_level(self, operation: op.SetLevel) -> None:
+        self._context.level = operation.level
+
+    def _log_status(self, operation: op.Status) -> None:
+        write = {"error": self._node.log.error, "warning": self._node.log.warning}
+        write.get(operation.level, self._node.log.info)("%s", op.shown(operation.msg))
+
+    def _reject(self, error: op.OperationError) -> None:
+        """Answer, count and log (rarely) what could not be carried out."""
+        self._counts.rejected += 1
+        self._rejected += 1
+        if is_logged(self._rejected):
+            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
+        self._context.tell(error.level, str(error), error.id)
+
+
+async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
+    """Wait for a valid ``auth`` operation; return whether it came before anything else."""
+    try:
+        data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)
+        return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.is_right(auth)
+    except (op.OperationError, asyncio.TimeoutError, ws_exceptions.ConnectionClosed):
+        return False
+
+
+def _ignore(_operation: op.Auth) -> None:
+    """Where nobody asked for it, credentials are ignored."""

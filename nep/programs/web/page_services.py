@@ -1,0 +1,174 @@
+"""Services of one page: those that it calls and those that it serves."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from concurrent.futures import Future
+from functools import partial
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.patterns.services.client import Client
+from nep.patterns.services.server import Server
+from nep.programs.web.context import PageContext
+from nep.programs.web.limits import MAX_CALLS, MAX_SERVICES
+from nep.programs.web.operations import (
+    AdvertiseService,
+    CallService,
+    OperationError,
+    OperationId,
+    ServiceResponse,
+    UnadvertiseService,
+)
+from nep.programs.web.outgoing import Form, operation_frames
+from nep.programs.web.rosapi import RosApi, is_rosapi
+from nep.text import bounded_str, quotable
+
+__all__ = ["PageServices"]
+
+
+class ServiceFailedError(NepError):
+    """The page answered that a call failed, or does not answer any more."""
+
+
+class PageServices:
+    """See the module. Its methods raise `NepError` for what can't be done."""
+
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
+        self._loop = asyncio.get_running_loop()
+        self._clients: dict[str, Client] = {}
+        self._calls: set[asyncio.Task[None]] = set()
+        self._servers: dict[str, Server] = {}
+        self._pending: dict[OperationId, tuple[str, Future[object]]] = {}
+        self._numbers = itertools.count(1)
+
+    # ---- calling
+
+    def call(self, operation: CallService) -> None:
+        """Call a service; its answer follows while other operations go on."""
+        if len(self._calls) >= MAX_CALLS:
+            raise OperationError(
+                _("this page has {count} calls in flight, and may have no more").format(count=MAX_CALLS),
+                operation.id,
+            )
+        task = asyncio.create_task(self._call(operation))
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
+    async def _call(self, operation: CallService) -> None:
+        try:
+            values, is_success = await self._answer(operation), True
+        except Exception as error:  # noqa: BLE001 - what a server answers must not end the page
+            values, is_success = str(error) or type(error).__name__, False
+        try:
+            self._respond(operation, values, is_success=is_success)
+        except NepError as error:
+            self._respond(operation, str(error), is_success=False)
+
+    async def _answer(self, operation: CallService) -> object:
+        if is_rosapi(operation.service):
+            api = RosApi(self._context.node, self._context.guard)
+            return await self._context.in_thread(api.answer, operation.service, operation.args)
+        client = self._clients.pop(operation.service, None)
+        if client is None:
+            client = await self._context.in_thread(self._context.node.new_client, operation.service)
+        self._clients[operation.service] = client
+        while len(self._clients) > MAX_SERVICES:
+            await self._context.in_thread(self._clients.pop(next(iter(self._clients))).close)
+        return await client.acall(operation.args, operation.timeout_s)
+
+    def _respond(self, operation: CallService, values: object, *, is_success: bool) -> None:
+        response = {
+            "op": "service_response",
+            "service": operation.service,
+            "values": values,
+            "result": is_success,
+        }
+        if operation.id is not None:
+            response["id"] = operation.id
+        form = Form(operation.compression, operation.fragment_size)
+        self._context.outbox.put(operation_frames(response, form))
+
+    # ---- serving
+
+    async def advertise(self, operation: AdvertiseService) -> None:
+        """Serve a service."""
+        if is_rosapi(operation.service):
+            raise OperationError(_("services of rosapi can't be served by a page"), operation.id)
+        if operation.service in self._servers:
+            return
+        if len(self._servers) >= MAX_SERVICES:
+            raise OperationError(
+                _("this page serves {count} services, and may have no more").format(count=MAX_SERVICES),
+                operation.id,
+            )
+        callback = partial(self._ask_page, operation.service)
+        self._servers[operation.service] = await self._context.in_thread(
+            self._context.node.new_server, operation.service, callback, threads=1
+        )
+        said = _("serving '{service}'").format(service=operation.service)
+        self._context.tell("info", said, operation.id)
+
+    def _ask_page(self, service: str, request: object) -> Future[object]:
+        """In a thread of the server's: ask the page, and return the future of its answer."""
+        answer: Future[object] = Future()
+        self._loop.call_soon_threadsafe(self._ask, service, request, answer)
+        return answer
+
+    def _ask(self, service: str, request: object, answer: Future[object]) -> None:
+        if len(self._pending) >= MAX_CALLS:
+            answer.set_exception(ServiceFailedError(_("the page has too many calls to answer")))
+            return
+        id_ = f"call:{next(self._numbers)}"
+        call = {"op": "call_service", "id": id_, "service": service, "args": request}
+        try:
+            frames = operation_frames(call, Form())
+        except NepError as error:
+            answer.set_exception(error)
+            return
+        self._pending[id_] = service, answer
+        self._context.outbox.put(frames)
+
+    def respond(self, operation: ServiceResponse) -> None:
+        """Hand the page's answer to who called."""
+        service, answer = self._pending.get(operation.id, ("", None))
+        if answer is None or service != operation.service:
+            raise OperationError(
+                _("no call of '{service}' with this id waits for an answer").format(
+                    service=quotable(operation.service)
+                ),
+                operation.id,
+            )
+        del self._pending[operation.id]
+        if operation.is_success:
+            answer.set_result(operation.values)
+        else:
+            reason = operation.values
+            said = bounded_str(reason) if reason else _("the page answered that it failed")
+            answer.set_exception(ServiceFailedError(said))
+
+    async def unadvertise(self, operation: UnadvertiseService) -> None:
+        """Serve a service no more; who waits for an answer is told."""
+        known = self._servers.pop(operation.service, None)
+        if known is None:
+            raise OperationError(
+                _("this page doesn't serve '{service}'").format(service=quotable(operation.service)),
+                operation.id,
+                "warning",
+            )
+        self._fail_pending(operation.service)
+        await self._context.in_thread(known.close)
+
+    def cancel(self) -> None:
+        """Call and answer no more: the page is gone. Its node closes what is open."""
+        for task in self._calls:
+            task.cancel()
+        self._fail_pending()
+
+    def _fail_pending(self, service: str = "") -> None:
+        for id_, (name, answer) in list(self._pending.items()):
+            if service in {"", name}:
+                del self._pending[id_]
+                answer.set_exception(ServiceFailedError(_("the page that serves it is gone")))

@@ -1,0 +1,236 @@
+"""Topics of one page: what it publishes and what it subscribes to."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from nep.i18n import _
+from nep.nodes.publisher import Publisher
+from nep.nodes.subscriber import Subscriber
+from nep.programs.web.context import PageContext
+from nep.programs.web.limits import MAX_SUBSCRIPTION_IDS, MAX_TOPICS
+from nep.programs.web.operations import (
+    Advertise,
+    OperationError,
+    OperationId,
+    Publish,
+    Subscribe,
+    Unadvertise,
+    Unsubscribe,
+)
+from nep.programs.web.outbox import Feed
+from nep.programs.web.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
+from nep.programs.web.ros_definitions import bare_type, definition_of
+from nep.text import quotable
+
+__all__ = ["PageTopics"]
+
+_GRAPH_TIMEOUT_S = 2.0
+_SETTLE_S = 0.5
+"""How long the descriptions of robots are waited for before a page may publish."""
+_PIXELS = "sensor_msgs/Image"
+_NS = 1_000_000_000
+
+
+@dataclass
+class _Publication:
+    publisher: Publisher
+    ros_type: str
+    ids: set[OperationId] = field(default_factory=set)
+
+
+@dataclass
+class _Subscription:
+    subscriber: Subscriber
+    feed: Feed
+    reader: asyncio.Task[None]
+
+
+class PageTopics:
+    """See the module. Its methods raise `NepError` for what can't be done."""
+
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
+        self._publications: dict[str, _Publication] = {}
+        self._subscriptions: dict[str, _Subscription] = {}
+
+    # ---- publishing
+
+    async def advertise(self, operation: Advertise) -> None:
+        """Publish a topic from now on."""
+        known = self._publications.get(operation.topic)
+        if known is None:
+            known = await self._open_publication(operation)
+        elif bare_type(known.ros_type) != bare_type(operation.ros_type):
+            raise _another_type(operation.topic, operation.ros_type, known.publisher.msg_type, operation.id)
+        if len(known.ids) < MAX_SUBSCRIPTION_IDS:
+            known.ids.add(operation.id)
+        self._context.tell("info", _("advertised '{topic}'").format(topic=operation.topic), operation.id)
+
+    async def _open_publication(self, operation: Advertise) -> _Publication:
+        if len(self._publications) >= MAX_TOPICS:
+            raise OperationError(
+                _("this page publishes {count} topics, and may have no more").format(count=MAX_TOPICS),
+                operation.id,
+            )
+        publisher = await self._context.in_thread(self._open_publisher, operation)
+        opened = self._publications[operation.topic] = _Publication(publisher, operation.ros_type)
+        return opened
+
+    def _open_publisher(self, operation: Advertise) -> Publisher:
+        """In the page's thread."""
+        known = self._type_of(operation.topic)
+        if not is_compatible(operation.ros_type, known):
+            raise _another_type(operation.topic, operation.ros_type, known, operation.id)
+        msg_type = known or nep_type_of(operation.ros_type)
+        self._context.guard.settle(_SETTLE_S)
+        self._check_motion(operation.topic, msg_type, operation.id)
+        return self._context.node.new_pub(operation.topic, msg_type, latched=operation.is_latched)
+
+    def _type_of(self, topic: str) -> str:
+        """The NEP type under which others have a topic; "" when nobody has it."""
+        own = self._context.node
+        known = own.graph(_GRAPH_TIMEOUT_S).topics.get(topic)
+        if known is None or known.msg_type == "*":
+            return ""
+        members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
+        return "" if members <= {own.id} else known.msg_type
+
+    def _check_motion(self, topic: str, msg_type: str, id_: OperationId) -> None:
+        refusal = self._context.guard.refusal(topic, msg_type)
+        if refusal:
+            self._context.counts.motions_refused += 1
+            raise OperationError(refusal, id_)
+
+    async def publish(self, operation: Publish) -> None:
+        """Publish a message; a topic that others have need not be advertised first."""
+        known = self._publications.get(operation.topic)
+        if known is None:
+            known = await self._open_by_type(operation)
+        publisher = known.publisher
+        self._check_motion(operation.topic, publisher.msg_type, operation.id)
+        msg = _with_header(operation.msg, known.ros_type)
+        publisher.publish(from_ros(msg, known.ros_type, publisher.msg_type), strict=True)
+
+    async def _open_by_type(self, operation: Publish) -> _Publication:
+        msg_type = await self._context.in_thread(self._type_of, operation.topic)
+        if not msg_type:
+            raise OperationError(
+                _("there is no topic '{topic}'; advertise it before you publish").format(
+                    topic=quotable(operation.topic)
+                ),
+                operation.id,
+            )
+        opened = Advertise(operation.id, operation.topic, ros_type_of(msg_type), is_latched=False)
+        return await self._open_publication(opened)
+
+    async def unadvertise(self, operation: Unadvertise) -> None:
+        """Publish a topic no more, once all who advertised it said so."""
+        known = self._publications.get(operation.topic)
+        if known is None:
+            raise OperationError(
+                _("this page doesn't publish '{topic}'").format(topic=quotable(operation.topic)),
+                operation.id,
+                "warning",
+            )
+        known.ids.discard(operation.id)
+        if operation.id is None or not known.ids:
+            del self._publications[operation.topic]
+            await self._context.in_thread(known.publisher.close)
+        self._context.tell("info", _("unadvertised '{topic}'").format(topic=operation.topic), operation.id)
+
+    # ---- subscribing
+
+    async def subscribe(self, operation: Subscribe) -> None:
+        """Send the page the messages of a topic from now on."""
+        as_pixels = bare_type(operation.ros_type) == _PIXELS
+        known = self._subscriptions.get(operation.topic)
+        if known is None:
+            await self._open_subscription(operation, as_pixels=as_pixels)
+        else:
+            if not is_compatible(operation.ros_type, known.subscriber.msg_type):
+                raise _another_type(
+                    operation.topic, operation.ros_type, known.subscriber.msg_type, operation.id
+                )
+            if known.feed.subscription_count >= MAX_SUBSCRIPTION_IDS:
+                raise OperationError(
+                    _("this page has {count} subscriptions to '{topic}', and may have no more").format(
+                        count=MAX_SUBSCRIPTION_IDS, topic=quotable(operation.topic)
+                    ),
+                    operation.id,
+                )
+            known.feed.subscribe(operation, as_pixels=as_pixels)
+            self._context.outbox.activate(known.feed)
+        self._context.tell("info", _("subscribed to '{topic}'").format(topic=operation.topic), operation.id)
+
+    async def _open_subscription(self, operation: Subscribe, *, as_pixels: bool) -> None:
+        if len(self._subscriptions) >= MAX_TOPICS:
+            raise OperationError(
+                _("this page subscribes to {count} topics, and may have no more").format(count=MAX_TOPICS),
+                operation.id,
+            )
+        subscriber = await self._context.in_thread(self._open_subscriber, operation)
+        feed = Feed(operation.topic)
+        feed.subscribe(operation, as_pixels=as_pixels)
+        reader = asyncio.create_task(self._read(subscriber, feed))
+        self._subscriptions[operation.topic] = _Subscription(subscriber, feed, reader)
+
+    def _open_subscriber(self, operation: Subscribe) -> Subscriber:
+        """In the page's thread."""
+        known = self._type_of(operation.topic)
+        if not is_compatible(operation.ros_type, known):
+            raise _another_type(operation.topic, operation.ros_type, known, operation.id)
+        msg_type = known or (nep_type_of(operation.ros_type) if operation.ros_type else "json")
+        return self._context.node.new_sub(operation.topic, msg_type, wildcards=False)
+
+    async def _read(self, subscriber: Subscriber, feed: Feed) -> None:
+        async for message in subscriber:
+            self._context.outbox.add(feed, message)
+
+    async def unsubscribe(self, operation: Unsubscribe) -> None:
+        """End one subscription, or all of a topic."""
+        known = self._subscriptions.get(operation.topic)
+        if known is None or not known.feed.unsubscribe(operation.id):
+            return  # as rosbridge: roslib unsubscribes again when it reconnects
+        if not known.feed.subscription_count:
+            del self._subscriptions[operation.topic]
+            await self._close_subscription(known)
+        self._context.tell(
+            "info", _("unsubscribed from '{topic}'").format(topic=operation.topic), operation.id
+        )
+
+    async def _close_subscription(self, known: _Subscription) -> None:
+        known.reader.cancel()
+        self._context.outbox.remove(known.feed)
+        await self._context.in_thread(known.subscriber.close)
+
+    def cancel(self) -> None:
+        """Read no more: the page is gone. Its node closes what is open."""
+        for each in self._subscriptions.values():
+            each.reader.cancel()
+            each.feed.clear()
+
+
+def _another_type(topic: str, ros_type: str, known: str, id_: OperationId) -> OperationError:
+    return OperationError(
+        _("'{topic}' has the type '{known}', not '{given}'").format(
+            topic=quotable(topic), known=quotable(ros_type_of(known)), given=quotable(ros_type)
+        ),
+        id_,
+    )
+
+
+def _with_header(msg: object, ros_type: str) -> object:
+    """A message whose type has a header, with the time of now where the page gives none."""
+    definition = definition_of(bare_type(ros_type))
+    if definition is None or not definition.has_header or not isinstance(msg, Mapping):
+        return msg
+    header = msg.get("header", {})
+    if not isinstance(header, Mapping) or "stamp" in header:
+        return msg
+    sec, nanosec = divmod(time.time_ns(), _NS)
+    stamped = {"frame_id": "", **header, "stamp": {"sec": sec, "nanosec": nanosec}}
+    return {**msg, "header": stamped}

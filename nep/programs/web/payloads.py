@@ -1,0 +1,215 @@
+"""NEP messages in the shapes of ROS messages, and back. Pure.
+
+| NEP message type  | ROS type                     | shape                                           |
+|-------------------|------------------------------|-------------------------------------------------|
+| string            | std_msgs/String              | `{data: text}`                                  |
+| bytes             | std_msgs/UInt8MultiArray     | `{layout, data}`                                |
+| image             | sensor_msgs/CompressedImage  | `{header, format, data}`: the JPEG or PNG file  |
+|                   | sensor_msgs/Image, if asked  | `{header, height, width, encoding, …, data}`    |
+| json              | nep/Json                     | as it is                                        |
+| msgpack           | nep/Msgpack                  | as it is                                        |
+| package/Type      | itself                       | as it is: NEP's typed messages have ROS's fields |
+
+Bytes are base64 text in JSON, and bytes in CBOR. The ROS back end packs and unpacks ROS messages.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import struct
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+from nep.backends.ros import carried
+from nep.errors import DecodeError, EncodeError, NepError
+from nep.i18n import _
+from nep.messages import image_codec
+from nep.messages.codecs import codec_for
+from nep.messages.encoded import Encoded
+from nep.messages.message import Message
+from nep.programs.web.ros_definitions import JSON_TYPE, MSGPACK_TYPE, bare_type, definition_of, full_text
+from nep.text import bounded_str, escaped
+
+__all__ = ["PayloadError", "from_ros", "is_compatible", "nep_type_of", "ros_bytes", "ros_type_of", "to_ros"]
+
+_STRING = "std_msgs/String"
+_BYTES = "std_msgs/UInt8MultiArray"
+_FILE = "sensor_msgs/CompressedImage"
+_PIXELS = "sensor_msgs/Image"
+_OWN = {"string": _STRING, "bytes": _BYTES, "image": _FILE, "json": JSON_TYPE, "msgpack": MSGPACK_TYPE}
+_CODECS = {**{ros_type: codec for codec, ros_type in _OWN.items()}, _PIXELS: "image"}
+_UNKNOWN = frozenset({"", "*"})
+_STAMP = struct.Struct("<II")
+_NS = 1_000_000_000
+
+
+class PayloadError(NepError):
+    """A message doesn't have the shape of its type."""
+
+
+def nep_type_of(ros_type: str) -> str:
+    """Return the NEP message type for a ROS type: "string" for std_msgs/String, else the name itself."""
+    bare = bare_type(ros_type)
+    return _CODECS.get(bare, bare)
+
+
+def ros_type_of(msg_type: str) -> str:
+    """Return the ROS type under which pages see a NEP message type."""
+    if msg_type in _UNKNOWN:
+        return JSON_TYPE
+    codec = codec_for(msg_type).name
+    return msg_type if codec == "json" and "/" in msg_type else _OWN[codec]
+
+
+def is_compatible(ros_type: str, msg_type: str) -> bool:
+    """Return whether a page may use `ros_type` on a topic of `msg_type`.
+
+    Plain JSON takes everything: its messages pass as they are.
+    """
+    if msg_type in _UNKNOWN or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
+        return True
+    wanted = bare_type(ros_type)
+    return wanted == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
+
+
+def codec_or_type(msg_type: str) -> str:
+    """Return "image" for "images" and the like, and a type's own name."""
+    codec = codec_for(msg_type).name
+    return msg_type if codec == "json" and "/" in msg_type else codec
+
+
+# ---- to pages
+
+
+def to_ros(message: Message, *, as_pixels: bool = False) -> object:
+    """Return a message's payload in its ROS shape; `bytes` in it stay bytes.
+
+    Raises `DecodeError` and `EncodeError` for a message that can't be read, or has no such shape.
+    """
+    if message.codec == "string":
+        return {"data": message.payload}
+    if message.codec == "bytes":
+        return {"layout": {"dim": [], "data_offset": 0}, "data": message.payload}
+    if message.codec == "image":
+        ros_type = _PIXELS if as_pixels else _FILE
+        definition = definition_of(ros_type)
+        shape = definition.decode(_picture(message, ros_type)) if definition is not None else {}
+        header = cast("dict[str, object]", shape["header"])
+        shape["header"] = {**header, "seq": (message.seq or 0) & 0xFFFFFFFF}
+        return shape
+    return message.payload
+
+
+def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
+    """Return a message as ROS 1 serializes its type. Raises as `to_ros` does."""
+    if message.codec == "image":
+        return _picture(message, _PIXELS if as_pixels else _FILE)
+    if message.codec in {"string", "bytes"}:
+        ros_type = _OWN[message.codec]
+        return carried.to_ros(ros_type, message.codec, Encoded(bytes(message.data)))
+    definition = definition_of(bare_type(ros_type_of(message.msg_type)))
+    if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
+        return definition.encode(_with_ros1_times(message.payload))
+    text = bytes(message.data) if message.codec == "json" else codec_for("json").encode(message.payload).data
+    return carried.to_ros(_STRING, "json", Encoded(bytes(text)))
+
+
+def _picture(message: Message, ros_type: str) -> bytes:
+    """A picture as ROS bytes with the time at which it was published."""
+    encoded = Encoded(message.data, dict(message.extension) or image_codec.picture_info(message.data))
+    layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
+    if ros_type == _FILE and layout is not None:
+        encoded = image_codec.encode(message.payload)
+    elif ros_type == _PIXELS and layout is None:
+        encoded = image_codec.raw_image(message.payload)
+    body = carried.to_ros(ros_type, "image", encoded)
+    stamp_ns = message.stamp_ns
+    if stamp_ns is None or not 0 <= stamp_ns < 2**32 * _NS:
+        return body
+    return body[:4] + _STAMP.pack(*divmod(stamp_ns, _NS)) + body[12:]
+
+
+def _with_ros1_times(value: object) -> object:
+    """`{sec, nanosec}`, as NEP and ROS 2 call them, becomes `{secs, nsecs}`."""
+    if isinstance(value, dict):
+        if value.keys() == {"sec", "nanosec"}:
+            return {"secs": value["sec"], "nsecs": value["nanosec"]}
+        return {key: _with_ros1_times(each) for key, each in value.items()}
+    if isinstance(value, list) and value and isinstance(value[0], dict | list):
+        return [_with_ros1_times(each) for each in value]
+    return value
+
+
+# ---- from pages
+
+
+def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
+    """Return what to publish on a topic of `msg_type` for a page's message of `ros_type`.
+
+    Raises `PayloadError` with the field that doesn't fit.
+    """
+    codec = codec_or_type(msg_type)
+    if codec == "string":
+        text = _map(msg, ros_type).get("data", "")
+        if not isinstance(text, str):
+            raise _wrong("data", text, _("a text"))
+        return text
+    if codec == "bytes":
+        return _bytes(_map(msg, ros_type).get("data", ""), "data")
+    if codec == "image":
+        return _image(_map(msg, ros_type), bare_type(ros_type))
+    return _map(msg, ros_type) if "/" in codec else msg
+
+
+def _map(msg: object, ros_type: str) -> Mapping[str, object]:
+    if not isinstance(msg, Mapping):
+        raise PayloadError(
+            _("a message of '{type}' is a map of its fields, not {given}").format(
+                type=escaped(ros_type), given=escaped(bounded_str(msg, 60))
+            )
+        )
+    return msg
+
+
+def _bytes(value: object, field: str) -> bytes:
+    """Bytes, which are base64 in JSON, or numbers from 0 to 255."""
+    if isinstance(value, str):
+        try:
+            return base64.b64decode(value, validate=True)
+        except (binascii.Error, ValueError):
+            raise _wrong(field, value, _("base64")) from None
+    if isinstance(value, Sequence):
+        try:
+            return bytes(value)
+        except (TypeError, ValueError):
+            pass
+    raise _wrong(field, value, _("base64 or numbers from 0 to 255"))
+
+
+def _image(fields: Mapping[str, object], ros_type: str) -> object:
+    data = _bytes(fields.get("data", ""), "data")
+    if ros_type != _PIXELS:
+        return data  # the codec reads whether it is a JPEG or a PNG
+    definition = definition_of(_PIXELS)
+    unpack = carried.unpacker("image", _PIXELS, full_text(_PIXELS) or "").unpack
+    try:
+        known = (
+            {each.name: fields[each.name] for each in definition.fields if each.name in fields}
+            if (definition is not None)
+            else {}
+        )
+        known.pop("header", None)
+        body = b"" if definition is None else definition.encode({**known, "data": data})
+        pixels, extension = unpack(memoryview(body))
+    except (EncodeError, DecodeError) as error:
+        raise PayloadError(str(error)) from None
+    return Encoded(bytes(pixels), extension)
+
+
+def _wrong(field: str, value: object, wanted: str) -> PayloadError:
+    return PayloadError(
+        _("'{field}' is {given}; give {wanted}").format(
+            field=field, given=escaped(bounded_str(value, 60)), wanted=wanted
+        )
+    )

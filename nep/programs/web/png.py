@@ -1,0 +1,52 @@
+"""Text in the pixels of a PNG file: rosbridge's compression `png`. Needs the extra `image`."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+
+from nep.errors import DecodeError, EncodeError, NepError
+from nep.i18n import _
+from nep.messages import image_codec
+from nep.messages.image_files import examine
+from nep.programs.web.limits import MAX_MESSAGE_BYTES
+from nep.programs.web.operations import OperationError
+
+__all__ = ["text_as_png", "text_in_png"]
+
+_MAX_WIDTH = 4_096
+
+
+def text_as_png(text: bytes) -> str:
+    """Return text as base64 of a PNG file whose pixels, filled up with newlines, are its bytes.
+
+    Raises `NepError` where the picture codec is not installed.
+    """
+    try:
+        import numpy as np  # noqa: PLC0415 - optional and heavy
+    except ImportError as error:
+        raise NepError(_("install the picture codec with: pip install 'nep-studio[image]'")) from error
+    width = max(1, min(_MAX_WIDTH, math.isqrt(len(text) // 3)))
+    height = -(-len(text) // (3 * width)) or 1
+    pixels = np.frombuffer(text.ljust(3 * width * height, b"\n"), np.uint8).reshape(height, width, 3)
+    png = image_codec.ImageFormat("png").encode(pixels[:, :, ::-1])
+    return base64.b64encode(png.data).decode()
+
+
+def text_in_png(data: str) -> bytes:
+    """Return the text in a PNG file. Raises `OperationError`, before it takes memory for a large one."""
+    try:
+        file = examine(base64.b64decode(data, validate=True))
+        is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)
+        if not is_right or file.width * file.height * 3 > MAX_MESSAGE_BYTES:
+            raise OperationError(
+                _("a 'png' has 8-bit RGB pixels, and {most} bytes at most").format(most=MAX_MESSAGE_BYTES)
+            )
+        return bytes(image_codec.read_file(file)[:, :, ::-1].tobytes().rstrip(b"\n"))
+    except (binascii.Error, ValueError):
+        raise OperationError(_("the 'data' of a 'png' is no base64")) from None
+    except (DecodeError, EncodeError) as error:
+        raise OperationError(_("a 'png' can't be read: {reason}").format(reason=error.reason)) from None
+    except ImportError:
+        raise OperationError(_("install the picture codec with: pip install 'nep-studio[image]'")) from None

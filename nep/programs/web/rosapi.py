@@ -1,0 +1,297 @@
+"""Services of rosapi, by which roslib, roslibpy and Foxglove ask what there is: answered from the graph.
+
+Parameters are called ``NODE:PARAMETER``, as in rosapi of ROS 2; their values are JSON texts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+import orjson
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.nodes.node import Node
+from nep.patterns.parameters.owned import place_of
+from nep.programs.robots.guard import MotionGuard
+from nep.programs.web.payloads import ros_type_of
+from nep.programs.web.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
+from nep.protocol.graph_view import GraphView, NodeInfo
+from nep.text import bounded_str, quotable
+
+__all__ = ["PREFIX", "RosApi", "is_rosapi", "is_shown"]
+
+PREFIX = "/rosapi/"
+_HIDDEN = "/nep/"
+_GRAPH_TIMEOUT_S = 2.0
+_PARAMETER_TIMEOUT_S = 2.0
+_MAX_NODES_ASKED = 50
+_NS = 1_000_000_000
+
+
+def is_rosapi(service: str) -> bool:
+    """Return whether a service is rosapi's; roslib leaves out the first slash."""
+    return f"/{service.removeprefix('/')}".startswith(PREFIX)
+
+
+def is_shown(name: str) -> bool:
+    """Return whether a topic or service is for people: those below /nep/ are NEP's own."""
+    return not name.startswith(_HIDDEN)
+
+
+class RosApi:
+    """Answers one call. Made for each; reads the graph once, when it is needed."""
+
+    def __init__(self, node: Node, guard: MotionGuard) -> None:
+        self._node = node
+        self._guard = guard
+
+    def answer(self, service: str, args: object) -> Mapping[str, object]:
+        """Return the values of a service of rosapi. Raises `NepError`."""
+        name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
+        known = _SERVICES.get(name)
+        if known is None:
+            raise NepError(
+                _("there is no service '{service}' in this rosapi").format(service=quotable(service))
+            )
+        return known[1](self, args if isinstance(args, Mapping) else {})
+
+    @cached_property
+    def _view(self) -> GraphView:
+        return self._node.graph(_GRAPH_TIMEOUT_S)
+
+    @cached_property
+    def _types(self) -> dict[str, str]:
+        """The ROS type of each topic that is shown."""
+        topics = self._view.topics.values()
+        return {each.name: ros_type_of(each.msg_type) for each in topics if is_shown(each.name)}
+
+    def _name(self, node_id: str) -> str:
+        known = self._view.nodes.get(node_id)
+        return node_id if known is None else known.name
+
+    # ---- topics
+
+    def topics(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """All topics with their types."""
+        return {"topics": list(self._types), "types": list(self._types.values())}
+
+    def topics_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The topics of a type."""
+        wanted = bare_type(_text(args, "type"))
+        return {"topics": [topic for topic, ros_type in self._types.items() if ros_type == wanted]}
+
+    def topic_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The type of a topic; "" when there is none."""
+        return {"type": self._types.get(_text(args, "topic"), "")}
+
+    def topics_and_raw_types(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """All topics with their types and the types' definitions."""
+        texts = [full_text(each) or full_text(JSON_TYPE) for each in self._types.values()]
+        return {**self.topics(args), "typedefs_full_text": texts}
+
+    def publishers(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """Names of the nodes that publish a topic."""
+        topic = self._view.topics.get(_text(args, "topic"))
+        found = () if topic is None else topic.publishers
+        return {"publishers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
+
+    def subscribers(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """Names of the nodes that subscribe to a topic."""
+        topic = self._view.topics.get(_text(args, "topic"))
+        found = () if topic is None else topic.subscribers
+        return {"subscribers": list(dict.fromkeys(self._name(each.node_id) for each in found))}
+
+    def message_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The fields of a type."""
+        asked = _text(args, "type")
+        found = type_definitions(bare_type(asked))
+        if found is None:
+            raise NepError(_("the fields of '{type}' are not known here").format(type=quotable(asked)))
+        return {"typedefs": found}
+
+    # ---- services
+
+    def services(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """All services with a server, and rosapi's own."""
+        return {"services": [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]}
+
+    @property
+    def _served(self) -> list[str]:
+        found = self._view.services.values()
+        return [each.name for each in found if each.servers and is_shown(each.name)]
+
+    def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The type of a service; "" when there is none."""
+        return {"type": self._service_type(_text(args, "service"))}
+
+    def _service_type(self, service: str) -> str:
+        if is_rosapi(service):
+            known = _SERVICES.get(f"/{service.removeprefix('/')}".removeprefix(PREFIX))
+            return "" if known is None else f"rosapi/{known[0]}"
+        known_service = self._view.services.get(service)
+        return "" if known_service is None else ros_type_of(known_service.msg_type)
+
+    def services_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The services of a type."""
+        wanted = _text(args, "type")
+        names = [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]
+        return {"services": [each for each in names if self._service_type(each) == wanted]}
+
+    def service_providers(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """Names of the nodes that serve a service."""
+        return {"providers": self._nodes_serving(_text(args, "service"))}
+
+    def service_node(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The name of the node that is asked first; "" when there is none."""
+        return {"node": next(iter(self._nodes_serving(_text(args, "service"))), "")}
+
+    def _nodes_serving(self, service: str) -> list[str]:
+        known = self._view.services.get(service)
+        servers = () if known is None else known.servers
+        return list(dict.fromkeys(self._name(each.node_id) for each in servers))
+
+    def service_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """NEP's services have no declared fields, so a type without fields."""
+        asked = _text(args, "type")
+        empty: list[str] = []
+        kinds = ("fieldnames", "fieldtypes", "fieldarraylen", "examples", "constnames", "constvalues")
+        return {"typedefs": [{"type": asked, **dict.fromkeys(kinds, empty)}]}
+
+    # ---- nodes
+
+    def nodes(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """Names of all nodes."""
+        return {"nodes": list(dict.fromkeys(each.name for each in self._view.nodes.values()))}
+
+    def node_details(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """What a node publishes, subscribes to and serves."""
+        ids = {each.id for each in self._nodes_named(_text(args, "node"))}
+        topics, services = self._view.topics.values(), self._view.services.values()
+        return {
+            "subscribing": [each.name for each in topics if _has(each.subscribers, ids)],
+            "publishing": [each.name for each in topics if _has(each.publishers, ids)],
+            "services": [each.name for each in services if _has(each.servers, ids)],
+        }
+
+    def _nodes_named(self, name: str) -> list[NodeInfo]:
+        found = [each for each in self._view.nodes.values() if name in {each.name, each.id}]
+        if not found:
+            raise NepError(_("there is no node '{name}'").format(name=quotable(name)))
+        return found
+
+    # ---- parameters
+
+    def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """Names of all parameters of nodes that answer."""
+        able = [each for each in self._view.nodes.values() if place_of(each.id) in self._view.services]
+        names: list[str] = []
+        for each in able[:_MAX_NODES_ASKED]:
+            try:
+                with self._node.parameters_of(each.id, _PARAMETER_TIMEOUT_S) as remote:
+                    names += [f"{each.name}:{bounded_str(known.get('name'))}" for known in remote.list()]
+            except NepError:
+                continue  # it went just now, or hangs
+        return {"names": names}
+
+    def get_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """The value of a parameter, or the default that the page gives, as JSON text."""
+        default = args.get("default")
+        try:
+            node, name = _parameter(args)
+            with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
+                return {"value": orjson.dumps(remote.get(name)).decode()}
+        except NepError:
+            if isinstance(default, str) and default:
+                return {"value": default}
+            raise
+
+    def has_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """Whether there is such a parameter."""
+        try:
+            self.get_param({"name": args.get("name")})
+        except NepError:
+            return {"exists": False}
+        return {"exists": True}
+
+    def set_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
+        """Set a parameter; that of a robot's node only where the page may move the robot."""
+        node, name = _parameter(args)
+        try:
+            value = orjson.loads(_text(args, "value"))
+        except orjson.JSONDecodeError:
+            raise NepError(_('the value of a parameter is a JSON text, such as 0.5 or "slow"')) from None
+        ids = {each.id for each in self._nodes_named(node)}
+        for topic in self._view.topics.values():
+            refusal = self._guard.refusal(topic.name, topic.msg_type)
+            if refusal and _has(topic.subscribers, ids):
+                raise NepError(refusal)
+        with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
+            remote.set(name, value)
+        return {}
+
+    def delete_param(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """NEP's parameters are declared by their node, and stay."""
+        raise NepError(_("parameters are declared by their node and can't be deleted"))
+
+    # ---- others
+
+    def action_servers(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """NEP has no actions of ROS."""
+        return {"action_servers": []}
+
+    def get_time(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """The time of this computer."""
+        secs, nsecs = divmod(time.time_ns(), _NS)
+        return {"time": {"secs": secs, "nsecs": nsecs}}
+
+
+def _text(args: Mapping[str, object], name: str) -> str:
+    value = args.get(name)
+    if not isinstance(value, str):
+        raise NepError(_("this service needs '{name}', a text").format(name=name))
+    return value
+
+
+def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
+    given = _text(args, "name")
+    node, colon, name = given.rpartition(":")
+    if not colon or not node:
+        raise NepError(
+            _("'{name}' is no parameter here; write it as 'NODE:PARAMETER'").format(name=quotable(given))
+        )
+    return node.removeprefix("/"), name
+
+
+def _has(members: tuple[object, ...], node_ids: set[str]) -> bool:
+    return any(getattr(each, "node_id", "") in node_ids for each in members)
+
+
+_Service = Callable[[RosApi, Mapping[str, object]], Mapping[str, object]]
+_SERVICES: Mapping[str, tuple[str, _Service]] = {
+    "topics": ("Topics", RosApi.topics),
+    "topics_for_type": ("TopicsForType", RosApi.topics_for_type),
+    "topic_type": ("TopicType", RosApi.topic_type),
+    "topics_and_raw_types": ("TopicsAndRawTypes", RosApi.topics_and_raw_types),
+    "publishers": ("Publishers", RosApi.publishers),
+    "subscribers": ("Subscribers", RosApi.subscribers),
+    "message_details": ("MessageDetails", RosApi.message_details),
+    "services": ("Services", RosApi.services),
+    "services_for_type": ("ServicesForType", RosApi.services_for_type),
+    "service_type": ("ServiceType", RosApi.service_type),
+    "service_providers": ("ServiceProviders", RosApi.service_providers),
+    "service_node": ("ServiceNode", RosApi.service_node),
+    "service_request_details": ("ServiceRequestDetails", RosApi.service_details),
+    "service_response_details": ("ServiceResponseDetails", RosApi.service_details),
+    "nodes": ("Nodes", RosApi.nodes),
+    "node_details": ("NodeDetails", RosApi.node_details),
+    "get_param_names": ("GetParamNames", RosApi.get_param_names),
+    "get_param": ("GetParam", RosApi.get_param),
+    "has_param": ("HasParam", RosApi.has_param),
+    "set_param": ("SetParam", RosApi.set_param),
+    "delete_param": ("DeleteParam", RosApi.delete_param),
+    "action_servers": ("GetActionServers", RosApi.action_servers),
+    "get_time": ("GetTime", RosApi.get_time),
+}
