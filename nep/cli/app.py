@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         top,
         topics,
         watch,
+        web,
         wire,
     )
 else:  # each command line needs one of them
@@ -47,11 +48,12 @@ else:  # each command line needs one of them
     record, recordings = lazy_module("nep.cli.record"), lazy_module("nep.cli.recordings")
     services, top = lazy_module("nep.cli.services"), lazy_module("nep.cli.top")
     topics, watch = lazy_module("nep.cli.topics"), lazy_module("nep.cli.watch")
-    wire = lazy_module("nep.cli.wire")
+    web, wire = lazy_module("nep.cli.web"), lazy_module("nep.cli.wire")
 
 _COMMANDS: Mapping[str, Callable[[], object]] = {
     "master": lambda: masters.master,
     "bridge": lambda: bridge.bridge,
+    "web": lambda: web.web,
     "log": lambda: log.log,
     "top": lambda: top.top,
     "record": lambda: record.record,

@@ -18,10 +18,11 @@ from nep.errors import AddressInUseError, NepError, TooManyFilesError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web.access import Access, AuthCheck
+from nep.programs.web.access import Access, AuthCheck, is_own_host
 from nep.programs.web.context import WebCounts
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
+from nep.system.addresses import ANY
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.log_rarely import is_logged
 from nep.text import escaped
@@ -36,6 +37,7 @@ __all__ = ["DEFAULT_PORT", "WebServer", "WebSettings"]
 DEFAULT_PORT = 9090
 """Rosbridge's."""
 _logger = logging.getLogger("nep.programs.web")
+_LOOPBACK = "127.0.0.1"
 _NODE_NAME = "nep_web"
 _REFRESH_S = 1.0
 """How often the guard looks for robots that came while pages are connected."""
@@ -53,16 +55,28 @@ _MAX_LOCKED = 16
 class WebSettings:
     """What a server is told.
 
-    `host`: the address of this computer at which it answers; 127.0.0.1 lets no other computer connect.
-    `port`: 0 takes a free one. `allow_moving`: names of the robots that pages may move.
+    `port`: 0 takes a free one. `listen`: addresses of this computer at which other computers can connect, too;
+    then a token is needed. `allow_moving`: names of the robots that pages may move.
     """
 
-    host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
+    listen: Collection[str] = ()
     access: Access = field(default_factory=Access)
     allow_moving: Collection[str] = ()
     master: str | None = None
     transport: str = "zeromq"
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """All addresses at which it answers."""
+        if ANY in self.listen:
+            return (ANY,)
+        return tuple(dict.fromkeys((_LOOPBACK, *self.listen)))
+
+    @property
+    def is_open(self) -> bool:
+        """Whether other computers can connect."""
+        return any(not is_own_host(each) for each in self.hosts)
 
 
 class WebServer:
@@ -88,8 +102,7 @@ class WebServer:
     @property
     def url(self) -> str:
         """Where pages of this computer connect, without the token."""
-        host = "127.0.0.1" if self.settings.host in {"0.0.0.0", "localhost"} else self.settings.host  # noqa: S104
-        return f"ws://{host}:{self.port}"
+        return f"ws://{_LOOPBACK}:{self.port}"
 
     @property
     def page_names(self) -> tuple[str, ...]:
@@ -99,6 +112,8 @@ class WebServer:
     def start(self) -> Self:
         """Listen; return once pages can connect."""
         check_installed()
+        if self.settings.is_open and not self.settings.access.token:
+            raise NepError(_("a web server that other computers can reach needs a token"))
         self._thread.start()
         self._started.wait()
         if self._problem is not None:
@@ -149,7 +164,7 @@ class WebServer:
             try:
                 server = await serve(
                     self._page,
-                    self.settings.host,
+                    self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                     self.settings.port,
                     process_request=self._refusal,
                     compression=None,
@@ -175,9 +190,11 @@ class WebServer:
             self._guard.close()
 
     def _bind_error(self, error: OSError) -> Exception:
-        address = f"{self.settings.host}:{self.settings.port}"
+        address = f"{', '.join(self.settings.hosts)}:{self.settings.port}"
         if error.errno == errno.EADDRINUSE:
             return AddressInUseError(address)
+        if error.errno == errno.EADDRNOTAVAIL:
+            return NepError(str(AddressInUseError(", ".join(self.settings.listen), is_own=False)))
         if error.errno is not None and is_lack(error.errno):
             return TooManyFilesError("a web server", opened(), limit())
         if isinstance(error, PermissionError):

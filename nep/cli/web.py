@@ -1,0 +1,188 @@
+"""`nep web`: serve web pages and programs that speak rosbridge."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nep.cli import interrupts
+from nep.cli.options import AllowMovingOption, MasterOption
+from nep.cli.screen import console, say
+from nep.errors import AddressInUseError, NepError
+from nep.i18n import _, ngettext
+from nep.masters.master import is_running
+from nep.programs.web.access import Access, checked_origin, new_token
+from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
+from nep.system.addresses import ANY, checked_host, master_address, own_addresses
+from nep.system.descriptors import allow_many
+from nep.system.terminal import Terminal, log_to
+
+_SLICE_S = 0.1
+_MASTER_TIMEOUT_S = 0.5
+_MIN_TOKEN_LENGTH, _MAX_TOKEN_BYTES = 16, 1_000
+
+PortOption = Annotated[
+    int, typer.Option("--port", "-p", min=1, max=65535, metavar="PORT", help=_("Port to listen on."))
+]
+ListenOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--listen",
+        metavar=_("ADDRESS"),
+        help=_(
+            "Let other computers connect at this address of this computer; 0.0.0.0 means all of its "
+            "addresses. They need the token."
+        ),
+        show_default=False,
+    ),
+]
+OriginOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--origin",
+        metavar="ORIGIN",
+        help=_(
+            "Let pages of this origin connect, such as http://192.168.1.5:8000; can be repeated. Pages of "
+            "this computer may always connect. 'null' allows pages that were opened as files."
+        ),
+        show_default=False,
+    ),
+]
+TokenOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--token",
+        metavar=_("FILE"),
+        help=_(
+            "Require the token in this file from everybody. If there is no such file, it is written with a "
+            "new token. Without this option a new token is made whenever other computers can connect."
+        ),
+        show_default=False,
+    ),
+]
+
+
+def web(
+    port: PortOption = DEFAULT_PORT,
+    listen: ListenOption = None,
+    origin: OriginOption = None,
+    token: TokenOption = None,
+    allow_moving: AllowMovingOption = None,
+    master: MasterOption = None,
+) -> None:
+    """Let web pages and programs connect with roslib, roslibpy or Foxglove. Ctrl+C ends it.
+
+    It is a WebSocket server that speaks the rosbridge v2 protocol. Each page is a node while it is connected.
+    Only this computer can connect unless you add --listen. Messages that move a robot are refused unless you
+    add --allow-moving. docs/web.md has examples.
+    """
+    hosts = [checked_host(each) for each in listen or ()]
+    origins = frozenset(map(checked_origin, origin or ()))
+    is_file_new = token is not None and not token.exists()
+    secret = _token(token, is_needed=bool(hosts))
+    settings = WebSettings(
+        port=port,
+        listen=tuple(hosts),
+        access=Access(origins, secret),
+        allow_moving=frozenset(allow_moving or ()),
+        master=master,
+    )
+    allow_many()
+    with Terminal(sys.stderr) as terminal:
+        log_to(terminal, logging.WARNING)
+        server = WebServer(settings)
+        try:
+            _start(server)
+            _say_running(server, terminal, token_file=None if token is None or is_file_new else token)
+            interrupts.leave_when_told()
+            while not server.wait(_SLICE_S):
+                pass  # in slices: Windows does not interrupt a wait for Ctrl+C
+        finally:
+            server.close()
+            _say_ended(server, terminal)
+
+
+def _start(server: WebServer) -> None:
+    try:
+        server.start()
+    except AddressInUseError as error:
+        raise NepError(
+            _(
+                "another program uses port {port}, perhaps rosbridge or another 'nep web'; end it, or choose "
+                "another port with --port"
+            ).format(port=server.settings.port)
+        ) from error
+
+
+def _token(file: Path | None, *, is_needed: bool) -> str:
+    """The token that everybody must give, "" for none. Raises `NepError`."""
+    if file is None:
+        return new_token() if is_needed else ""
+    try:
+        if not file.exists():
+            return _written(file)
+        with file.open("rb") as opened:
+            found = opened.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
+    except OSError as error:
+        raise NepError(
+            _("can't use the token file '{file}': {reason}").format(file=file, reason=error.strerror)
+        ) from error
+    if len(found) < _MIN_TOKEN_LENGTH or not found.isascii() or not found.isprintable():
+        raise NepError(
+            _("the token in '{file}' needs {least} letters or more; delete the file to get a new one").format(
+                file=file, least=_MIN_TOKEN_LENGTH
+            )
+        )
+    return found
+
+
+def _written(file: Path) -> str:
+    """A new token in a new file that only its owner can read."""
+    made = new_token()
+    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
+        opened.write(made + "\n")
+    return made
+
+
+def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | None) -> None:
+    """Print where to connect, who may, and what is missing."""
+    out = console(out=terminal)
+    token = server.settings.access.token
+    query = f"/?token={token}" if token and token_file is None else ""
+    out.print(_("[bold green]●[/] web pages connect to [bold]{url}[/]").format(url=server.url + query))
+    for host in _network_hosts(server.settings.listen):
+        url = f"ws://{host}:{server.port}{query}"
+        out.print(_("[bold yellow]●[/] other computers connect to [bold]{url}[/]").format(url=url))
+    if token_file is not None:
+        said = _("  add /?token=TOKEN to it, with the token in {file}")
+        out.print(said.format(file=token_file), style="dim")
+    if not server.settings.access.origins:
+        out.print(_("  only pages of this computer and programs; --origin allows others"), style="dim")
+    address = master_address(server.settings.master)
+    if not is_running(address, _MASTER_TIMEOUT_S):
+        said = _("no master answers at '{address}' yet; start one with 'nep master'")
+        say(said.format(address=address), terminal)
+    out.print(_("  Ctrl+C ends it"), style="dim")
+
+
+def _network_hosts(listen: Collection[str]) -> list[str]:
+    return [own.host for own in own_addresses()] if ANY in listen else list(listen)
+
+
+def _say_ended(server: WebServer, terminal: Terminal) -> None:
+    counts = server.counts
+    if not (counts.opened or counts.turned_away):
+        return
+    said = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
+    said += _(
+        ", {turned_away} refused; {operations} operations, {rejected} rejected; {sent} messages sent, "
+        "{dropped} dropped"
+    ).format(**counts.as_map())
+    say(said, terminal)
