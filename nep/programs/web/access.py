@@ -97,7 +97,7 @@ class Access:
 
         ``ws://host:9090/?token=TOKEN`` or ``Authorization: Bearer TOKEN``.
         """
-        given = [*parse_qs(urlsplit(path).query, max_num_fields=20).get("token", ())]
+        given = [*parse_qs(urlsplit(path).query, keep_blank_values=True).get("token", ())]
         scheme, _space, value = (authorization or "").partition(" ")
         if scheme.lower() == "bearer" and value:
             given.append(value.strip())

@@ -124,9 +124,10 @@ class Feed:
 
 
 class Outbox:
-    """Everything that waits for one page. `clock` is the event loop's."""
+    """Everything that waits for one page. `clock` is the event loop's; messages have `max_bytes` together."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
+    def __init__(self, clock: Callable[[], float], max_bytes: int = MAX_QUEUED_BYTES) -> None:
+        self._max_bytes = max_bytes
         self._clock = clock
         self._frames: deque[Frame] = deque()
         self._frames_bytes = 0
@@ -147,7 +148,7 @@ class Outbox:
     def add(self, feed: Feed, message: Message) -> None:
         """Append a message of a topic."""
         feed.add(message)
-        while len(feed) > 1 and sum(each.size_bytes for each in self._active) > MAX_QUEUED_BYTES:
+        while len(feed) > 1 and sum(each.size_bytes for each in self._active) > self._max_bytes:
             feed.drop_oldest()
         self.activate(feed)
 

@@ -131,10 +131,6 @@ class Page:
         said = _("this page is too slow: {count} messages of '{topic}' were dropped")
         self._context.tell("warning", said.format(count=count, topic=topic))
 
-    async def close(self, code: int, reason: str) -> None:
-        """Close the connection; `run` ends."""
-        await self._connection.close(code, reason)
-
     # ---- operations
 
     async def handle(self, data: bytes) -> None:
@@ -156,11 +152,10 @@ class Page:
         for _nested in range(MAX_NESTED_OPERATIONS):
             if not isinstance(operation, op.Fragment | op.Png):
                 break
-            whole = self._fragments.add(operation)
-            if whole is None:
+            inner = self._unwrapped(operation)
+            if inner is None:
                 return
-            text = text_in_png(whole) if isinstance(operation, op.Png) else whole.encode("utf-8", "replace")
-            operation = op.parse(text)
+            operation = inner
         carry_out = self._carriers.get(type(operation))
         if carry_out is None:
             raise op.OperationError(_("an operation is in too many fragments of fragments"), operation.id)
@@ -172,6 +167,18 @@ class Page:
             raise
         except NepError as error:
             raise op.OperationError(str(error), operation.id) from error
+
+    def _unwrapped(self, part: op.Fragment | op.Png) -> op.Operation | None:
+        """The operation inside once all of its parts are there."""
+        try:
+            whole = self._fragments.add(part)
+            if whole is None:
+                return None
+            text = text_in_png(whole) if isinstance(part, op.Png) else whole.encode("utf-8", "replace")
+            return op.parse(text)
+        except op.OperationError as error:
+            error.id = part.id if error.id is None else error.id
+            raise
 
     def _set_level(self, operation: op.SetLevel) -> None:
         self._context.level = operation.level

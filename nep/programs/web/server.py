@@ -45,7 +45,6 @@ _WAIT_FOR_MASTER_S = 2.0
 _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
 _JOIN_S = 10.0
-_GOING_AWAY = 1001
 _POLICY_VIOLATION = 1008
 _MAX_LOCKED = 16
 """Connections without a token that may still send an ``auth``."""
@@ -55,8 +54,8 @@ _MAX_LOCKED = 16
 class WebSettings:
     """What a server is told.
 
-    `port`: 0 takes a free one. `listen`: addresses of this computer at which other computers can connect, too;
-    then a token is needed. `allow_moving`: names of the robots that pages may move.
+    `port`: 0 takes a free one. `listen`: addresses of this computer at which others can connect, too; then a
+    token is needed. `allow_moving`: names of the robots that pages may move.
     """
 
     port: int = DEFAULT_PORT
@@ -183,10 +182,7 @@ class WebServer:
                 watch = asyncio.create_task(self._watch_robots())
                 await self._stop.wait()
                 watch.cancel()
-                server.close(close_connections=False)
-                await asyncio.gather(
-                    *(each.close(_GOING_AWAY, "nep web ends") for each in tuple(self._pages))
-                )
+                server.close()  # with 1001, going away
             self._guard.close()
 
     def _bind_error(self, error: OSError) -> Exception:

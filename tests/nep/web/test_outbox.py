@@ -1,0 +1,100 @@
+"""What waits for a page: bounded, dropped oldest first, and sent by turns at the rate that the page wants."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+
+from nep.messages.message import Message
+from nep.programs.web.operations import Subscribe
+from nep.programs.web.outbox import Feed, Outbox, Queued
+from nep.programs.web.outgoing import Frame
+
+
+def message(number: int, *, size: int = 1) -> Message:
+    return Message("/t", b"1" * size, "json", "json", seq=number)
+
+
+def feed(**wishes: object) -> Feed:
+    made = Feed("/t")
+    made.subscribe(replace(Subscribe("s", "/t"), **wishes), as_pixels=False)
+    return made
+
+
+def numbers(source: Feed) -> list[int | None]:
+    return [source.take(0.0).seq for _left in range(len(source))]
+
+
+def test_slow_page_loses_the_oldest_messages() -> None:
+    slow = feed(queue_length=3)
+    for number in range(10):
+        slow.add(message(number))
+    assert slow.dropped_count == 7
+    assert numbers(slow) == [7, 8, 9]
+
+
+def test_throttled_subscription_keeps_the_newest_message() -> None:
+    slow = feed(throttle_s=0.5)
+    for number in range(10):
+        slow.add(message(number))
+    assert (slow.dropped_count, slow.throttled_count) == (0, 9)
+    assert slow.take(100.0).seq == 9
+    assert slow.next_at == 100.5
+
+
+def test_subscriptions_of_a_page_are_combined() -> None:
+    both = feed(throttle_s=0.5, queue_length=2, fragment_size=900, compression="png")
+    both.subscribe(Subscribe("t", "/t", "", 0.1, 5, 300, "cbor"), as_pixels=False)
+    assert (both.form.compression, both.form.fragment_size) == ("cbor", 300)
+    for number in range(10):
+        both.add(message(number))
+    assert len(both) == 5
+    assert both.take(1.0) is not None
+    assert both.next_at == pytest.approx(1.1)
+    assert both.unsubscribe("t")
+    assert not both.unsubscribe("t")
+    assert both.form.compression == "png"
+    assert both.unsubscribe(None)
+    assert both.subscription_count == 0
+
+
+def test_bytes_that_wait_for_a_page_are_bounded() -> None:
+    async def fill() -> None:
+        waiting, first, second = Outbox(lambda: 0.0, max_bytes=1_000), feed(), feed()
+        for number in range(20):
+            waiting.add(first, message(number, size=100))
+        waiting.add(second, message(0, size=5_000))
+        assert first.size_bytes <= 1_000
+        assert len(second) == 1
+        assert first.dropped_count == 10
+
+    asyncio.run(fill())
+
+
+def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
+    async def drain() -> list[object]:
+        waiting, busy, quiet = Outbox(lambda: 0.0), feed(), feed()
+        for number in range(3):
+            waiting.add(busy, message(number))
+        waiting.add(quiet, message(9))
+        waiting.put([Frame(b"status", is_text=True)])
+        taken = [await waiting.take() for _left in range(5)]
+        return [each.message.seq if isinstance(each, Queued) else each.data for each in taken]
+
+    assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
+
+
+def test_throttled_message_is_sent_when_its_time_has_come() -> None:
+    async def wait() -> float:
+        loop = asyncio.get_running_loop()
+        waiting, slow = Outbox(loop.time), feed(throttle_s=0.05)
+        waiting.add(slow, message(1))
+        await waiting.take()
+        began = loop.time()
+        waiting.add(slow, message(2))
+        await waiting.take()
+        return loop.time() - began
+
+    assert asyncio.run(wait()) >= 0.03
