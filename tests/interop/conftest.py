@@ -26,6 +26,9 @@ SCRIPTS = Path(__file__).parent / "peers"
 FIXED_PORTS = (7000, 50000)
 PYTHON_PEERS = ("0.5.3.5", "0.5.4.5", "0.5.4.6", "0.5.4.7", "0.5.4.8")
 JAVASCRIPT_PEER = "nep-js"
+ROSLIB_PEER = "roslib"
+JAVASCRIPT = {JAVASCRIPT_PEER: "javascript", ROSLIB_PEER: "roslib"}
+"""Peers from npm, each with the folder that pins it."""
 SHARED = "shared"
 """The environment of the packages that all Python peers need."""
 MARK = "\x1e"
@@ -145,14 +148,21 @@ class Peers:
         """A program of `version` (one of `PYTHON_PEERS`, "nep-js" or "native") with its own node."""
         arguments = [role, topic, msg_type, mode, name or f"{role}_{version.replace('.', '')}"]
         if version == "nep-js":
-            folder = self._have(version, _install_javascript)
-            script = folder / "peer.js"
-            shutil.copyfile(SCRIPTS / "javascript_peer.js", script)
-            return self.run(["node", str(script), *arguments])
+            return self.run_javascript(version, "javascript_peer.js", arguments)
         if version == "native":
             return self.run_native([str(SCRIPTS / "native_peer.py"), *arguments])
         folder = self._have(version, _install_python)
         return self.run([str(_python_of(folder)), str(SCRIPTS / "python_peer.py"), *arguments])
+
+    def run_javascript(self, peer: str, script: str, arguments: Sequence[str]) -> Program:
+        """A script that finds what is installed for this peer."""
+        copy = self.folder(peer) / script
+        shutil.copyfile(SCRIPTS / script, copy)
+        return self.run(["node", str(copy), *arguments])
+
+    def folder(self, peer: str) -> Path:
+        """Where a peer from npm is installed."""
+        return self._have(peer, _install_javascript)
 
     def run_native(self, arguments: Sequence[str]) -> Program:
         """A program on our own `nep`."""
@@ -211,17 +221,17 @@ def _packages_in(folder: Path) -> Path:
 
 def _install_javascript(version: str, folder: Path) -> str:
     if shutil.which("node") is None or shutil.which("npm") is None:
-        return "the test peer nep-js needs node and npm, which this computer does not have"
+        return f"the test peer {version} needs node and npm, which this computer does not have"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for name in ("package.json", "package-lock.json"):
-        shutil.copy(SCRIPTS / "javascript" / name, folder)
+        shutil.copy(_pins(version).with_name(name), folder)
     npm = shutil.which("npm") or "npm"
     commands = (
         [npm, "ci", "--silent", "--no-audit", "--no-fund", "--prefix", str(folder)],
-        ["node", "-e", f"require({json.dumps(str(folder / 'node_modules' / 'nep-js'))})"],
+        ["node", "--input-type=module", "-e", f"await import({json.dumps(version)})"],
     )
-    return _run_all(commands, version, folder, is_complete=True)
+    return _run_all(commands, version, folder, is_complete=True, where=folder)
 
 
 def _is_complete(version: str) -> bool:
@@ -232,8 +242,8 @@ def _is_complete(version: str) -> bool:
 
 def _pins(version: str) -> Path:
     """What is installed for a peer, with hashes."""
-    if version == JAVASCRIPT_PEER:
-        return SCRIPTS / "javascript" / "package-lock.json"
+    if version in JAVASCRIPT:
+        return SCRIPTS / JAVASCRIPT[version] / "package-lock.json"
     if version == SHARED:
         return SCRIPTS / "python.txt"
     return SCRIPTS / f"nep-{version}.txt"
@@ -246,13 +256,18 @@ def _packages(version: str) -> str:
 
 
 def _run_all(
-    commands: Sequence[Sequence[str]], version: str, folder: Path, *, is_complete: bool = False
+    commands: Sequence[Sequence[str]],
+    version: str,
+    folder: Path,
+    *,
+    is_complete: bool = False,
+    where: Path | None = None,
 ) -> str:
     """Run commands that install a peer, the last ones too; the reason why it is not there, or nothing."""
-    what = {JAVASCRIPT_PEER: "the test peer nep-js", SHARED: "what the test peers need"}.get(
-        version, f"the test peer nep {version}"
-    )
-    where = folder.parent  # not where we are: `import nep` would find our own
+    what = "what the test peers need" if version == SHARED else f"the test peer nep {version}"
+    if version in JAVASCRIPT:
+        what = f"the test peer {version}"
+    where = where or folder.parent  # not where we are: `import nep` would find our own
     where.mkdir(parents=True, exist_ok=True)
     for command in commands:
         try:
