@@ -538,6 +538,21 @@ def test_a_name_that_cannot_be_one_is_refused(make: Make, name) -> None:
         node.new_client(name)
 
 
+def test_callback_that_returns_futures_answers_in_any_order(make: Make) -> None:
+    promised: list[Future[object]] = [Future(), Future(), Future()]
+    make("server").new_server("/later", lambda request: promised[request["n"]], threads=1)
+    client = make("client").new_client("/later", timeout_s=LONG_S)
+    calls = [client.call_async({"n": number}) for number in range(3)]
+    eventually(lambda: all(each._done_callbacks for each in promised))
+    promised[2].set_result({"answer": 2})
+    assert calls[2].result(LONG_S) == {"answer": 2}
+    promised[1].set_exception(ValueError("no luck"))
+    promised[0].set_result(object())
+    for call, reason in ((calls[1], "no luck"), (calls[0], "object")):
+        with pytest.raises(nep.ServiceError, match=reason):
+            call.result(LONG_S)
+
+
 def test_the_longest_name_is_served(make: Make) -> None:
     name = "x" * 188
     make("server").new_server(name, doubled, threads=1)
