@@ -16,7 +16,9 @@ FILES = ("README.md", "CONTRIBUTING.md", "dev.py", "hatch_build.py", "pyproject.
 ELSEWHERE = frozenset({
     "app/_resources/",  # where a wheel has them
     "nep/locale/fr/LC_MESSAGES/nep-studio.po",  # an example of a language to begin
-    "nep/log",  # a type of messages
+    "nep/Json",  # types of messages
+    "nep/Msgpack",
+    "nep/log",
     "tools/nothing.py",  # a test says that it is not there
 })  # fmt: skip
 

@@ -104,9 +104,7 @@ def test_roslib_reads_every_compression(clients: Peers, server: WebServer, node:
     page.wait(lambda: "failed" in str(page.got[-1]), "the refusal of a parameter")
 
 
-def test_roslib_is_told_when_the_server_ends(
-    clients: Peers, master: Master, node: nep.Node
-) -> None:
+def test_roslib_is_told_when_the_server_ends(clients: Peers, master: Master, node: nep.Node) -> None:
     settings = WebSettings(port=0, master=master.address)
     with WebServer(settings) as first:
         page = started(clients, "roslib", first)

@@ -18,7 +18,7 @@ from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 from nep.text import escaped, shortened
 
-__all__ = ["Definition", "Field", "FieldKind", "parse"]
+__all__ = ["Definition", "DefinitionField", "FieldKind", "parse"]
 
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
@@ -83,13 +83,13 @@ class FieldKind:
     write: Callable[[object, str, bytearray], None]
     read: Callable[[_Reader, str], object]
     least: int
-    fields: tuple[Field, ...] = ()
+    fields: tuple[DefinitionField, ...] = ()
     element: FieldKind | None = None
     length: int | None = None
 
 
 @dataclass(frozen=True)
-class Field:
+class DefinitionField:
     """Field of a message."""
 
     name: str
@@ -102,7 +102,7 @@ class Definition:
 
     name: str
     text: str
-    fields: tuple[Field, ...]
+    fields: tuple[DefinitionField, ...]
     has_header: bool
     """Whether its first field is a header: then the bytes begin with seq, secs and nsecs."""
 
@@ -166,8 +166,8 @@ class _Parser:
         self._count = 0
         self.has_header = False
 
-    def fields_of(self, name: str, depth: int) -> tuple[Field, ...]:
-        fields: list[Field] = []
+    def fields_of(self, name: str, depth: int) -> tuple[DefinitionField, ...]:
+        fields: list[DefinitionField] = []
         names: set[str] = set()
         for line in self._texts[name].splitlines():
             stripped = line.partition("#")[0].strip()
@@ -183,7 +183,7 @@ class _Parser:
             kind = self._kind(name, found[1], depth)
             if found[2]:
                 kind = _array(kind, int(found[3]) if found[3] else None)
-            fields.append(Field(found[4], kind))
+            fields.append(DefinitionField(found[4], kind))
         return tuple(fields)
 
     def _kind(self, inside: str, written: str, depth: int) -> FieldKind:
@@ -430,7 +430,7 @@ def _write_length(count: int, length: int | None, path: str, out: bytearray) -> 
         raise _FieldError(path, _("has {count} elements; give {length}").format(count=count, length=length))
 
 
-def _nested(name: str, fields: tuple[Field, ...]) -> FieldKind:
+def _nested(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
     def write(value: object, path: str, out: bytearray) -> None:
         _write_fields(name, fields, value, path, out)
 
@@ -440,7 +440,9 @@ def _nested(name: str, fields: tuple[Field, ...]) -> FieldKind:
     return FieldKind(name, write, read, sum(each.kind.least for each in fields), fields)
 
 
-def _write_fields(name: str, fields: tuple[Field, ...], payload: object, path: str, out: bytearray) -> None:
+def _write_fields(
+    name: str, fields: tuple[DefinitionField, ...], payload: object, path: str, out: bytearray
+) -> None:
     if not isinstance(payload, Mapping):
         if not path:
             raise _FieldError("", _not_a_map(fields))
@@ -455,7 +457,7 @@ def _write_fields(name: str, fields: tuple[Field, ...], payload: object, path: s
         raise _unknown(path, next(key for key in payload if key not in names), names)
 
 
-def _read_fields(fields: tuple[Field, ...], reader: _Reader, path: str) -> dict[str, object]:
+def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str) -> dict[str, object]:
     made: dict[str, object] = {}
     reader.messages_left -= 1
     if reader.messages_left < 0:
@@ -482,7 +484,7 @@ def _whole(value: object) -> int | None:
     return None if index is None else int(index(value))
 
 
-def _not_a_map(fields: tuple[Field, ...]) -> str:
+def _not_a_map(fields: tuple[DefinitionField, ...]) -> str:
     names = ", ".join(f"'{each.name}'" for each in fields[:6])
     return _("publish a 'dict' with its fields {names}").format(names=names or "{}")
 

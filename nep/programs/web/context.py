@@ -1,4 +1,4 @@
-"""What the parts of a page share: its node, its outbox, its thread, and how it is told of problems."""
+"""What the parts of a page share: its node, its send queue, its thread, and how it is told of problems."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import ParamSpec, TypeVar
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.operations import LEVELS, Level, OperationId
-from nep.programs.web.outbox import Outbox
-from nep.programs.web.outgoing import Form, operation_frames
+from nep.programs.web.outgoing import EncodingOptions, operation_frames
+from nep.programs.web.send_queue import SendQueue
 
 __all__ = ["PageContext", "WebCounts"]
 
@@ -46,10 +46,10 @@ class PageContext:
     """See the module."""
 
     def __init__(
-        self, node: Node, outbox: Outbox, thread: Executor, guard: MotionGuard, counts: WebCounts
+        self, node: Node, queue: SendQueue, thread: Executor, guard: MotionGuard, counts: WebCounts
     ) -> None:
         self.node = node
-        self.outbox = outbox
+        self.queue = queue
         self.guard = guard
         self.counts = counts
         self.level: Level = "error"
@@ -67,4 +67,4 @@ class PageContext:
         status: dict[str, object] = {"op": "status", "level": level, "msg": sentence}
         if id_ is not None:
             status["id"] = id_
-        self.outbox.put(operation_frames(status, Form()))
+        self.queue.put(operation_frames(status, EncodingOptions()))

@@ -41,11 +41,11 @@ __all__ = [
     "Operation",
     "OperationError",
     "OperationId",
+    "PageStatus",
     "Png",
     "Publish",
     "ServiceResponse",
     "SetLevel",
-    "Status",
     "Subscribe",
     "Unadvertise",
     "UnadvertiseService",
@@ -189,7 +189,7 @@ class SetLevel:
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class PageStatus:
     """A note of the page, for the log."""
 
     id: OperationId
@@ -224,7 +224,7 @@ Operation = (
     | Fragment
     | Png
     | SetLevel
-    | Status
+    | PageStatus
     | Auth
 )
 
@@ -418,7 +418,7 @@ def _png(fields: _Fields) -> Operation:
 
 def _status(fields: _Fields) -> Operation:
     level = cast("Level", fields.choice("level", "info", LEVELS))
-    return Status(fields.id, level, fields.text("msg", "", most=MAX_MESSAGE_BYTES))
+    return PageStatus(fields.id, level, fields.text("msg", "", most=MAX_MESSAGE_BYTES))
 
 
 def _auth(fields: _Fields) -> Operation:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 else:
     cbor2 = lazy_module("cbor2")
 
-__all__ = ["Form", "Frame", "operation_frames", "publish_frames"]
+__all__ = ["EncodingOptions", "Frame", "operation_frames", "publish_frames"]
 
 _NS = 1_000_000_000
 _TYPED_ARRAYS = {
@@ -45,7 +45,7 @@ class Frame(NamedTuple):
     is_text: bool
 
 
-class Form(NamedTuple):
+class EncodingOptions(NamedTuple):
     """How a page wants a message."""
 
     compression: Compression = "none"
@@ -53,7 +53,7 @@ class Form(NamedTuple):
     as_pixels: bool = False
 
 
-def publish_frames(topic: str, message: Message, form: Form) -> list[Frame]:
+def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[Frame]:
     """Return a message of a topic as its subscriber gets it.
 
     Raises `NepError` for a message that can't be read, or doesn't have that form.
@@ -76,14 +76,14 @@ def publish_frames(topic: str, message: Message, form: Form) -> list[Frame]:
     return _text_frames(text, form)
 
 
-def operation_frames(operation: Mapping[str, object], form: Form) -> list[Frame]:
+def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
     """Return another operation, such as a service's answer. Raises `EncodeError`."""
     if form.compression in {"cbor", "cbor-raw"}:
         return [Frame(_cbor(operation), is_text=False)]
     return _text_frames(_json(operation), form)
 
 
-def _text_frames(text: bytes, form: Form) -> list[Frame]:
+def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
     if form.compression == "png":
         text = _json({"op": "png", "data": text_as_png(text)})
     if form.fragment_size is None or len(text) <= form.fragment_size:

@@ -18,11 +18,11 @@ from nep.programs.web.access import AuthCheck
 from nep.programs.web.context import PageContext, WebCounts
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
-from nep.programs.web.outbox import Outbox, Queued
 from nep.programs.web.outgoing import Frame, publish_frames
 from nep.programs.web.page_services import PageServices
 from nep.programs.web.page_topics import PageTopics
 from nep.programs.web.png import text_in_png
+from nep.programs.web.send_queue import Queued, SendQueue
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged
 
@@ -55,8 +55,8 @@ class Page:
         self._counts = counts
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
         self._node = new_node(name)
-        self._outbox = Outbox(asyncio.get_running_loop().time)
-        self._context = PageContext(self._node, self._outbox, self._thread, guard, counts)
+        self._queue = SendQueue(asyncio.get_running_loop().time)
+        self._context = PageContext(self._node, self._queue, self._thread, guard, counts)
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
@@ -72,7 +72,7 @@ class Page:
             op.UnadvertiseService: self._services.unadvertise,
             op.ServiceResponse: self._services.respond,
             op.SetLevel: self._set_level,
-            op.Status: self._log_status,
+            op.PageStatus: self._log_status,
             op.Auth: _ignore,
         }
 
@@ -104,7 +104,7 @@ class Page:
         """Send what waits, as fast as the page takes it."""
         try:
             while True:
-                next_up = await self._outbox.take()
+                next_up = await self._queue.take()
                 frames = [next_up] if isinstance(next_up, Frame) else self._frames_of(next_up)
                 for frame in frames:
                     await self._connection.send(frame.data, text=frame.is_text)
@@ -145,7 +145,7 @@ class Page:
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
             self._reject(op.OperationError(_("an operation failed because of an error in the server")))
-        if self._outbox.is_overfull:
+        if self._queue.is_overfull:
             await self._connection.close(_POLICY_VIOLATION, "the page does not read what it asked for")
 
     async def _carry_out(self, operation: op.Operation) -> None:
@@ -183,7 +183,7 @@ class Page:
     def _set_level(self, operation: op.SetLevel) -> None:
         self._context.level = operation.level
 
-    def _log_status(self, operation: op.Status) -> None:
+    def _log_status(self, operation: op.PageStatus) -> None:
         write = {"error": self._node.log.error, "warning": self._node.log.warning}
         write.get(operation.level, self._node.log.info)("%s", op.shown(operation.msg))
 

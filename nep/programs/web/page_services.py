@@ -21,7 +21,7 @@ from nep.programs.web.operations import (
     ServiceResponse,
     UnadvertiseService,
 )
-from nep.programs.web.outgoing import Form, operation_frames
+from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.rosapi import RosApi, is_rosapi
 from nep.text import bounded_str, quotable
 
@@ -88,8 +88,8 @@ class PageServices:
         }
         if operation.id is not None:
             response["id"] = operation.id
-        form = Form(operation.compression, operation.fragment_size)
-        self._context.outbox.put(operation_frames(response, form))
+        form = EncodingOptions(operation.compression, operation.fragment_size)
+        self._context.queue.put(operation_frames(response, form))
 
     # ---- serving
 
@@ -124,12 +124,12 @@ class PageServices:
         id_ = f"call:{next(self._numbers)}"
         call = {"op": "call_service", "id": id_, "service": service, "args": request}
         try:
-            frames = operation_frames(call, Form())
+            frames = operation_frames(call, EncodingOptions())
         except NepError as error:
             answer.set_exception(error)
             return
         self._pending[id_] = service, answer
-        self._context.outbox.put(frames)
+        self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
         """Hand the page's answer to who called."""

@@ -21,9 +21,9 @@ from nep.programs.web.operations import (
     Unadvertise,
     Unsubscribe,
 )
-from nep.programs.web.outbox import Feed
 from nep.programs.web.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
 from nep.programs.web.ros_definitions import bare_type, definition_of
+from nep.programs.web.send_queue import Feed
 from nep.text import quotable
 
 __all__ = ["PageTopics"]
@@ -163,7 +163,7 @@ class PageTopics:
                     operation.id,
                 )
             known.feed.subscribe(operation, as_pixels=as_pixels)
-            self._context.outbox.activate(known.feed)
+            self._context.queue.activate(known.feed)
         self._context.tell("info", _("subscribed to '{topic}'").format(topic=operation.topic), operation.id)
 
     async def _open_subscription(self, operation: Subscribe, *, as_pixels: bool) -> None:
@@ -188,7 +188,7 @@ class PageTopics:
 
     async def _read(self, subscriber: Subscriber, feed: Feed) -> None:
         async for message in subscriber:
-            self._context.outbox.add(feed, message)
+            self._context.queue.add(feed, message)
 
     async def unsubscribe(self, operation: Unsubscribe) -> None:
         """End one subscription, or all of a topic."""
@@ -204,7 +204,7 @@ class PageTopics:
 
     async def _close_subscription(self, known: _Subscription) -> None:
         known.reader.cancel()
-        self._context.outbox.remove(known.feed)
+        self._context.queue.remove(known.feed)
         await self._context.in_thread(known.subscriber.close)
 
     def cancel(self) -> None:

@@ -107,7 +107,7 @@ def _types_inside(ros_type: str) -> Iterator[str]:
 
 
 def type_definitions(ros_type: str) -> list[dict[str, object]] | None:
-    """Return a type and all types inside as rosapi's ``TypeDef``, or None when it is not known here."""
+    """Return a type and all types inside as rosapi describes them, or None when it is not known here."""
     definition = definition_of(ros_type)
     if definition is None:
         return None

@@ -17,7 +17,7 @@ from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.programs.web.operations import OperationError
-from nep.programs.web.outgoing import Form, operation_frames, publish_frames
+from nep.programs.web.outgoing import EncodingOptions, operation_frames, publish_frames
 from nep.programs.web.payloads import (
     PayloadError,
     from_ros,
@@ -41,7 +41,7 @@ def message(msg_type: str, payload: object, encoded: Encoded | None = None) -> M
 
 
 def sent(made: Message, *form: object) -> object:
-    (frame,) = publish_frames("/t", made, Form(*form))
+    (frame,) = publish_frames("/t", made, EncodingOptions(*form))
     whole = json.loads(frame.data) if frame.is_text else cbor2.loads(frame.data)
     assert (whole["op"], whole["topic"]) == ("publish", "/t")
     return whole["msg"]
@@ -60,7 +60,7 @@ def test_string_is_data_both_ways() -> None:
 def test_plain_json_passes_as_it_is() -> None:
     text = b'{"z": 1.50, "a": [1, {"b": null}]}'
     made = message("json", None, Encoded(text))
-    (frame,) = publish_frames("/t", made, Form())
+    (frame,) = publish_frames("/t", made, EncodingOptions())
     assert text in frame.data
     assert sent(message("json", None, Encoded(b'{"x": NaN}'))) == {"x": None}
     assert from_ros([1, 2], "nep/Json", "json") == [1, 2]
@@ -122,7 +122,7 @@ def test_cbor_raw_is_the_ros_message() -> None:
 def test_png_holds_the_text_and_large_ones_are_refused() -> None:
     for text in (b"{}", json.dumps({"x": "é" * 999}).encode()):
         assert text_in_png(text_as_png(text)) == text
-    packed = json.loads(publish_frames("/t", message("json", {"a": 1}), Form("png"))[0].data)
+    packed = json.loads(publish_frames("/t", message("json", {"a": 1}), EncodingOptions("png"))[0].data)
     assert json.loads(text_in_png(packed["data"]))["msg"] == {"a": 1}
     for data in ("", "é", "AAAA", text_as_png(b"\n" * 9_000_000)):
         with pytest.raises(OperationError):
@@ -130,7 +130,7 @@ def test_png_holds_the_text_and_large_ones_are_refused() -> None:
 
 
 def test_large_message_is_cut_into_fragments() -> None:
-    frames = publish_frames("/t", message("string", "é" * 1_000), Form("none", 200))
+    frames = publish_frames("/t", message("string", "é" * 1_000), EncodingOptions("none", 200))
     parts = [json.loads(each.data) for each in frames]
     assert {each["op"] for each in parts} == {"fragment"}
     assert [each["num"] for each in parts] == list(range(parts[0]["total"]))
@@ -143,14 +143,14 @@ def test_hostile_message_is_sent_or_refused(compression: str) -> None:
         for msg_type in ("json", "string", "bytes", "image", "msgpack", "geometry_msgs/Twist"):
             made = message(msg_type, None, Encoded(data))
             try:
-                publish_frames("/t", made, Form(compression))
+                publish_frames("/t", made, EncodingOptions(compression))
             except NepError:
                 continue
 
 
 def test_answer_that_has_no_json_is_refused() -> None:
     with pytest.raises(NepError):
-        operation_frames({"op": "service_response", "values": {"x": object()}}, Form())
+        operation_frames({"op": "service_response", "values": {"x": object()}}, EncodingOptions())
 
 
 def test_definitions_have_the_fields_of_neps_types() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from nep.messages.message import Message
 from nep.programs.web.operations import Subscribe
-from nep.programs.web.outbox import Feed, Outbox, Queued
 from nep.programs.web.outgoing import Frame
+from nep.programs.web.send_queue import Feed, Queued, SendQueue
 
 
 def message(number: int, *, size: int = 1) -> Message:
@@ -62,7 +62,7 @@ def test_subscriptions_of_a_page_are_combined() -> None:
 
 def test_bytes_that_wait_for_a_page_are_bounded() -> None:
     async def fill() -> None:
-        waiting, first, second = Outbox(lambda: 0.0, max_bytes=1_000), feed(), feed()
+        waiting, first, second = SendQueue(lambda: 0.0, max_bytes=1_000), feed(), feed()
         for number in range(20):
             waiting.add(first, message(number, size=100))
         waiting.add(second, message(0, size=5_000))
@@ -75,7 +75,7 @@ def test_bytes_that_wait_for_a_page_are_bounded() -> None:
 
 def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
     async def drain() -> list[object]:
-        waiting, busy, quiet = Outbox(lambda: 0.0), feed(), feed()
+        waiting, busy, quiet = SendQueue(lambda: 0.0), feed(), feed()
         for number in range(3):
             waiting.add(busy, message(number))
         waiting.add(quiet, message(9))
@@ -89,7 +89,7 @@ def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
 def test_throttled_message_is_sent_when_its_time_has_come() -> None:
     async def wait() -> float:
         loop = asyncio.get_running_loop()
-        waiting, slow = Outbox(loop.time), feed(throttle_s=0.05)
+        waiting, slow = SendQueue(loop.time), feed(throttle_s=0.05)
         waiting.add(slow, message(1))
         await waiting.take()
         began = loop.time()

@@ -1,6 +1,6 @@
 """What waits for a page: messages of topics, which can be dropped, and the rest, which can't.
 
-A `Feed` has the messages of one topic, within the wishes of the page's subscriptions. An `Outbox` has all
+A `Feed` has the messages of one topic, within the wishes of the page's subscriptions. An `SendQueue` has all
 feeds of a page and takes turns between them, so that a topic with many messages does not hold up the others.
 Used in the event loop's thread only.
 """
@@ -15,9 +15,9 @@ from typing import NamedTuple
 from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES, MAX_QUEUED_BYTES, MAX_QUEUED_MESSAGES
 from nep.programs.web.operations import COMPRESSIONS, OperationId, Subscribe
-from nep.programs.web.outgoing import Form, Frame
+from nep.programs.web.outgoing import EncodingOptions, Frame
 
-__all__ = ["Feed", "Outbox", "Queued"]
+__all__ = ["Feed", "Queued", "SendQueue"]
 
 
 class Queued(NamedTuple):
@@ -36,7 +36,7 @@ class Feed:
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
-        self.form = Form()
+        self.form = EncodingOptions()
         self.dropped_count = 0
         """Messages that the page was too slow for."""
         self.throttled_count = 0
@@ -80,7 +80,7 @@ class Feed:
         wishes = self._wishes.values()
         sizes = [each.fragment_size for each in wishes if each.fragment_size is not None]
         compression = max((each.compression for each in wishes), key=COMPRESSIONS.index)
-        self.form = Form(compression, min(sizes, default=None), as_pixels)
+        self.form = EncodingOptions(compression, min(sizes, default=None), as_pixels)
         self._throttle_s = min(each.throttle_s for each in wishes)
         longest = max(each.queue_length for each in wishes)
         self._capacity = longest or (1 if self._throttle_s else MAX_QUEUED_MESSAGES)
@@ -123,7 +123,7 @@ class Feed:
         self.size_bytes = 0
 
 
-class Outbox:
+class SendQueue:
     """Everything that waits for one page. `clock` is the event loop's; messages have `max_bytes` together."""
 
     def __init__(self, clock: Callable[[], float], max_bytes: int = MAX_QUEUED_BYTES) -> None:
