@@ -103,6 +103,10 @@ def web(
             interrupts.leave_when_told()
             while not server.wait(_SLICE_S):
                 pass  # in slices: Windows does not interrupt a wait for Ctrl+C
+            if server.problem is not None:
+                raise NepError(
+                    _("the web server ended because of an error: {reason}").format(reason=server.problem)
+                )
         finally:
             server.close()
             _say_ended(server, terminal)

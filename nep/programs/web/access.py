@@ -26,6 +26,7 @@ __all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token"]
 _CLOCK_TOLERANCE_S = 5
 """As rosauth has it: so much may the clocks of the two sides differ."""
 _MAX_REMEMBERED = 1_000
+_DEFAULT_PORTS = {"http": 80, "https": 443}
 
 
 def new_token() -> str:
@@ -46,23 +47,24 @@ def is_own_host(host: str) -> bool:
 def checked_origin(origin: str) -> str:
     """Return `origin` as browsers write it. Raises `NepError` for what is none.
 
-    "null" is the origin of pages that were opened as files, and of every sandboxed frame of any page.
+    "null" is the origin of pages that were opened as files, and of every sandboxed frame of any page;
+    "file://" is that of desktop programs, such as Lichtblick's.
     """
-    if origin == "null":
+    if origin in {"null", "file://"}:
         return origin
     try:
         parts = urlsplit(origin)
-        is_origin = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.path in {"", "/"}
         port = parts.port
     except ValueError:
-        is_origin, parts, port = False, urlsplit(""), None
+        parts, port = urlsplit(""), None
+    is_origin = parts.scheme in _DEFAULT_PORTS and bool(parts.hostname) and parts.path in {"", "/"}
     if not is_origin or parts.query or parts.fragment or parts.username:
         raise NepError(
             _("'{origin}' is no origin of a page; write it as 'http://192.168.1.5:8000'").format(
                 origin=quotable(origin)
             )
         )
-    is_usual = port is None or port == {"http": 80, "https": 443}[parts.scheme]
+    is_usual = port is None or port == _DEFAULT_PORTS[parts.scheme]
     host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
     return f"{parts.scheme}://{host}" if is_usual else f"{parts.scheme}://{host}:{port}"
 

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from nep.errors import NepError
-from nep.i18n import _
+from nep.i18n import _, ngettext
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
@@ -128,7 +128,11 @@ class Page:
 
     def _tell_dropped(self, topic: str, count: int) -> None:
         self._counts.dropped += count
-        said = _("this page is too slow: {count} messages of '{topic}' were dropped")
+        said = ngettext(
+            "this page is too slow: {count} message of '{topic}' was dropped",
+            "this page is too slow: {count} messages of '{topic}' were dropped",
+            count,
+        )
         self._context.tell("warning", said.format(count=count, topic=topic))
 
     # ---- operations

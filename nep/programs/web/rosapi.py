@@ -27,6 +27,7 @@ PREFIX = "/rosapi/"
 _HIDDEN = "/nep/"
 _GRAPH_TIMEOUT_S = 2.0
 _PARAMETER_TIMEOUT_S = 2.0
+_NAMES_TIMEOUT_S = 5.0
 _MAX_NODES_ASKED = 50
 _NS = 1_000_000_000
 
@@ -188,7 +189,10 @@ class RosApi:
         """Names of all parameters of nodes that answer."""
         able = [each for each in self._view.nodes.values() if place_of(each.id) in self._view.services]
         names: list[str] = []
+        deadline = time.monotonic() + _NAMES_TIMEOUT_S
         for each in able[:_MAX_NODES_ASKED]:
+            if time.monotonic() > deadline:
+                break
             try:
                 with self._node.parameters_of(each.id, _PARAMETER_TIMEOUT_S) as remote:
                     names += [f"{each.name}:{bounded_str(known.get('name'))}" for known in remote.list()]

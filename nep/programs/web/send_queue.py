@@ -19,6 +19,9 @@ from nep.programs.web.outgoing import EncodingOptions, Frame
 
 __all__ = ["Feed", "Queued", "SendQueue"]
 
+_MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4
+"""Latched messages of a topic that are kept for further subscriptions of a page."""
+
 
 class Queued(NamedTuple):
     """A message and its feed."""
@@ -88,13 +91,17 @@ class Feed:
     def add(self, message: Message) -> None:
         """Append a message; drop the oldest beyond the queue's length."""
         if message.is_latched:
-            self._latched[message.publisher] = message
-            while len(self._latched) > 8:
-                del self._latched[next(iter(self._latched))]
+            self._keep_latched(message)
         self._messages.append(message)
         self.size_bytes += message.size_bytes
         while len(self._messages) > self._capacity:
             self.drop_oldest()
+
+    def _keep_latched(self, message: Message) -> None:
+        self._latched.pop(message.publisher, None)
+        self._latched[message.publisher] = message
+        while sum(each.size_bytes for each in self._latched.values()) > _MAX_LATCHED_BYTES:
+            del self._latched[next(iter(self._latched))]
 
     def drop_oldest(self) -> None:
         """Drop one message, and count it."""

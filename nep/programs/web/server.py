@@ -120,6 +120,11 @@ class WebServer:
             raise self._problem
         return self
 
+    @property
+    def problem(self) -> Exception | None:
+        """Why it ended by itself, None when it did not."""
+        return self._problem
+
     def wait(self, timeout_s: float) -> bool:
         """Wait until it has ended, `timeout_s` at most; whether it has."""
         self._thread.join(timeout_s)

@@ -43,7 +43,8 @@ def test_page_connects_only_from_an_allowed_origin(origin: str | None, is_allowe
 
 def test_origin_is_written_as_browsers_write_it() -> None:
     assert checked_origin("HTTP://Example.ORG:80/") == "http://example.org"
-    assert Access({"null"}).origin_refusal("null") == ""
+    for origin in ("null", "file://"):
+        assert Access({checked_origin(origin)}).origin_refusal(origin) == ""
     for wrong in ("example.org", "ws://example.org", "http://", "*", "http://a/b", "http://a?b"):
         with pytest.raises(NepError):
             checked_origin(wrong)
