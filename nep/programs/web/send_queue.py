@@ -63,7 +63,7 @@ class Feed:
     def subscribe(self, wish: Subscribe, *, as_pixels: bool) -> None:
         """Add or replace a subscription; a further one gets what is latched, which the first one had."""
         if self._wishes and wish.id not in self._wishes:
-            for each in self._latched.values():
+            for each in tuple(self._latched.values()):
                 self.add(each)
         self._wishes[wish.id] = wish
         self._combine(as_pixels=as_pixels)

@@ -49,11 +49,13 @@ def test_command_serves_with_a_token_and_ends_when_told(master: Master, tmp_path
 def test_command_says_what_to_do_when_it_cannot_serve(
     master: Master, taken_port: int, tmp_path: Path, type_in: TypeIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        free_port = str(probe.getsockname()[1])
     short = tmp_path / "short"
     short.write_text("1234")
     for words, hint in (
         (("--port", str(taken_port)), "--port"),
-        (("--port", str(taken_port), "--listen", "192.0.2.7"), "192.0.2.7"),
+        (("--port", free_port, "--listen", "192.0.2.7"), "192.0.2.7"),
         (("--listen", "http://x"), "URL"),
         (("--origin", "example.org"), "http://192.168.1.5:8000"),
         (("--token", str(short)), str(short)),
