@@ -33,7 +33,7 @@ MAX_SUBSCRIPTION_IDS = 100
 """Subscriptions of one page to one topic."""
 MAX_SERVICES = 100
 """Services that a page serves, and as many again that it calls."""
-MAX_CALLS = 1_000
+MAX_CALLS = 500
 """Calls of a page that are in flight, and as many again that it has to answer."""
 CALL_TIMEOUT_S = 10.0
 MAX_CALL_TIMEOUT_S = 3_600.0

@@ -60,6 +60,7 @@ Level = Literal["info", "warning", "error", "none"]
 COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
 """In the order in which they win when two subscriptions of a page to one topic differ."""
 LEVELS: tuple[Level, ...] = ("info", "warning", "error", "none")
+_RESERVED = "/nep/"
 _MAX_NUMBER = 2**53
 _MAX_THROTTLE_MS = 3_600_000
 
@@ -295,6 +296,22 @@ class _Fields:
         except BadTopicError as error:
             raise self.error(str(error)) from None
 
+    def type_name(self, default: str | None = None) -> str:
+        """The name of a type, "" for none if that may be."""
+        given = self.text("type", default)
+        try:
+            return check_topic(given) if given else given
+        except BadTopicError as error:
+            raise self.error(_("'type' is refused: {reason}").format(reason=error.reason)) from None
+
+    def own_name(self, name: str) -> str:
+        """The name of a topic or a service that the page makes."""
+        given = self.topic(name)
+        if given.startswith(_RESERVED):
+            said = _("names below '{prefix}' are NEP's own; choose another")
+            raise self.error(said.format(prefix=_RESERVED))
+        return given
+
     def number(self, name: str, default: int | None, least: int, most: int) -> int:
         """A whole number, also as the float that some programs send; required without a default."""
         value = self._fields.get(name)
@@ -364,18 +381,18 @@ def _operation(fields: _Fields) -> Operation:
 
 def _advertise(fields: _Fields) -> Operation:
     is_latched = fields.get("latch") is True
-    return Advertise(fields.id, fields.topic("topic"), fields.text("type"), is_latched)
+    return Advertise(fields.id, fields.own_name("topic"), fields.type_name(), is_latched)
 
 
 def _publish(fields: _Fields) -> Operation:
-    return Publish(fields.id, fields.topic("topic"), fields.get("msg", {}))
+    return Publish(fields.id, fields.own_name("topic"), fields.get("msg", {}))
 
 
 def _subscribe(fields: _Fields) -> Operation:
     return Subscribe(
         fields.id,
         fields.topic("topic"),
-        fields.text("type", ""),
+        fields.type_name(""),
         fields.number("throttle_rate", 0, 0, _MAX_THROTTLE_MS) / 1000,
         min(fields.number("queue_length", 0, 0, _MAX_NUMBER), MAX_QUEUED_MESSAGES),
         fields.fragment_size(),
@@ -442,7 +459,7 @@ _READERS = {
     "unsubscribe": lambda fields: Unsubscribe(fields.id, fields.topic("topic")),
     "call_service": _call_service,
     "advertise_service": lambda fields: AdvertiseService(
-        fields.id, fields.topic("service"), fields.text("type", "")
+        fields.id, fields.own_name("service"), fields.type_name("")
     ),
     "unadvertise_service": lambda fields: UnadvertiseService(fields.id, fields.topic("service")),
     "service_response": _service_response,

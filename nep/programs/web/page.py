@@ -55,12 +55,13 @@ class Page:
         self._counts = counts
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
         self._node = new_node(name)
-        self._queue = SendQueue(asyncio.get_running_loop().time)
+        self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
         self._context = PageContext(self._node, self._queue, self._thread, guard, counts)
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
         self._rejected = 0
+        self._closing: asyncio.Task[None] | None = None
         self._carriers: dict[type, Callable[[Any], Awaitable[None] | None]] = {
             op.Publish: self._topics.publish,
             op.Advertise: self._topics.advertise,
@@ -95,6 +96,12 @@ class Page:
             self._services.cancel()
             self._thread.submit(self._node.close, _NODE_CLOSE_S)
             await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
+
+    def _end_slow(self) -> None:
+        _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
+        self._closing = asyncio.create_task(
+            self._connection.close(_POLICY_VIOLATION, "the page does not read its answers")
+        )
 
     def _announce(self) -> None:
         """In the page's thread: a node is in the graph once it has something, if only its log."""
@@ -149,8 +156,6 @@ class Page:
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
             self._reject(op.OperationError(_("an operation failed because of an error in the server")))
-        if self._queue.is_overfull:
-            await self._connection.close(_POLICY_VIOLATION, "the page does not read what it asked for")
 
     async def _carry_out(self, operation: op.Operation) -> None:
         for _nested in range(MAX_NESTED_OPERATIONS):

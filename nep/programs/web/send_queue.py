@@ -131,9 +131,21 @@ class Feed:
 
 
 class SendQueue:
-    """Everything that waits for one page. `clock` is the event loop's; messages have `max_bytes` together."""
+    """Everything that waits for one page.
 
-    def __init__(self, clock: Callable[[], float], max_bytes: int = MAX_QUEUED_BYTES) -> None:
+    `clock` is the event loop's. Messages of topics have `max_bytes` together. `on_overflow` is called once,
+    when more waits than may of what can't be dropped: the page does not read, and gets nothing any more.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        on_overflow: Callable[[], object] = lambda: None,
+        *,
+        max_bytes: int = MAX_QUEUED_BYTES,
+    ) -> None:
+        self._on_overflow = on_overflow
+        self._is_overfull = False
         self._max_bytes = max_bytes
         self._clock = clock
         self._frames: deque[Frame] = deque()
@@ -141,23 +153,28 @@ class SendQueue:
         self._active: deque[Feed] = deque()
         self._is_filled = asyncio.Event()
 
-    @property
-    def is_overfull(self) -> bool:
-        """Whether more waits than may, of what can't be dropped."""
-        return self._frames_bytes > MAX_CONTROL_BYTES
-
     def put(self, frames: list[Frame]) -> None:
         """Append messages that can't be dropped."""
+        if self._is_overfull:
+            return
         self._frames.extend(frames)
         self._frames_bytes += sum(len(each.data) for each in frames)
         self._is_filled.set()
+        if self._frames_bytes > MAX_CONTROL_BYTES and len(self._frames) > len(frames):
+            self._is_overfull = True
+            self._on_overflow()
 
     def add(self, feed: Feed, message: Message) -> None:
-        """Append a message of a topic."""
+        """Append a message of a topic; beyond the limit the oldest of the largest feed is dropped."""
         feed.add(message)
-        while len(feed) > 1 and sum(each.size_bytes for each in self._active) > self._max_bytes:
-            feed.drop_oldest()
         self.activate(feed)
+        while sum(each.size_bytes for each in self._active) > self._max_bytes:
+            largest = max(self._active, key=lambda each: (len(each) > 1, each.size_bytes))
+            if len(self._active) == 1 and len(largest) == 1:
+                return  # larger than the limit by itself, and the only one
+            largest.drop_oldest()
+            if not len(largest):
+                self._active.remove(largest)
 
     def activate(self, feed: Feed) -> None:
         """Serve a feed that may have messages."""

@@ -85,6 +85,14 @@ def test_operation_beyond_a_limit_is_refused_before_it_is_parsed() -> None:
     with pytest.raises(op.OperationError) as raised:
         parsed(op="subscribe", id="s", topic="/t", compression="zip")
     assert raised.value.id == "s"
+    for wrong in (
+        {"op": "advertise", "topic": "/t", "type": "a\x1b[31m/B"},
+        {"op": "advertise", "topic": "/nep/log", "type": "nep/Json"},
+        {"op": "publish", "topic": "/nep/log", "msg": {}},
+        {"op": "advertise_service", "service": "/nep/parameters/0", "type": ""},
+    ):
+        with pytest.raises(op.OperationError):
+            parsed(**wrong)
     small = parsed(op="subscribe", topic="/t", fragment_size=1)
     assert isinstance(small, op.Subscribe)
     assert small.fragment_size == MIN_FRAGMENT_SIZE

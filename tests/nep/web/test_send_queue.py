@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from nep.messages.message import Message
+from nep.programs.web.limits import MAX_CONTROL_BYTES
 from nep.programs.web.operations import Subscribe
 from nep.programs.web.outgoing import Frame
 from nep.programs.web.send_queue import Feed, Queued, SendQueue
@@ -65,10 +66,14 @@ def test_bytes_that_wait_for_a_page_are_bounded() -> None:
         waiting, first, second = SendQueue(lambda: 0.0, max_bytes=1_000), feed(), feed()
         for number in range(20):
             waiting.add(first, message(number, size=100))
+        assert (first.size_bytes, first.dropped_count) == (1_000, 10)
+        waiting.add(second, message(0, size=600))
+        assert (first.size_bytes, second.size_bytes) == (400, 600)
         waiting.add(second, message(0, size=5_000))
-        assert first.size_bytes <= 1_000
+        assert first.size_bytes + second.size_bytes <= 1_000
+        waiting.remove(first)
+        waiting.add(second, message(0, size=5_000))  # by itself it is sent
         assert len(second) == 1
-        assert first.dropped_count == 10
 
     asyncio.run(fill())
 
@@ -84,6 +89,18 @@ def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
         return [each.message.seq if isinstance(each, Queued) else each.data for each in taken]
 
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
+
+
+def test_page_that_reads_no_answers_is_ended_once() -> None:
+    async def fill() -> int:
+        ended: list[bool] = []
+        waiting = SendQueue(lambda: 0.0, lambda: ended.append(True))
+        for _number in range(40):
+            waiting.put([Frame(b"x" * 2**20, is_text=True)])
+        assert waiting._frames_bytes <= MAX_CONTROL_BYTES + 2**20
+        return len(ended)
+
+    assert asyncio.run(fill()) == 1
 
 
 def test_throttled_message_is_sent_when_its_time_has_come() -> None:
