@@ -188,7 +188,10 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     if extension:
         raise WireError(_("a '{name}' has no room for an extension").format(name=ros_type), len(data))
     if codec == "image" and ros_type == _COMPRESSED and _magic(data):
-        return to_ros(ros_type, codec, Encoded(data, picture_info(data)))
+        known = picture_info(data)
+        if known is None:
+            raise EncodeError("image", type(data).__name__, _("they are no picture that can be read"))
+        return to_ros(ros_type, codec, Encoded(data, known))
     if codec in {"ros", "image"}:
         return bytes(data)
     size = _LENGTH.pack(len(data))
@@ -196,7 +199,7 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
 
 
 def _magic(data: bytes | memoryview) -> bool:
-    return bytes(data[:2]) == b"\xff\xd8" or bytes(data[:4]) == b"\x89PNG"
+    return bytes(data[:3]) == b"\xff\xd8\xff" or bytes(data[:4]) == b"\x89PNG"
 
 
 def _now() -> bytes:

@@ -27,6 +27,7 @@ from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
+from nep.messages.image_files import examine
 from nep.messages.message import Message
 from nep.programs.web.ros_definitions import JSON_TYPE, MSGPACK_TYPE, bare_type, definition_of, full_text
 from nep.text import bounded_str, escaped
@@ -117,7 +118,7 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
 
 def _picture(message: Message, ros_type: str) -> bytes:
     """A picture as ROS bytes with the time at which it was published."""
-    encoded = Encoded(message.data, dict(message.extension) or image_codec.picture_info(message.data))
+    encoded = Encoded(message.data, dict(message.extension) or examine(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
     if ros_type == _FILE and layout is not None:
         encoded = image_codec.encode(message.payload)

@@ -206,6 +206,12 @@ def test_bodies_that_are_no_such_message_are_refused() -> None:
     assert bytes(read(memoryview(labelled))[0]) == b"yz", "the data begins where data_offset says"
 
 
+def test_picture_that_cannot_be_read_is_refused() -> None:
+    for data in (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"):
+        with pytest.raises(EncodeError):
+            to_ros("sensor_msgs/CompressedImage", "image", Encoded(data))
+
+
 def test_an_extension_has_no_room() -> None:
     with pytest.raises(WireError, match="a 'std_msgs/String' has no room for an extension"):
         to_ros("std_msgs/String", "json", Encoded(b"{}", {"a": 1}))
