@@ -208,7 +208,7 @@ def test_bodies_that_are_no_such_message_are_refused() -> None:
 
 def test_picture_that_cannot_be_read_is_refused() -> None:
     for data in (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"):
-        with pytest.raises(EncodeError):
+        with pytest.raises(nep.EncodeError):
             to_ros("sensor_msgs/CompressedImage", "image", Encoded(data))
 
 

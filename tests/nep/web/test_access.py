@@ -32,6 +32,7 @@ from nep.programs.web.server import WebServer, WebSettings, node_name
         ("", False),
         ("\x1b[31m", False),
         ("http://[::1", False),
+        ("http://local\thost:8000", False),
         ("http://localhost:99999", False),
     ],
 )
