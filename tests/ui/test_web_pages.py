@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QUrl
@@ -17,6 +19,7 @@ from nep.sensor import LaserScan
 from tests.interop.conftest import Peers
 
 pytestmark = [pytest.mark.web, pytest.mark.interop, pytest.mark.timeout(600)]
+GUIDE = Path(__file__).parents[2] / "docs/web.md"
 PAGE = """<!doctype html><title>waiting</title><script>%s</script><script>
 const seen = {};
 const told = (name, value) => { seen[name] = value; document.title = JSON.stringify(seen); };
@@ -84,5 +87,29 @@ def test_page_of_this_computer_talks_and_one_of_another_site_is_refused(
         assert heard.listen(timeout_s=30) == (True, "from the page")
         (name,) = server.page_names
         assert name.startswith("web_localhost:8000_")
+        page.setHtml("")
+        qtbot.waitUntil(lambda: not server.page_names)
+
+
+def test_page_of_the_guide_shows_messages_and_sends_clicks(
+    qtbot: QtBot, page: QWebEnginePage, node: nep.Node, master: Master, roslib: str
+) -> None:
+    found = re.search(r"```html\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
+    assert found is not None
+    node.new_pub("/chatter", "string", latched=True).publish("hello")
+    clicks = node.new_sub("/button")
+    with WebServer(WebSettings(port=0, master=master.address)) as server:
+        html = found[1].replace("ws://127.0.0.1:9090", server.url)
+        html = html.replace('<script src="roslib.min.js"></script>', f"<script>{roslib}</script>")
+        page.setHtml(html, QUrl("http://localhost:8000/"))
+        texts: list[str] = []
+
+        def is_shown() -> bool:
+            page.toPlainText(texts.append)
+            return "hello" in texts
+
+        qtbot.waitUntil(is_shown)
+        page.runJavaScript("document.body.click()")
+        assert clicks.listen(timeout_s=30) == (True, {"pressed": True})
         page.setHtml("")
         qtbot.waitUntil(lambda: not server.page_names)

@@ -37,7 +37,7 @@ def test_page_is_a_node_until_it_goes(server: WebServer, node: nep.Node, open_pa
     eventually(lambda: name in {each.name for each in node.graph().nodes.values()})
     page.connection.socket.shutdown(socket.SHUT_RDWR)  # as a tab that crashes
     eventually(lambda: name not in {each.name for each in node.graph().nodes.values()})
-    assert server.page_names == ()
+    eventually(lambda: server.page_names == ())
 
 
 def test_page_publishes_and_subscribes(node: nep.Node, page: Peer) -> None:
@@ -211,13 +211,11 @@ def test_hostile_operations_end_neither_page_nor_server(
             text = bytearray(json.dumps(fields).encode())
             text[chance.randrange(len(text))] = chance.randrange(256)
             page.connection.send(bytes(text))
-    operations = server.counts.operations
-    assert operations > 0
+    eventually(lambda: server.counts.rejected > 100)
     with connect(server.url) as other:
         assert Peer(other).call("/s", x=1)["values"] == {"x": 1}
     page.connection.close()
     drain.join()
-    assert server.counts.rejected > 100
 
 
 def test_message_beyond_the_limit_closes_the_page_alone(server: WebServer, open_page: Open) -> None:
