@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import logging
+import socket
 import threading
 from collections.abc import Collection
 from concurrent.futures import ThreadPoolExecutor
@@ -113,6 +114,8 @@ class WebServer:
         check_installed()
         if self.settings.is_open and not self.settings.access.token:
             raise NepError(_("a web server that other computers can reach needs a token"))
+        for host in self.settings.listen:
+            check_own_address(host)
         self._thread.start()
         self._started.wait()
         if self._problem is not None:
@@ -194,8 +197,6 @@ class WebServer:
         address = f"{', '.join(self.settings.hosts)}:{self.settings.port}"
         if error.errno == errno.EADDRINUSE:
             return AddressInUseError(address)
-        if error.errno == errno.EADDRNOTAVAIL:
-            return NepError(str(AddressInUseError(", ".join(self.settings.listen), is_own=False)))
         if error.errno is not None and is_lack(error.errno):
             return TooManyFilesError("a web server", opened(), limit())
         if isinstance(error, PermissionError):
@@ -297,6 +298,18 @@ def check_installed() -> None:
         raise NepError(
             _("the web server is not installed; install it with: pip install 'nep-studio[web]'")
         ) from error
+
+
+def check_own_address(host: str) -> None:
+    """Raise `NepError` for an address that this computer doesn't have.
+
+    asyncio of Python 3.13 leaves out such an address without an error while another one can be bound.
+    """
+    try:
+        with socket.socket() as probe:
+            probe.bind((host, 0))
+    except OSError as error:
+        raise NepError(str(AddressInUseError(host, is_own=False))) from error
 
 
 def node_name(origin: str | None, address: str) -> str:
