@@ -28,10 +28,6 @@ const steps = {
   ask: async ([method, ...given]) => got(await answered(ros[method], ...given)),
   getParam: ([name]) => new ROSLIB.Param({ ros, name }).get(got, (reason) => got({ failed: reason })),
   setParam: ([name, value]) => new ROSLIB.Param({ ros, name }).set(value, () => got("set"), (reason) => got({ failed: reason })),
-  echo: ([name, back, type, rest]) => {
-    const answers = topic(back, type);
-    topic(name, type, rest).subscribe((msg) => answers.publish(msg));
-  },
 };
 createInterface({ input: process.stdin }).on("line", (line) => {
   const [step, ...given] = JSON.parse(line);
