@@ -1,0 +1,4 @@
+using System.Runtime.CompilerServices;
+
+[assembly: InternalsVisibleTo("Nep.Tests")]
+[assembly: InternalsVisibleTo("ZmtpPeer")]

@@ -1,0 +1,199 @@
+using System;
+using System.Net;
+using System.Net.Sockets;
+using System.Threading;
+
+namespace Nep.Zmtp
+{
+    /// <summary>What a <see cref="Connector"/> tells its owner, in the connector's thread.</summary>
+    internal interface IConnectorOwner
+    {
+        /// <summary>The handshake is over. Nothing was sent yet but what the owner sends now.</summary>
+        void Connected(Connector connector, Connection connection);
+
+        void Received(Connector connector, byte[][] parts);
+
+        /// <summary>The connection ended; another attempt follows unless the connector was closed.</summary>
+        void Disconnected(Connector connector, string reason);
+    }
+
+    /// <summary>Keeps one outgoing connection: dials, reads, and dials again with growing waits, in a background thread.</summary>
+    internal sealed class Connector
+    {
+        private readonly ZmtpEndpoint _endpoint;
+        private readonly string _socketType;
+        private readonly ZmtpLimits _limits;
+        private readonly MechanismFactory _mechanism;
+        private readonly IConnectorOwner _owner;
+        private readonly CloseCounter _refused;
+        private readonly ManualResetEvent _stop = new ManualResetEvent(false);
+        private readonly Random _random;
+        private readonly Thread _thread;
+        private volatile Connection _connection;
+        private int _waitMs;
+
+        public Connector(ZmtpEndpoint endpoint, string socketType, ZmtpLimits limits, MechanismFactory mechanism,
+            IConnectorOwner owner, CloseCounter refused)
+        {
+            _endpoint = endpoint;
+            _socketType = socketType;
+            _limits = limits;
+            _mechanism = mechanism;
+            _owner = owner;
+            _refused = refused;
+            _random = new Random(unchecked(Environment.TickCount * 31 + endpoint.Port));
+            _waitMs = limits.MinReconnectMs;
+            _thread = new Thread(Run, 256 * 1024) { IsBackground = true, Name = "nep " + socketType.ToLowerInvariant() };
+        }
+
+        /// <summary>Data of the owner.</summary>
+        public object Tag { get; set; }
+
+        /// <summary>The connection after its handshake, or null.</summary>
+        public Connection Connection
+        {
+            get { return _connection; }
+        }
+
+        public void Start()
+        {
+            _thread.Start();
+        }
+
+        /// <summary>Queue a message; false when there is no connection or its queue is full.</summary>
+        public bool Send(EncodedMessage message)
+        {
+            Connection connection = _connection;
+            return connection != null && connection.Send(message);
+        }
+
+        /// <summary>End it. Does not wait; nothing is told to the owner from another connection after this.</summary>
+        public void Close()
+        {
+            _stop.Set();
+            Connection connection = _connection;
+            if (connection != null)
+            {
+                connection.Close();
+            }
+        }
+
+        /// <summary>Wait for the thread, unless it is the caller's.</summary>
+        public void Join(int timeoutMs)
+        {
+            if (Thread.CurrentThread != _thread)
+            {
+                _thread.Join(timeoutMs);
+            }
+        }
+
+        private bool IsStopped
+        {
+            get { return _stop.WaitOne(0); }
+        }
+
+        private void Run()
+        {
+            while (!IsStopped)
+            {
+                Connection connection = null;
+                string reason;
+                bool wasReady = false;
+                try
+                {
+                    connection = new Connection(Dial(), _socketType, false, _limits, _mechanism);
+                    connection.Handshake();
+                    _connection = connection;
+                    if (IsStopped)
+                    {
+                        break;
+                    }
+                    wasReady = true;
+                    _owner.Connected(this, connection);
+                    _waitMs = _limits.MinReconnectMs;
+                    while (true)
+                    {
+                        _owner.Received(this, connection.ReadMessage());
+                    }
+                }
+                catch (ZmtpException exception)
+                {
+                    _refused.Add(exception.Code);
+                    reason = exception.Message;
+                }
+                catch (ConnectionClosedException exception)
+                {
+                    reason = exception.Message;
+                }
+                catch (SocketException exception)
+                {
+                    reason = exception.Message;
+                }
+                catch (ObjectDisposedException)
+                {
+                    reason = "this side closed the connection";
+                }
+                catch (Exception exception) // whatever a peer sends, the thread goes on
+                {
+                    _refused.Add("unexpected-" + exception.GetType().Name);
+                    reason = exception.Message;
+                }
+                _connection = null;
+                if (connection != null)
+                {
+                    connection.Close();
+                }
+                if (wasReady)
+                {
+                    _owner.Disconnected(this, reason);
+                }
+                _stop.WaitOne(NextWaitMs());
+            }
+            Connection last = _connection;
+            _connection = null;
+            if (last != null)
+            {
+                last.Close();
+            }
+        }
+
+        /// <summary>Grows to the limit; a quarter of it is random, so that clients do not dial in step.</summary>
+        private int NextWaitMs()
+        {
+            int wait = _waitMs;
+            _waitMs = Math.Min(_limits.MaxReconnectMs, _waitMs * 2);
+            return wait - wait / 8 + _random.Next(wait / 4 + 1);
+        }
+
+        private Socket Dial()
+        {
+            SocketException problem = null;
+            foreach (IPAddress address in _endpoint.Resolve())
+            {
+                var socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp);
+                try
+                {
+                    IAsyncResult pending = socket.BeginConnect(new IPEndPoint(address, _endpoint.Port), null, null);
+                    int ended = WaitHandle.WaitAny(new[] { pending.AsyncWaitHandle, _stop }, _limits.ConnectTimeoutMs);
+                    if (ended == 0)
+                    {
+                        socket.EndConnect(pending);
+                        return socket;
+                    }
+                    socket.Close();
+                    problem = new SocketException((int)SocketError.TimedOut);
+                }
+                catch (SocketException exception)
+                {
+                    socket.Close();
+                    problem = exception;
+                }
+                if (IsStopped)
+                {
+                    break;
+                }
+            }
+            throw problem ?? new SocketException((int)SocketError.HostNotFound);
+        }
+    }
+}

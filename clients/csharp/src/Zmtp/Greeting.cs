@@ -1,0 +1,52 @@
+using System.Text;
+
+namespace Nep.Zmtp
+{
+    /// <summary>The 64 bytes that open a connection (ZMTP 3.0, section "Greeting").</summary>
+    internal static class Greeting
+    {
+        public const int Size = 64;
+        private const int MechanismAt = 12;
+        private const int MechanismBytes = 20;
+        private const int AsServerAt = 32;
+
+        public static byte[] Create(string mechanism, bool isServer)
+        {
+            var greeting = new byte[Size];
+            greeting[0] = 0xFF;
+            greeting[9] = 0x7F;
+            greeting[10] = 3; // 3.0: a libzmq peer then sends subscriptions as messages
+            Encoding.ASCII.GetBytes(mechanism, 0, mechanism.Length, greeting, MechanismAt);
+            greeting[AsServerAt] = isServer ? (byte)1 : (byte)0;
+            return greeting;
+        }
+
+        /// <summary>Check what is there of a peer's greeting.</summary>
+        /// <exception cref="ZmtpException">It is no ZMTP 3 greeting or names another mechanism.</exception>
+        public static void Check(byte[] greeting, int count, string mechanism)
+        {
+            if (count >= 1 && greeting[0] != 0xFF || count >= 10 && (greeting[9] & 1) != 1)
+            {
+                throw new ZmtpException("no-greeting", "the peer does not speak ZMTP");
+            }
+            if (count >= 11 && greeting[10] < 3)
+            {
+                throw new ZmtpException("old-version", "the peer speaks ZMTP " + greeting[10] + ", 3 is needed");
+            }
+            if (count < Size)
+            {
+                return;
+            }
+            int end = MechanismAt;
+            while (end < MechanismAt + MechanismBytes && greeting[end] != 0)
+            {
+                end++;
+            }
+            string theirs = Encoding.ASCII.GetString(greeting, MechanismAt, end - MechanismAt);
+            if (theirs != mechanism)
+            {
+                throw new ZmtpException("other-mechanism", "the peer uses another security mechanism");
+            }
+        }
+    }
+}

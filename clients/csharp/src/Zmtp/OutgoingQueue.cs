@@ -1,0 +1,274 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Net.Sockets;
+using System.Threading;
+
+namespace Nep.Zmtp
+{
+    /// <summary>Messages on their way out of one connection. Bounded; drops the newest. Thread-safe.</summary>
+    /// <remarks>
+    /// The caller's thread writes as much as the socket takes at once; what is left is written by a thread that is
+    /// started when it is first needed.
+    /// </remarks>
+    internal sealed class OutgoingQueue
+    {
+        private const int JoinBytes = 65536;
+
+        private readonly object _lock = new object();
+        private readonly Queue<EncodedMessage> _waiting = new Queue<EncodedMessage>();
+        private readonly Socket _socket;
+        private readonly ZmtpLimits _limits;
+        private readonly Action<string> _onFailure;
+        private ArraySegment<byte>[] _current;
+        private int _segment;
+        private int _offset;
+        private long _bytes;
+        private bool _isWriting;
+        private bool _threadMayWrite;
+        private bool _hasThread;
+        private bool _isClosed;
+
+        public OutgoingQueue(Socket socket, ZmtpLimits limits, Action<string> onFailure)
+        {
+            _socket = socket;
+            _limits = limits;
+            _onFailure = onFailure;
+        }
+
+        /// <summary>Messages that were dropped because the queue was full.</summary>
+        public long Dropped { get; private set; }
+
+        /// <summary>Bytes that the socket has not taken yet.</summary>
+        public long Bytes
+        {
+            get
+            {
+                lock (_lock)
+                {
+                    return _bytes;
+                }
+            }
+        }
+
+        /// <summary>Queue a message; false when it was dropped.</summary>
+        public bool Send(EncodedMessage message)
+        {
+            lock (_lock)
+            {
+                if (_isClosed)
+                {
+                    return false;
+                }
+                bool fits = _bytes <= _limits.AlwaysQueueBelowBytes || _bytes + message.Bytes <= _limits.MaxQueuedBytes;
+                if (!fits || _waiting.Count >= _limits.MaxQueuedMessages)
+                {
+                    Dropped++;
+                    return false;
+                }
+                _waiting.Enqueue(message);
+                _bytes += message.Bytes;
+                if (_isWriting)
+                {
+                    return true;
+                }
+                _isWriting = true;
+            }
+            if (!Write())
+            {
+                HandOver();
+            }
+            return true;
+        }
+
+        /// <summary>Wait until the socket has taken everything; false when it has not in time.</summary>
+        public bool Flush(int timeoutMs)
+        {
+            var watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (_bytes > 0 && !_isClosed)
+                {
+                    int left = timeoutMs - (int)watch.ElapsedMilliseconds;
+                    if (left <= 0 || !Monitor.Wait(_lock, left))
+                    {
+                        return _bytes == 0;
+                    }
+                }
+                return _bytes == 0;
+            }
+        }
+
+        /// <summary>Drop what waits and end the thread.</summary>
+        public void Close()
+        {
+            lock (_lock)
+            {
+                _isClosed = true;
+                _waiting.Clear();
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        /// <summary>Write until there is nothing more (true) or the socket is full (false). The caller owns the writing.</summary>
+        private bool Write()
+        {
+            try
+            {
+                while (_current != null || TakeNext())
+                {
+                    ArraySegment<byte> segment = _current[_segment];
+                    SocketError error;
+                    int sent = _socket.Send(segment.Array, segment.Offset + _offset, segment.Count - _offset, SocketFlags.None, out error);
+                    if (error == SocketError.WouldBlock || error == SocketError.NoBufferSpaceAvailable)
+                    {
+                        return false;
+                    }
+                    if (error == SocketError.Interrupted)
+                    {
+                        continue;
+                    }
+                    if (error != SocketError.Success)
+                    {
+                        Fail(error.ToString());
+                        return true;
+                    }
+                    Written(sent, segment.Count);
+                }
+            }
+            catch (ObjectDisposedException)
+            {
+                Fail("closed");
+            }
+            catch (SocketException exception)
+            {
+                Fail(exception.SocketErrorCode.ToString());
+            }
+            return true;
+        }
+
+        private void Written(int sent, int size)
+        {
+            _offset += sent;
+            if (_offset == size)
+            {
+                _offset = 0;
+                if (++_segment == _current.Length)
+                {
+                    _current = null;
+                }
+            }
+            lock (_lock)
+            {
+                _bytes -= sent;
+                if (_bytes == 0)
+                {
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        /// <summary>The next message, or several small ones in one buffer; false ends the writing.</summary>
+        private bool TakeNext()
+        {
+            lock (_lock)
+            {
+                if (_isClosed || _waiting.Count == 0)
+                {
+                    _isWriting = false;
+                    _threadMayWrite = false;
+                    Monitor.PulseAll(_lock);
+                    return false;
+                }
+                _segment = 0;
+                EncodedMessage first = _waiting.Dequeue();
+                _current = IsSmall(first) && _waiting.Count > 0 && IsSmall(_waiting.Peek()) ? Join(first) : first.Segments;
+                return true;
+            }
+        }
+
+        private static bool IsSmall(EncodedMessage message)
+        {
+            return message.Segments.Length == 1 && message.Bytes < JoinBytes / 4;
+        }
+
+        private ArraySegment<byte>[] Join(EncodedMessage first)
+        {
+            var buffer = new byte[JoinBytes];
+            int size = 0;
+            EncodedMessage next = first;
+            while (true)
+            {
+                ArraySegment<byte> from = next.Segments[0];
+                Buffer.BlockCopy(from.Array, from.Offset, buffer, size, from.Count);
+                size += from.Count;
+                if (_waiting.Count == 0 || !IsSmall(_waiting.Peek()) || size + _waiting.Peek().Bytes > JoinBytes)
+                {
+                    return new[] { new ArraySegment<byte>(buffer, 0, size) };
+                }
+                next = _waiting.Dequeue();
+            }
+        }
+
+        private void Fail(string reason)
+        {
+            lock (_lock)
+            {
+                _isClosed = true;
+                _isWriting = false;
+                _waiting.Clear();
+                _current = null;
+                Monitor.PulseAll(_lock);
+            }
+            _onFailure(reason);
+        }
+
+        private void HandOver()
+        {
+            lock (_lock)
+            {
+                _threadMayWrite = true;
+                if (!_hasThread)
+                {
+                    _hasThread = true;
+                    var thread = new Thread(WriteInThread, 128 * 1024) { IsBackground = true, Name = "nep writer" };
+                    thread.Start();
+                }
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        private void WriteInThread()
+        {
+            while (true)
+            {
+                lock (_lock)
+                {
+                    while (!_threadMayWrite && !_isClosed)
+                    {
+                        Monitor.Wait(_lock);
+                    }
+                    if (_isClosed)
+                    {
+                        return;
+                    }
+                }
+                try
+                {
+                    _socket.Poll(100000, SelectMode.SelectWrite);
+                }
+                catch (ObjectDisposedException)
+                {
+                    Fail("closed");
+                    return;
+                }
+                catch (SocketException exception)
+                {
+                    Fail(exception.SocketErrorCode.ToString());
+                    return;
+                }
+                Write();
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+"""Compile and run the C# client's programs with mono."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import queue
+import shutil
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CSHARP = ROOT / "clients" / "csharp"
+BUILD = CSHARP / "build"
+JSON = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")
+COMPILE = ("mcs", "-langversion:7", "-warnaserror", "-debug-")
+HAS_MONO = bool(shutil.which("mcs") and shutil.which("mono") and JSON.exists())
+WITHOUT = "mono-mcs, mono-runtime or libnewtonsoft-json5.0-cil is missing: the C# client is not tested"
+_LINE_S = 20.0
+
+
+def sources(folder: str) -> list[Path]:
+    """Return all C# sources below a folder of the client."""
+    return sorted((CSHARP / folder).rglob("*.cs"))
+
+
+def library() -> Path:
+    """Return ``Nep.dll``, compiled when a source is newer."""
+    return _compiled("Nep.dll", sources("src"), ("-target:library", f"-r:{JSON}"))
+
+
+def program(name: str, *files: Path) -> Path:
+    """Return a program that uses the library, compiled when a source is newer."""
+    return _compiled(name, [*files], ("-target:exe", f"-r:{library()}", f"-r:{JSON}"))
+
+
+def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
+    """Compile under a lock: pytest's workers are processes of their own."""
+    BUILD.mkdir(exist_ok=True)
+    target = BUILD / name
+    needed = [*files, *(Path(each[3:]) for each in options if each.startswith("-r:"))]
+    with (BUILD / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not target.exists() or any(each.stat().st_mtime > target.stat().st_mtime for each in needed):
+            made = BUILD / "new" / name  # the file's name becomes the assembly's
+            made.parent.mkdir(exist_ok=True)
+            done = subprocess.run(
+                [*COMPILE, *options, f"-out:{made}", *map(str, files)], capture_output=True, text=True, check=False
+            )
+            assert done.returncode == 0, done.stdout + done.stderr
+            made.replace(target)
+    return target
+
+
+class MonoProgram:
+    """A running C# program that reads and writes lines."""
+
+    def __init__(self, path: Path, *args: str, **environment: str) -> None:
+        self.process = subprocess.Popen(
+            ["mono", str(path), *args],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            encoding="utf-8",
+            env={**os.environ, "MONO_PATH": str(BUILD), **environment},
+        )
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._lines.put(line.rstrip("\n"))
+        self._lines.put("(it ended)")
+
+    def line(self, timeout_s: float = _LINE_S) -> str:
+        """Return the next line that it prints."""
+        return self._lines.get(timeout=timeout_s)
+
+    def say(self, text: str) -> None:
+        """Give it a line."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(text + "\n")
+        self.process.stdin.flush()
+
+    def ask(self, text: str) -> str:
+        """Give it a line and return the next line that it prints."""
+        self.say(text)
+        return self.line()
+
+    def end(self, timeout_s: float = _LINE_S) -> int:
+        """Close its input and return its exit code."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        return self.process.wait(timeout_s)
+
+    def close(self) -> None:
+        """Kill it if it still runs."""
+        self.process.kill()
+        self.process.wait()
+        self._reader.join()
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
+
+@contextmanager
+def running(path: Path, *args: str, **environment: str) -> Iterator[MonoProgram]:
+    """Run a program; it is killed at the end."""
+    started = MonoProgram(path, *args, **environment)
+    try:
+        yield started
+    finally:
+        started.close()

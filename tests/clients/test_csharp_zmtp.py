@@ -1,0 +1,215 @@
+"""The C# client's own ZMTP sockets against libzmq."""
+
+from __future__ import annotations
+
+import random
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import pytest
+import zmq
+
+from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+
+pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
+TOPIC = b"example\0"
+LAST = b"\xffhello3/0000000000000001/example"
+
+
+def peer(*args: str) -> MonoProgram:
+    return MonoProgram(program("ZmtpPeer.exe", CSHARP / "tests" / "peer" / "ZmtpPeer.cs"), *args)
+
+
+@pytest.fixture
+def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
+    with zmq.Context() as made:
+        made.linger = 0
+        yield made
+
+
+@pytest.fixture
+def stack() -> Iterator[ExitStack]:
+    with ExitStack() as made:
+        yield made
+
+
+def started(stack: ExitStack, *args: str) -> MonoProgram:
+    made = peer(*args)
+    stack.callback(made.close)
+    return made
+
+
+def bound(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> tuple[zmq.Socket[bytes], str]:
+    made = context.socket(kind)
+    made.rcvtimeo = 20_000
+    port = made.bind_to_random_port("tcp://127.0.0.1")
+    return made, f"tcp://127.0.0.1:{port}"
+
+
+def test_dealer_exchanges_messages_of_any_size(context, stack: ExitStack) -> None:
+    echo, endpoint = bound(context, zmq.DEALER)
+    with echo:
+        dealer = started(stack, "dealer", endpoint)
+        for parts in ([b"a"], [b"", b"b" * 255, b"c" * 256], [b"x" * 70_000, b""], [bytes(range(256)) * 24_000]):
+            echo.send_multipart(parts)
+            assert echo.recv_multipart() == parts
+
+
+def test_dealer_answers_heartbeats_and_reconnects(context, stack: ExitStack) -> None:
+    first = context.socket(zmq.DEALER)
+    first.heartbeat_ivl, first.heartbeat_timeout = 50, 5000
+    port = first.bind_to_random_port("tcp://127.0.0.1")
+    with first:
+        dealer = started(stack, "dealer", f"tcp://127.0.0.1:{port}")
+        assert dealer.line() == "connected"
+        first.rcvtimeo = 20_000
+        for _ in range(5):
+            first.send(b"ping")
+            assert first.recv() == b"ping"
+    assert dealer.line() == "disconnected"
+    with context.socket(zmq.DEALER) as second:
+        second.rcvtimeo = 20_000
+        second.bind(f"tcp://127.0.0.1:{port}")
+        assert dealer.line() == "connected"
+        second.send(b"again")
+        assert second.recv() == b"again"
+    assert dealer.ask("refused") in {"refused ", "disconnected"}
+
+
+def test_sub_sends_its_filters_in_byte_order_on_every_connection(context, stack: ExitStack) -> None:
+    sub = started(stack, "sub")
+    filters = [LAST, *(b"topic %d\0" % number for number in range(10)), TOPIC]
+    for each in filters:
+        sub.say(f"subscribe {each.hex()}")
+    for kind in (zmq.XPUB, zmq.XPUB):
+        publisher, endpoint = bound(context, kind)
+        with publisher:
+            sub.say(f"connect {endpoint}")
+            assert [publisher.recv() for _ in filters] == [b"\1" + each for each in sorted(filters)]
+            sub.say(f"subscribe {b'late'.hex()}")
+            assert publisher.recv() == b"\1late"
+            sub.say(f"unsubscribe {b'late'.hex()}")
+            assert publisher.recv() == b"\0late"
+            for parts in ([TOPIC + b"one part"], [TOPIC, b"h" * 32, b"payload"], [TOPIC, b"", b""]):
+                publisher.send_multipart(parts)
+                assert sub.line() == "message " + " ".join(part.hex() for part in parts)
+            body = bytes(range(256)) * 24_000
+            publisher.send_multipart([TOPIC, body])
+            assert sub.line() == f"message {TOPIC.hex()} {len(body)}:{sum(body)}"
+
+
+def test_xpub_reports_each_subscription_and_serves_every_filter(context, stack: ExitStack) -> None:
+    xpub = started(stack, "xpub", "127.0.0.1")
+    endpoint = f"tcp://127.0.0.1:{xpub.line().split()[1]}"
+    with context.socket(zmq.SUB) as one, context.socket(zmq.SUB) as two, context.socket(zmq.SUB) as other:
+        for each, wanted in ((one, TOPIC), (two, TOPIC), (other, b"else")):
+            each.rcvtimeo = 20_000
+            each.subscribe(wanted)
+            each.connect(endpoint)
+            assert xpub.line() == f"+{wanted.hex()}"
+        for parts in ([TOPIC + b"x"], [TOPIC, b"", b"y" * 70_000]):
+            xpub.say("send " + " ".join(part.hex() for part in parts))
+            assert one.recv_multipart() == two.recv_multipart() == parts
+        xpub.say(f"burst {TOPIC.hex()} 20 6000000")
+        for number in range(20):
+            topic, counted, body = one.recv_multipart()
+            assert (topic, int.from_bytes(counted, "little"), len(body)) == (TOPIC, number, 6_000_000)
+        assert xpub.line() == "sent 40"
+        assert other.poll(0) == 0
+        one.unsubscribe(TOPIC)
+        assert xpub.line() == f"-{TOPIC.hex()}"
+        xpub.say(f"send {TOPIC.hex()}")
+        other.close()
+        assert xpub.line() == "left"
+    xpub.line()
+    assert xpub.end() == 0
+
+
+def test_xpub_bounds_the_queue_of_a_slow_reader_and_keeps_serving_others(context, stack: ExitStack) -> None:
+    xpub = started(stack, "xpub", "127.0.0.1", "queue=8000000")
+    endpoint = f"tcp://127.0.0.1:{xpub.line().split()[1]}"
+    with context.socket(zmq.SUB) as slow:
+        slow.rcvhwm, slow.rcvtimeo = 1, 20_000
+        slow.subscribe(TOPIC)
+        slow.connect(endpoint)
+        xpub.line()
+        taken = int(xpub.ask(f"burst {TOPIC.hex()} 400 1000000").split()[1])
+        assert 0 < taken < 300
+        for _ in range(taken):  # what was taken arrives, and what was dropped does not
+            slow.recv_multipart()
+        xpub.say(f"send {TOPIC.hex()} {b'end'.hex()}")
+        assert slow.recv_multipart() == [TOPIC, b"end"]
+
+
+def test_ipv6_works_where_the_computer_has_it(context, stack: ExitStack) -> None:
+    if not socket.has_ipv6:
+        pytest.skip("no IPv6")
+    xpub = started(stack, "xpub", "::1")
+    endpoint = f"tcp://[::1]:{xpub.line().split()[1]}"
+    sub = started(stack, "sub")
+    sub.say(f"subscribe {TOPIC.hex()}")
+    sub.say(f"connect {endpoint}")
+    assert xpub.line() == f"+{TOPIC.hex()}"
+    xpub.say(f"send {TOPIC.hex()} 00")
+    assert sub.line() == f"message {TOPIC.hex()} 00"
+
+
+GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(16) + b"\x00" + bytes(31)
+READY = b"\x04\x19\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
+
+
+@pytest.mark.parametrize(
+    ("said", "code"),
+    [
+        (b"GET / HTTP/1.1\r\n\r\n" + bytes(60), "no-greeting"),
+        (GREETING.replace(b"\x03\x00NULL", b"\x01\x00NULL"), "old-version"),
+        (GREETING.replace(b"NULL", b"CURV"), "other-mechanism"),
+        (GREETING + b"\x00\x01x", "bad-handshake"),
+        (GREETING + READY.replace(b"SUB", b"PUB"), "other-socket-type"),
+        (GREETING + READY + b"\x02" + b"\x7f" + bytes(7), "message-too-large"),
+        (GREETING + READY + b"\x00" * 2 + b"\x40\x00", "bad-frame"),
+        (GREETING + READY + b"\x01\x01\x01\x00\x01\x01", "too-many-parts"),
+        (GREETING + READY + b"\x06" + bytes(6) + b"\xff\xff", "command-too-large"),
+        (GREETING[:40], "handshake-timeout"),
+    ],
+)
+def test_malformed_peer_is_disconnected_and_counted_with_a_reason(stack: ExitStack, said: bytes, code: str) -> None:
+    xpub = started(stack, "xpub", "127.0.0.1", "handshake_ms=300")
+    port = int(xpub.line().split()[1])
+    with socket.create_connection(("127.0.0.1", port), timeout=40.0) as stranger:
+        stranger.sendall(said)
+        try:
+            while stranger.recv(4096):
+                pass
+        except ConnectionResetError:
+            pass
+    told = [xpub.ask("refused")]
+    while not told[-1].startswith("refused"):
+        told.append(xpub.line())
+    assert told[-1] == f"refused {code}=1"
+
+
+def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None:
+    xpub = started(stack, "xpub", "127.0.0.1", "handshake_ms=200")
+    port = int(xpub.line().split()[1])
+    chance = random.Random(27)
+    good = GREETING + READY + b"\x00\x09\x01" + TOPIC + b"\x04\x07\x04PING\x00\x00"
+    for _ in range(150):
+        bad = bytearray(good)
+        for _ in range(chance.randrange(1, 6)):
+            bad[chance.randrange(len(bad))] = chance.randrange(256)
+        with socket.create_connection(("127.0.0.1", port), timeout=40.0) as stranger:
+            stranger.sendall(bad[: chance.randrange(1, len(bad) + 1)])
+    with context.socket(zmq.SUB) as sub:
+        sub.rcvtimeo = 20_000
+        sub.subscribe(b"alive")
+        sub.connect(f"tcp://127.0.0.1:{port}")
+        while xpub.line() != f"+{b'alive'.hex()}":
+            pass
+        xpub.say(f"send {b'alive'.hex()}")
+        assert sub.recv() == b"alive"
+    xpub.say("refused")
+    while not (told := xpub.line()).startswith("refused"):
+        pass
+    assert "unexpected" not in told
