@@ -14,12 +14,15 @@ namespace Nep.Zmtp
     internal sealed class OutgoingQueue
     {
         private const int JoinBytes = 65536;
+        private const int SendBufferBytes = 262144;
+        private static readonly bool IsMono = Type.GetType("Mono.Runtime") != null;
 
         private readonly object _lock = new object();
         private readonly Queue<EncodedMessage> _waiting = new Queue<EncodedMessage>();
         private readonly Socket _socket;
         private readonly ZmtpLimits _limits;
         private readonly Action<string> _onFailure;
+        private readonly int _maxChunk = int.MaxValue;
         private ArraySegment<byte>[] _current;
         private int _segment;
         private int _offset;
@@ -34,6 +37,13 @@ namespace Nep.Zmtp
             _socket = socket;
             _limits = limits;
             _onFailure = onFailure;
+            if (IsMono)
+            {
+                // Mono (6.8) spins in Send on a non-blocking socket until all is sent. A writable socket has a third of
+                // its buffer free, so what is an eighth of it never meets a full one.
+                socket.SendBufferSize = SendBufferBytes;
+                _maxChunk = Math.Max(2048, socket.SendBufferSize / 8);
+            }
         }
 
         /// <summary>Messages that were dropped because the queue was full.</summary>
@@ -118,8 +128,13 @@ namespace Nep.Zmtp
                 while (_current != null || TakeNext())
                 {
                     ArraySegment<byte> segment = _current[_segment];
+                    if (_maxChunk < int.MaxValue && !_socket.Poll(0, SelectMode.SelectWrite))
+                    {
+                        return false;
+                    }
                     SocketError error;
-                    int sent = _socket.Send(segment.Array, segment.Offset + _offset, segment.Count - _offset, SocketFlags.None, out error);
+                    int size = Math.Min(_maxChunk, segment.Count - _offset);
+                    int sent = _socket.Send(segment.Array, segment.Offset + _offset, size, SocketFlags.None, out error);
                     if (error == SocketError.WouldBlock || error == SocketError.NoBufferSpaceAvailable)
                     {
                         return false;
