@@ -1,0 +1,98 @@
+using System;
+using System.Text;
+using Nep.Wire;
+
+namespace Nep
+{
+    /// <summary>Payloads to and from bytes.</summary>
+    internal sealed class Codec
+    {
+        private static readonly string[] CodecNames = { "", "json", "string", "bytes", "msgpack", "image" };
+
+        private Codec(byte number)
+        {
+            Number = number;
+        }
+
+        public byte Number { get; private set; }
+
+        public string Name
+        {
+            get { return NameOf(Number); }
+        }
+
+        public static string NameOf(byte number)
+        {
+            return CodecNames[number];
+        }
+
+        /// <summary>The codec of a message type: types without one of their own are carried as JSON.</summary>
+        public static Codec For(string type)
+        {
+            int number = type == "images" ? 5 : Array.IndexOf(CodecNames, type);
+            return new Codec((byte)(number < 1 ? 1 : number));
+        }
+
+        /// <exception cref="PayloadException">The payload has no form in this codec.</exception>
+        public byte[] Encode(object payload)
+        {
+            switch (Number)
+            {
+                case 1:
+                    return EncodeJson(payload);
+                case 2:
+                    return EncodeText(payload as string);
+                case 4:
+                    try
+                    {
+                        return MessagePackWriter.Write(payload);
+                    }
+                    catch (NotSupportedException exception)
+                    {
+                        throw new PayloadException(exception.Message, exception);
+                    }
+                default:
+                    var bytes = payload as byte[];
+                    if (bytes == null)
+                    {
+                        throw new PayloadException("A topic of type '" + Name + "' carries byte[].");
+                    }
+                    return (byte[])bytes.Clone(); // the caller may go on using its array
+            }
+        }
+
+        private static byte[] EncodeText(string text)
+        {
+            if (text == null)
+            {
+                throw new PayloadException("A topic of type 'string' carries text.");
+            }
+            return Encoding.UTF8.GetBytes(text);
+        }
+
+        private static byte[] EncodeJson(object payload)
+        {
+            string text;
+            try
+            {
+                text = Json.Serializer.Serialize(payload);
+            }
+            catch (Exception exception) // each library has its own
+            {
+                throw new PayloadException("The payload can't be converted to JSON: " + exception.Message, exception);
+            }
+            return CheckedJson(text);
+        }
+
+        /// <summary>JSON text that exists already as bytes.</summary>
+        public static byte[] CheckedJson(string text)
+        {
+            byte[] bytes = Encoding.UTF8.GetBytes(text);
+            if (Json.IsTooDeep(bytes, 0, bytes.Length))
+            {
+                throw new PayloadException("The payload has more than 64 levels of lists and objects.");
+            }
+            return bytes;
+        }
+    }
+}

@@ -1,0 +1,78 @@
+using System.ComponentModel;
+using System.Threading;
+
+namespace Nep
+{
+    // Names of the paper's listings 9 and 10 and of the samples of that time.
+    public sealed partial class Node
+    {
+        /// <summary>Name of the original library for <see cref="CreatePublisher"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public Publisher new_pub(string topic, string msg_type = "json")
+        {
+            return CreatePublisher(topic, msg_type);
+        }
+
+        /// <summary>Name of the original library for <see cref="CreateSubscriber"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public Subscriber new_sub(string topic, string msg_type = "json")
+        {
+            return CreateSubscriber(topic, msg_type);
+        }
+
+        /// <summary>Name of the original library for <see cref="Close()"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public void close()
+        {
+            Close();
+        }
+    }
+
+    public sealed partial class Publisher
+    {
+        /// <summary>Name of the original library for <see cref="Publish"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public void publish(object message)
+        {
+            Publish(message);
+        }
+
+        /// <summary>Name of the original library for <see cref="Close"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public void close()
+        {
+            Close();
+        }
+    }
+
+    public sealed partial class Subscriber
+    {
+        /// <summary>Wait for the next message and return its JSON or text; empty when the subscriber was closed.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public string listen()
+        {
+            Message message = Receive();
+            return message == null ? "" : message.Text;
+        }
+
+        /// <summary>Return whether a message is there, and its JSON or text; <paramref name="msg"/> stays as it is when there is none.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public bool listenNB(ref string msg)
+        {
+            Message message = _socket.Take(0, CancellationToken.None);
+            if (message == null)
+            {
+                return false;
+            }
+            msg = message.Text;
+            return true;
+        }
+
+        /// <summary>Name of the original library for <see cref="Close"/>.</summary>
+        [EditorBrowsable(EditorBrowsableState.Never)]
+        public void close()
+        {
+            Close();
+        }
+    }
+}

@@ -1,0 +1,367 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Net;
+using System.Threading;
+using Nep.Session;
+using Nep.Wire;
+
+namespace Nep
+{
+    /// <summary>A program's membership in a NEP network. Thread-safe.</summary>
+    /// <remarks>
+    /// All threads of a node are background threads. A node that is still open when the process exits is closed then, so that
+    /// what was published is delivered.
+    /// </remarks>
+    public sealed partial class Node : IDisposable
+    {
+        private const int HandshakeMs = 500;
+        private const int LeaveMs = 300;
+        private static readonly HashSet<Node> Open = new HashSet<Node>();
+        private static bool _closesAtExit;
+
+        private readonly object _lock = new object();
+        private readonly NodeOptions _options;
+        private readonly NodeRecord _record;
+        private readonly Dictionary<string, MasterSession> _sessions = new Dictionary<string, MasterSession>();
+        private readonly Dictionary<Publisher, MasterSession> _publishers = new Dictionary<Publisher, MasterSession>();
+        private readonly Dictionary<Subscriber, MasterSession> _subscribers = new Dictionary<Subscriber, MasterSession>();
+        private readonly List<Subscription> _subscriptions = new List<Subscription>();
+        private long _numbers;
+        private bool _isClosed;
+
+        /// <summary>Create a node. It registers with the master when its first publisher or subscriber is created.</summary>
+        /// <param name="name">Name in the graph, 1 to 200 bytes of UTF-8 without control characters.</param>
+        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        public Node(string name) : this(name, new NodeOptions())
+        {
+        }
+
+        /// <summary>Create a node with options.</summary>
+        /// <param name="name">Name in the graph, 1 to 200 bytes of UTF-8 without control characters.</param>
+        /// <param name="options">Options; must not be changed afterwards.</param>
+        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        public Node(string name, NodeOptions options)
+        {
+            if (!Names.IsNodeName(name))
+            {
+                throw new ArgumentException("A node's name has 1 to 200 bytes and no control characters.", "name");
+            }
+            _options = options;
+            string key = Ids.NewKey();
+            _record = new NodeRecord
+            {
+                Id = Ids.NodeId(key),
+                Name = name,
+                Host = HostName(),
+                Pid = Process.GetCurrentProcess().Id,
+                SinceNs = Clock.NowNs,
+                Key = key,
+            };
+            lock (Open)
+            {
+                Open.Add(this);
+                if (!_closesAtExit)
+                {
+                    _closesAtExit = true;
+                    AppDomain.CurrentDomain.ProcessExit += CloseAll;
+                    AppDomain.CurrentDomain.DomainUnload += CloseAll;
+                }
+            }
+        }
+
+        /// <summary>Raised in the thread of a callback that threw an exception.</summary>
+        public event EventHandler<UnhandledExceptionEventArgs> CallbackFailed;
+
+        /// <summary>Name in the graph.</summary>
+        public string Name
+        {
+            get { return _record.Name; }
+        }
+
+        /// <summary>Create a publisher. Its first message reaches every subscriber that was created before.</summary>
+        /// <param name="topic">Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
+        /// <param name="type"><c>json</c>, <c>string</c>, <c>bytes</c>, <c>msgpack</c>, <c>image</c>, or the name of a type that is carried as JSON.</param>
+        /// <param name="options">Options, or null for the defaults.</param>
+        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        public Publisher CreatePublisher(string topic, string type = "json", PublisherOptions options = null)
+        {
+            CheckTopic(topic);
+            options = options ?? new PublisherOptions();
+            if (options.History < 0 || options.History > 10000)
+            {
+                throw new ArgumentException("A publisher keeps 0 to 10 000 messages.", "options");
+            }
+            Codec codec = Codec.For(type);
+            long number = Interlocked.Increment(ref _numbers);
+            var record = new PublisherRecord
+            {
+                Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type, Codec = codec.Name,
+                IsLatched = options.Latched || options.History > 0, History = options.History,
+            };
+            MasterSession session = SessionOf(options.Master);
+            var socket = new PublisherSocket(record, codec.Number);
+            List<ExpectedSubscriber> missing;
+            try
+            {
+                if (!socket.Move(session.Hosts()))
+                {
+                    throw new NepException("No port could be opened for the topic '" + topic + "'.");
+                }
+                missing = socket.WaitFor(session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout)), HandshakeMs);
+            }
+            catch
+            {
+                socket.Finish(0);
+                throw;
+            }
+            if (missing.Count > 0)
+            {
+                session.ReportMissing(record.Id, missing.ConvertAll(each => each.Id));
+            }
+            var made = new Publisher(this, socket, codec, missing.ConvertAll(each => each.NodeName));
+            lock (_lock)
+            {
+                _publishers[made] = session;
+            }
+            return made;
+        }
+
+        /// <summary>Create a subscriber. It receives the next message of every publisher that is registered.</summary>
+        /// <param name="topic">Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
+        /// <param name="type">Type that is expected; what a message holds is told by the message.</param>
+        /// <param name="options">Options, or null for the defaults.</param>
+        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        public Subscriber CreateSubscriber(string topic, string type = "json", SubscriberOptions options = null)
+        {
+            CheckTopic(topic);
+            options = options ?? new SubscriberOptions();
+            if (options.MaxMessages < 1 || options.MaxBytes < 1)
+            {
+                throw new ArgumentException("A subscriber keeps at least one message.", "options");
+            }
+            long number = Interlocked.Increment(ref _numbers);
+            var record = new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type };
+            MasterSession session = SessionOf(options.Master);
+            var socket = new SubscriberSocket(record, options);
+            try
+            {
+                session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
+            }
+            catch
+            {
+                socket.Close();
+                throw;
+            }
+            socket.WaitForEchoes(HandshakeMs);
+            var made = new Subscriber(this, socket);
+            lock (_lock)
+            {
+                _subscribers[made] = session;
+            }
+            return made;
+        }
+
+        /// <summary>Call a function with each message of a topic.</summary>
+        /// <param name="topic">Topic, as for <see cref="CreateSubscriber"/>.</param>
+        /// <param name="callback">Function; an exception of it is reported by <see cref="CallbackFailed"/> and changes nothing else.</param>
+        /// <param name="type">Type that is expected.</param>
+        /// <param name="options">Options, or null for the defaults; <see cref="SubscriberOptions.Callbacks"/> says in which thread it is called.</param>
+        /// <exception cref="ArgumentException">The topic is not allowed.</exception>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        public Subscription Subscribe(string topic, Action<Message> callback, string type = "json", SubscriberOptions options = null)
+        {
+            if (callback == null)
+            {
+                throw new ArgumentNullException("callback");
+            }
+            options = options ?? new SubscriberOptions();
+            var made = new Subscription(this, CreateSubscriber(topic, type, options), callback, options.Callbacks);
+            lock (_lock)
+            {
+                _subscriptions.Add(made);
+            }
+            return made;
+        }
+
+        /// <summary>Run waiting callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
+        /// <param name="budget">No further callback is begun after this time.</param>
+        /// <returns>Number of callbacks that ran.</returns>
+        public int Update(TimeSpan budget)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            List<Subscription> subscriptions;
+            lock (_lock)
+            {
+                subscriptions = new List<Subscription>(_subscriptions);
+            }
+            int count = 0;
+            bool hasMore = true;
+            while (hasMore)
+            {
+                hasMore = false;
+                foreach (Subscription each in subscriptions) // in turn, so that a busy topic does not hold up the others
+                {
+                    if (count > 0 && watch.Elapsed >= budget)
+                    {
+                        return count;
+                    }
+                    if (each.RunOne())
+                    {
+                        count++;
+                        hasMore = true;
+                    }
+                }
+            }
+            return count;
+        }
+
+        /// <summary>Close with all publishers and subscribers; takes <see cref="NodeOptions.CloseTimeout"/> at most, plus 0.3 s.</summary>
+        public void Close()
+        {
+            List<MasterSession> sessions;
+            List<Publisher> publishers;
+            List<Subscriber> subscribers;
+            lock (_lock)
+            {
+                if (_isClosed)
+                {
+                    return;
+                }
+                _isClosed = true;
+                sessions = new List<MasterSession>(_sessions.Values);
+                publishers = new List<Publisher>(_publishers.Keys);
+                subscribers = new List<Subscriber>(_subscribers.Keys);
+            }
+            lock (Open)
+            {
+                Open.Remove(this);
+            }
+            Stopwatch watch = Stopwatch.StartNew();
+            sessions.ForEach(each => each.BeginLeave());
+            publishers.ForEach(each => each.Socket.SayBye());
+            sessions.ForEach(each => each.Close(LeaveMs));
+            subscribers.ForEach(each => each.Socket.Close());
+            foreach (Publisher each in publishers)
+            {
+                each.Socket.Finish(Math.Max(0, TimeoutMs(_options.CloseTimeout) - (int)watch.ElapsedMilliseconds));
+            }
+        }
+
+        /// <summary>Same as <see cref="Close()"/>.</summary>
+        public void Dispose()
+        {
+            Close();
+        }
+
+        internal void Close(Publisher publisher)
+        {
+            MasterSession session;
+            lock (_lock)
+            {
+                if (_isClosed || !_publishers.TryGetValue(publisher, out session))
+                {
+                    return;
+                }
+                _publishers.Remove(publisher);
+            }
+            session.RemovePublisher(publisher.Socket.Record.Id, publisher.Socket.Count);
+            publisher.Socket.SayBye();
+            publisher.Socket.Finish(TimeoutMs(_options.CloseTimeout));
+        }
+
+        internal void Close(Subscriber subscriber)
+        {
+            MasterSession session;
+            lock (_lock)
+            {
+                if (_isClosed || !_subscribers.TryGetValue(subscriber, out session))
+                {
+                    return;
+                }
+                _subscribers.Remove(subscriber);
+            }
+            session.RemoveSubscriber(subscriber.Socket.Record.Id);
+            subscriber.Socket.Close();
+        }
+
+        internal void Forget(Subscription subscription)
+        {
+            lock (_lock)
+            {
+                _subscriptions.Remove(subscription);
+            }
+        }
+
+        internal void OnCallbackError(Exception exception)
+        {
+            EventHandler<UnhandledExceptionEventArgs> handler = CallbackFailed;
+            if (handler != null)
+            {
+                handler(this, new UnhandledExceptionEventArgs(exception, false));
+            }
+            else
+            {
+                Trace.TraceError("NEP: a callback failed: " + exception);
+            }
+        }
+
+        private static void CloseAll(object sender, EventArgs arguments)
+        {
+            List<Node> open;
+            lock (Open)
+            {
+                open = new List<Node>(Open);
+            }
+            open.ForEach(each => each.Close());
+        }
+
+        private static void CheckTopic(string topic)
+        {
+            if (!Names.IsTopic(topic))
+            {
+                throw new ArgumentException("A topic has 1 to 200 bytes without white space, control characters or '{'.", "topic");
+            }
+        }
+
+        private static int TimeoutMs(TimeSpan timeout)
+        {
+            return timeout < TimeSpan.Zero ? -1 : (int)Math.Min(int.MaxValue, timeout.TotalMilliseconds);
+        }
+
+        private static string HostName()
+        {
+            try
+            {
+                return Dns.GetHostName();
+            }
+            catch (System.Net.Sockets.SocketException)
+            {
+                return "unknown";
+            }
+        }
+
+        private MasterSession SessionOf(string master)
+        {
+            MasterAddress address = MasterAddress.Parse(master ?? _options.Master);
+            lock (_lock)
+            {
+                if (_isClosed)
+                {
+                    throw new ObjectDisposedException("Node");
+                }
+                MasterSession session;
+                if (!_sessions.TryGetValue(address.ToString(), out session))
+                {
+                    _sessions[address.ToString()] = session = new MasterSession(_record, address);
+                }
+                return session;
+            }
+        }
+    }
+}

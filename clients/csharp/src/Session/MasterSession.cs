@@ -1,0 +1,630 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A publisher as its session needs it. All methods are thread-safe.</summary>
+    internal interface ISessionPublisher
+    {
+        PublisherRecord Record { get; }
+
+        Dictionary<object, object> Statistics();
+
+        /// <summary>Be reached at these addresses; true when the endpoints of the record changed.</summary>
+        bool Move(IList<string> hosts);
+    }
+
+    /// <summary>A subscriber as its session needs it. All methods are thread-safe.</summary>
+    internal interface ISessionSubscriber
+    {
+        SubscriberRecord Record { get; }
+
+        Dictionary<object, object> Statistics();
+
+        void Connect(RemotePublisher remote);
+
+        /// <summary>A publisher is not listed any more.</summary>
+        void Gone(ulong publisher, ulong lastSeq, bool isClosed);
+
+        /// <summary>These are all publishers that are listed.</summary>
+        void Reconcile(IList<RemotePublisher> remotes);
+
+        /// <summary>A renewal was answered: the newest messages of publishers that the master knows.</summary>
+        void Tick(Dictionary<ulong, ulong> lastSeqs);
+    }
+
+    /// <summary>A node's link to one master: registers, renews, hears of publishers, joins a master that was started again.</summary>
+    internal sealed class MasterSession : IDealerOwner
+    {
+        private const int AskAgainMs = 500;
+        private const int JoinAgainMs = 500;
+        private const int MaxCalls = 256;
+        private const double MinRenewS = 1.0;
+        private const double MaxRenewS = 30.0;
+
+        private readonly object _lock = new object();
+        private readonly NodeRecord _node;
+        private readonly MasterAddress _address;
+        private readonly DealerSocket _socket;
+        private readonly Dictionary<ulong, ISessionPublisher> _publishers = new Dictionary<ulong, ISessionPublisher>();
+        private readonly Dictionary<ulong, ISessionSubscriber> _subscribers = new Dictionary<ulong, ISessionSubscriber>();
+        private readonly HashSet<ulong> _confirmed = new HashSet<ulong>();
+        private readonly Dictionary<long, Call> _calls = new Dictionary<long, Call>();
+        private readonly Stopwatch _clock = Stopwatch.StartNew();
+        private readonly Thread _thread;
+        private List<string> _served = new List<string>();
+        private string _ownHost = MasterAddress.Loopback;
+        private long _lastCall;
+        private ulong _epoch;
+        private ulong _revision;
+        private double _renewS = MinRenewS;
+        private double _dueAtS;
+        private double _joinAgainAtS;
+        private bool _isConnected;
+        private bool _isLeaving;
+        private bool _isClosed;
+
+        public MasterSession(NodeRecord node, MasterAddress address)
+        {
+            _node = node;
+            _address = address;
+            var limits = new ZmtpLimits { MaxMessageBytes = 256L << 20, MaxReconnectMs = 400, HeartbeatMs = 1000, HeartbeatTimeoutMs = 3000 };
+            _socket = new DealerSocket(address.Endpoint, this, limits, NullMechanism.Create);
+            _socket.Start();
+            _thread = new Thread(Run, 256 * 1024) { IsBackground = true, Name = "nep node" };
+            _thread.Start();
+        }
+
+        /// <summary>Addresses of this computer at which publishers are to be reached.</summary>
+        public IList<string> Hosts()
+        {
+            var hosts = new List<string>();
+            lock (_lock)
+            {
+                if (_address.IsNear)
+                {
+                    hosts.Add(MasterAddress.Loopback);
+                    hosts.AddRange(_served);
+                    return hosts;
+                }
+            }
+            string own = _address.OwnHost();
+            lock (_lock)
+            {
+                _ownHost = own ?? _ownHost;
+                hosts.Add(_ownHost);
+            }
+            return hosts;
+        }
+
+        /// <summary>Register a publisher and return the subscribers to wait for.</summary>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        public List<ExpectedSubscriber> AddPublisher(ISessionPublisher publisher, int timeoutMs)
+        {
+            ulong id = publisher.Record.Id;
+            lock (_lock)
+            {
+                _publishers[id] = publisher;
+            }
+            var expected = new List<ExpectedSubscriber>();
+            try
+            {
+                do
+                {
+                    var what = new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", publisher.Record.ToMap() } };
+                    Ask("publisher+", what, timeoutMs, reply =>
+                    {
+                        expected.AddRange(ExpectedSubscriber.ReadAll(reply.List("expected")));
+                        lock (_lock)
+                        {
+                            _confirmed.Add(id);
+                        }
+                    });
+                }
+                while (publisher.Move(Hosts())); // a node's first publisher learns whom the master serves
+            }
+            catch
+            {
+                RemovePublisher(id, 0);
+                throw;
+            }
+            return expected;
+        }
+
+        /// <summary>Register a subscriber; it is connected to the publishers there are before this returns.</summary>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        public void AddSubscriber(ISessionSubscriber subscriber, int timeoutMs)
+        {
+            ulong id = subscriber.Record.Id;
+            lock (_lock)
+            {
+                _subscribers[id] = subscriber;
+            }
+            var what = new Dictionary<object, object> { { "node", _node.ToMap() }, { "subscriber", subscriber.Record.ToMap() } };
+            try
+            {
+                Ask("subscriber+", what, timeoutMs, reply =>
+                {
+                    lock (_lock)
+                    {
+                        _confirmed.Add(id);
+                    }
+                    foreach (RemotePublisher remote in ReadRemotes(reply.List("publishers")))
+                    {
+                        subscriber.Connect(remote);
+                    }
+                });
+            }
+            catch
+            {
+                RemoveSubscriber(id);
+                throw;
+            }
+        }
+
+        public void RemovePublisher(ulong id, ulong lastSeq)
+        {
+            bool wasKnown;
+            lock (_lock)
+            {
+                wasKnown = _publishers.Remove(id);
+                _confirmed.Remove(id);
+            }
+            if (wasKnown)
+            {
+                Tell("publisher-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id }, { "last_seq", lastSeq } }, null);
+            }
+        }
+
+        public void RemoveSubscriber(ulong id)
+        {
+            bool wasKnown;
+            lock (_lock)
+            {
+                wasKnown = _subscribers.Remove(id);
+                _confirmed.Remove(id);
+            }
+            if (wasKnown)
+            {
+                Tell("subscriber-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id } }, null);
+            }
+        }
+
+        public void ReportMissing(ulong publisher, List<ulong> subscribers)
+        {
+            Tell("missing", new Dictionary<object, object> { { "node_id", _node.Id }, { "publisher_id", publisher }, { "subscriber_ids", subscribers } }, null);
+        }
+
+        /// <summary>Renew once more and unregister the node with all that it has; waits for the answer in <see cref="Close"/>.</summary>
+        public void BeginLeave()
+        {
+            lock (_lock)
+            {
+                if (_isLeaving)
+                {
+                    return;
+                }
+                _isLeaving = true;
+            }
+            Renew(); // subscribers that do not hear the bye learn what was sent last
+        }
+
+        public void Close(int timeoutMs)
+        {
+            lock (_lock)
+            {
+                _isLeaving = true;
+                _publishers.Clear();
+                _subscribers.Clear();
+                _confirmed.Clear();
+            }
+            if (_isConnected && _epoch != 0)
+            {
+                try
+                {
+                    Ask("leave", new Dictionary<object, object> { { "node_id", _node.Id } }, timeoutMs, null);
+                }
+                catch (NepException)
+                {
+                    // The master will notice that the connection has ended.
+                }
+            }
+            lock (_lock)
+            {
+                _isClosed = true;
+                Monitor.PulseAll(_lock);
+            }
+            _socket.Close(0);
+        }
+
+        // ---- in the socket's thread
+
+        void IDealerOwner.Connected()
+        {
+            lock (_lock)
+            {
+                _isConnected = true;
+                _dueAtS = 0.0; // a node renews as soon as its connection is back
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        void IDealerOwner.Disconnected(string reason)
+        {
+            lock (_lock)
+            {
+                _isConnected = false;
+            }
+        }
+
+        void IDealerOwner.Received(byte[][] parts)
+        {
+            try
+            {
+                Fields envelope = Fields.Of(new ArraySegment<byte>(parts[parts.Length - 1]));
+                Obey(envelope.Text("is", null), (long)envelope.Unsigned("re", 0), envelope.Map("what"));
+            }
+            catch (WireException)
+            {
+                _socket.Refused.Add("answer");
+            }
+        }
+
+        private void Obey(string name, long number, Fields what)
+        {
+            Call call = null;
+            lock (_lock)
+            {
+                if (number > 0 && _calls.TryGetValue(number, out call))
+                {
+                    _calls.Remove(number);
+                }
+            }
+            ulong epoch = what.Unsigned("epoch", 0);
+            bool isRegistration = name == "added" || name == "found";
+            if (isRegistration || name == "renewed")
+            {
+                TakeHosts(what.Texts("hosts"));
+            }
+            lock (_lock)
+            {
+                _epoch = isRegistration && _epoch == 0 ? epoch : _epoch;
+            }
+            if (call != null)
+            {
+                Complete(call, name, what);
+            }
+            else if (name == "publisher+")
+            {
+                RemotePublisher remote = RemotePublisher.Read(what.Map("publisher"), _address);
+                EachSubscriberOf(remote.Publisher.Topic, each => each.Connect(remote));
+            }
+            else if (name == "publisher-")
+            {
+                ulong id = what.Unsigned("id", 0), lastSeq = what.Unsigned("last_seq", 0);
+                bool isClosed = what.Flag("is_closed");
+                EachSubscriberOf(what.Text("topic", null), each => each.Gone(id, lastSeq, isClosed));
+            }
+            if (_epoch != 0 && epoch != _epoch)
+            {
+                Join();
+            }
+        }
+
+        private void Complete(Call call, string name, Fields what)
+        {
+            try
+            {
+                if (name == "refused")
+                {
+                    call.Refusal = what.Text("reason", "");
+                }
+                else if (call.Then != null)
+                {
+                    call.Then(what);
+                }
+            }
+            finally
+            {
+                lock (_lock)
+                {
+                    call.IsAnswered = true;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        private void TakeHosts(List<string> hosts)
+        {
+            lock (_lock)
+            {
+                if (string.Join(" ", hosts.ToArray()) != string.Join(" ", _served.ToArray()))
+                {
+                    _served = hosts;
+                    _dueAtS = 0.0;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        private List<RemotePublisher> ReadRemotes(List<object> list)
+        {
+            var remotes = new List<RemotePublisher>();
+            foreach (object each in list)
+            {
+                remotes.Add(RemotePublisher.Read(new Fields(each), _address));
+            }
+            return remotes;
+        }
+
+        private void EachSubscriberOf(string topic, Action<ISessionSubscriber> action)
+        {
+            foreach (ISessionSubscriber each in Subscribers())
+            {
+                if (each.Record.Topic == topic)
+                {
+                    action(each);
+                }
+            }
+        }
+
+        private List<ISessionSubscriber> Subscribers()
+        {
+            lock (_lock)
+            {
+                return new List<ISessionSubscriber>(_subscribers.Values);
+            }
+        }
+
+        private List<ISessionPublisher> Publishers()
+        {
+            lock (_lock)
+            {
+                return new List<ISessionPublisher>(_publishers.Values);
+            }
+        }
+
+        // ---- renewing and joining
+
+        private void Run()
+        {
+            double followAtS = 0.0;
+            while (true)
+            {
+                bool isDue;
+                lock (_lock)
+                {
+                    double now = _clock.Elapsed.TotalSeconds;
+                    double waitS = Math.Min(_dueAtS, followAtS) - now;
+                    if (!_isClosed && waitS > 0)
+                    {
+                        Monitor.Wait(_lock, (int)(waitS * 1000) + 1);
+                    }
+                    if (_isClosed)
+                    {
+                        return;
+                    }
+                    now = _clock.Elapsed.TotalSeconds;
+                    isDue = now >= _dueAtS;
+                    if (isDue)
+                    {
+                        _dueAtS = now + _renewS;
+                    }
+                }
+                followAtS = _clock.Elapsed.TotalSeconds + 1.0;
+                FollowAddresses();
+                if (isDue && !_isLeaving)
+                {
+                    Renew();
+                }
+            }
+        }
+
+        private void FollowAddresses()
+        {
+            List<ISessionPublisher> publishers = Publishers();
+            if (publishers.Count == 0)
+            {
+                return;
+            }
+            IList<string> hosts = Hosts();
+            foreach (ISessionPublisher each in publishers)
+            {
+                bool isConfirmed;
+                lock (_lock)
+                {
+                    isConfirmed = _confirmed.Contains(each.Record.Id);
+                }
+                if (isConfirmed && each.Move(hosts))
+                {
+                    Tell("publisher+", new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", each.Record.ToMap() } }, null);
+                }
+            }
+        }
+
+        private void Renew()
+        {
+            ulong epoch, revision;
+            var publishers = new List<ISessionPublisher>();
+            var subscribers = new List<ISessionSubscriber>();
+            lock (_lock)
+            {
+                epoch = _epoch;
+                revision = _revision;
+                foreach (KeyValuePair<ulong, ISessionPublisher> each in _publishers)
+                {
+                    if (_confirmed.Contains(each.Key))
+                    {
+                        publishers.Add(each.Value);
+                    }
+                }
+                foreach (KeyValuePair<ulong, ISessionSubscriber> each in _subscribers)
+                {
+                    if (_confirmed.Contains(each.Key))
+                    {
+                        subscribers.Add(each.Value);
+                    }
+                }
+            }
+            if (epoch == 0)
+            {
+                return;
+            }
+            var what = new Dictionary<object, object>
+            {
+                { "node_id", _node.Id }, { "epoch", epoch }, { "revision", revision },
+                { "publishers", publishers.ConvertAll(each => (object)each.Statistics()) },
+                { "subscribers", subscribers.ConvertAll(each => (object)each.Statistics()) },
+            };
+            Tell("renew", what, Renewed);
+        }
+
+        private void Renewed(Fields answer)
+        {
+            if (answer.Flag("again"))
+            {
+                Join();
+                return;
+            }
+            lock (_lock)
+            {
+                _revision = answer.Unsigned("revision", 0);
+                _renewS = Math.Min(MaxRenewS, Math.Max(MinRenewS, answer.Number("next_s", MinRenewS)));
+                _dueAtS = _clock.Elapsed.TotalSeconds + _renewS;
+            }
+            foreach (object each in answer.List("topics"))
+            {
+                var topic = new Fields(each);
+                List<RemotePublisher> remotes = ReadRemotes(topic.List("publishers"));
+                EachSubscriberOf(topic.Text("topic", null), subscriber => subscriber.Reconcile(remotes));
+            }
+            Dictionary<ulong, ulong> lastSeqs = answer.Numbers("last_seqs");
+            foreach (ISessionSubscriber each in Subscribers())
+            {
+                each.Tick(lastSeqs);
+            }
+        }
+
+        private void Join()
+        {
+            List<ISessionPublisher> publishers = Publishers();
+            List<ISessionSubscriber> subscribers = Subscribers();
+            lock (_lock)
+            {
+                double now = _clock.Elapsed.TotalSeconds;
+                if (_isLeaving || now < _joinAgainAtS)
+                {
+                    return;
+                }
+                _joinAgainAtS = now + JoinAgainMs / 1000.0;
+                _renewS = MinRenewS;
+            }
+            var what = new Dictionary<object, object>
+            {
+                { "node", _node.ToMap() }, { "epoch", _epoch },
+                { "publishers", publishers.ConvertAll(each => (object)each.Record.ToMap()) },
+                { "subscribers", subscribers.ConvertAll(each => (object)each.Record.ToMap()) },
+            };
+            Tell("join", what, reply => Joined(reply, publishers, subscribers));
+        }
+
+        private void Joined(Fields reply, List<ISessionPublisher> publishers, List<ISessionSubscriber> subscribers)
+        {
+            lock (_lock)
+            {
+                _epoch = reply.Unsigned("epoch", 0);
+                _revision = reply.Unsigned("revision", 0);
+                _joinAgainAtS = 0.0;
+                _confirmed.Clear();
+                foreach (ISessionPublisher each in publishers)
+                {
+                    _confirmed.Add(each.Record.Id);
+                }
+                foreach (ISessionSubscriber each in subscribers)
+                {
+                    _confirmed.Add(each.Record.Id);
+                }
+            }
+            List<RemotePublisher> remotes = ReadRemotes(reply.List("publishers"));
+            foreach (ISessionSubscriber each in subscribers)
+            {
+                each.Reconcile(remotes.FindAll(remote => remote.Publisher.Topic == each.Record.Topic));
+            }
+        }
+
+        // ---- calls
+
+        private void Tell(string name, Dictionary<object, object> what, Action<Fields> then)
+        {
+            Call call = Begin(name, what, then);
+            if (!_socket.Send(call.Body) || then == null)
+            {
+                lock (_lock)
+                {
+                    _calls.Remove(call.Number);
+                }
+            }
+        }
+
+        private void Ask(string name, Dictionary<object, object> what, int timeoutMs, Action<Fields> then)
+        {
+            Call call = Begin(name, what, then);
+            call.IsWaited = true;
+            Stopwatch watch = Stopwatch.StartNew();
+            long sentAtMs = -AskAgainMs;
+            lock (_lock)
+            {
+                while (!call.IsAnswered)
+                {
+                    long nowMs = watch.ElapsedMilliseconds;
+                    if (_isClosed || timeoutMs >= 0 && nowMs >= timeoutMs)
+                    {
+                        _calls.Remove(call.Number);
+                        throw new MasterUnreachableException(_address.ToString(), timeoutMs / 1000.0);
+                    }
+                    if (_isConnected && nowMs - sentAtMs >= AskAgainMs)
+                    {
+                        // It may have gone to a master that ended just then.
+                        sentAtMs = _socket.Send(call.Body) ? nowMs : nowMs - AskAgainMs + 20;
+                    }
+                    Monitor.Wait(_lock, 20);
+                }
+            }
+            if (call.Refusal != null)
+            {
+                throw new RequestRefusedException(call.Refusal);
+            }
+        }
+
+        private Call Begin(string name, Dictionary<object, object> what, Action<Fields> then)
+        {
+            var call = new Call { Then = then };
+            lock (_lock)
+            {
+                call.Number = ++_lastCall;
+                Call old;
+                if (_calls.TryGetValue(call.Number - MaxCalls, out old) && !old.IsWaited)
+                {
+                    _calls.Remove(old.Number); // its master has ended
+                }
+                _calls[call.Number] = call;
+            }
+            call.Body = MessagePackWriter.Write(new Dictionary<object, object> { { "do", name }, { "call", call.Number }, { "what", what } });
+            return call;
+        }
+
+        private sealed class Call
+        {
+            public long Number;
+            public byte[] Body;
+            public Action<Fields> Then;
+            public string Refusal;
+            public bool IsWaited;
+            public bool IsAnswered;
+        }
+    }
+}

@@ -1,0 +1,420 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Net.Sockets;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A publisher's XPUB socket and those who read there. Thread-safe.</summary>
+    internal sealed class PublisherSocket : IXPubOwner, ISessionPublisher
+    {
+        private const int OnePartBelowBytes = 16384;
+        private const int ByeAgainMs = 50;
+
+        private readonly object _lock = new object();
+        private readonly XPubSocket _socket;
+        private readonly byte[] _topic;
+        private readonly byte _codec;
+        private readonly Dictionary<ulong, XPubPeer> _greeted = new Dictionary<ulong, XPubPeer>();
+        private readonly Dictionary<string, string> _bound = new Dictionary<string, string>();
+        private readonly Queue<byte[][]> _history = new Queue<byte[][]>();
+        private readonly int _historySize;
+        private ulong _seq;
+        private ulong _bytes;
+        private ulong _lastStampNs;
+        private long _rejected;
+        private string _problem = "";
+        private bool _isClosing;
+
+        public PublisherSocket(PublisherRecord record, byte codec)
+        {
+            Record = record;
+            _codec = codec;
+            _topic = Names.TopicPart(record.Topic);
+            _historySize = record.IsLatched ? Math.Max(1, record.History) : record.History;
+            _socket = new XPubSocket(this, new ZmtpLimits(), NullMechanism.Create);
+        }
+
+        public PublisherRecord Record { get; private set; }
+
+        public ulong Count
+        {
+            get
+            {
+                lock (_lock)
+                {
+                    return _seq;
+                }
+            }
+        }
+
+        /// <summary>Messages that were not sent to a subscriber because too much was under way to it.</summary>
+        public long Dropped { get; private set; }
+
+        public int SubscriberCount
+        {
+            get
+            {
+                lock (_lock)
+                {
+                    return _greeted.Count;
+                }
+            }
+        }
+
+        /// <summary>Trouble with a payload, told with the next renewal.</summary>
+        public string Problem
+        {
+            set { _problem = value; }
+        }
+
+        public Dictionary<object, object> Statistics()
+        {
+            lock (_lock)
+            {
+                var statistics = new Dictionary<object, object> { { "id", Record.Id }, { "count", _seq }, { "bytes", _bytes }, { "last_seq", _seq } };
+                if (_seq > 0)
+                {
+                    statistics["last_stamp_ns"] = _lastStampNs;
+                }
+                if (_problem.Length > 0)
+                {
+                    statistics["problem"] = _problem;
+                }
+                return statistics;
+            }
+        }
+
+        public bool Move(IList<string> hosts)
+        {
+            lock (_lock)
+            {
+                if (_isClosing)
+                {
+                    return false;
+                }
+                foreach (string host in new List<string>(_bound.Keys))
+                {
+                    if (!hosts.Contains(host))
+                    {
+                        _socket.Unbind(host);
+                        _bound.Remove(host);
+                    }
+                }
+                var endpoints = new List<string>();
+                foreach (string host in hosts)
+                {
+                    if (!_bound.ContainsKey(host))
+                    {
+                        try
+                        {
+                            _bound[host] = ZmtpEndpoint.Format(host, _socket.Bind(host, IsFreeForUs));
+                        }
+                        catch (SocketException)
+                        {
+                            continue; // the address has gone; tried again within a second
+                        }
+                    }
+                    endpoints.Add(_bound[host]);
+                }
+                if (endpoints.Count == 0 || string.Join(" ", endpoints.ToArray()) == string.Join(" ", Record.Endpoints.ToArray()))
+                {
+                    return false;
+                }
+                Record.Endpoints = endpoints;
+                return true;
+            }
+        }
+
+        /// <summary>Send a message to everybody who reads. <paramref name="payload"/> must not be changed any more.</summary>
+        /// <exception cref="ObjectDisposedException">It is closed.</exception>
+        public void Send(byte[] payload, byte[] extension)
+        {
+            lock (_lock)
+            {
+                if (_isClosing)
+                {
+                    throw new ObjectDisposedException("Publisher");
+                }
+                _seq++;
+                _bytes += (ulong)payload.Length;
+                _lastStampNs = Clock.NowNs;
+                byte[] header = HeaderOf(payload, extension);
+                byte[][] tail = extension == null ? new[] { header, payload } : new[] { header, payload, extension };
+                Keep(tail);
+                EncodedMessage whole = null, apart = null;
+                foreach (XPubPeer peer in _socket.Peers)
+                {
+                    var state = (Reader)peer.Tag;
+                    if (state == null || state.TopicFilters.Count == 0)
+                    {
+                        continue;
+                    }
+                    bool isOnePart = state.Level >= 1 && extension == null && payload.Length < OnePartBelowBytes;
+                    EncodedMessage message = isOnePart
+                        ? whole ?? (whole = EncodedMessage.Message(Joined(header, payload)))
+                        : apart ?? (apart = EncodedMessage.Message(WithFirst(_topic, tail)));
+                    SendTo(peer, state, message, payload.Length);
+                }
+            }
+        }
+
+        /// <summary>Wait until these have said hello; returns those that have not in time.</summary>
+        public List<ExpectedSubscriber> WaitFor(List<ExpectedSubscriber> expected, int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (true)
+                {
+                    List<ExpectedSubscriber> missing = expected.FindAll(each => !_greeted.ContainsKey(each.Id));
+                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                    if (missing.Count == 0 || leftMs <= 0)
+                    {
+                        return missing;
+                    }
+                    Monitor.Wait(_lock, leftMs);
+                }
+            }
+        }
+
+        /// <summary>Publish nothing more; every subscriber disconnects when it has read everything.</summary>
+        public void SayBye()
+        {
+            lock (_lock)
+            {
+                _isClosing = true;
+                Bye();
+            }
+        }
+
+        /// <summary>Wait until all have disconnected, and close the socket.</summary>
+        public void Finish(int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (_greeted.Count > 0)
+                {
+                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                    if (leftMs <= 0)
+                    {
+                        break;
+                    }
+                    if (!Monitor.Wait(_lock, Math.Min(leftMs, ByeAgainMs)))
+                    {
+                        Bye(); // a full queue drops it like anything else
+                    }
+                }
+            }
+            _socket.Close(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+        }
+
+        // ---- in the connections' threads
+
+        void IXPubOwner.FilterChanged(XPubPeer peer, byte[] filter, bool isSubscribed)
+        {
+            Hello hello;
+            ReadAnswer answer;
+            lock (_lock)
+            {
+                var state = (Reader)peer.Tag;
+                if (state == null)
+                {
+                    peer.Tag = state = new Reader();
+                }
+                if (Filters.TryParseHello(filter, out hello))
+                {
+                    if (hello.Topic == Record.Topic)
+                    {
+                        HelloChanged(peer, state, hello, filter, isSubscribed);
+                    }
+                }
+                else if (Filters.TryParseRead(filter, out answer))
+                {
+                    TakeAnswer(peer, state, answer, isSubscribed);
+                }
+                else if (ByteOrder.StartsWith(_topic, filter))
+                {
+                    if (isSubscribed)
+                    {
+                        state.TopicFilters.Add(filter);
+                    }
+                    else
+                    {
+                        state.TopicFilters.Remove(filter);
+                    }
+                }
+                else if (!Filters.IsShares(filter))
+                {
+                    _rejected++;
+                }
+            }
+        }
+
+        void IXPubOwner.Left(XPubPeer peer)
+        {
+            lock (_lock)
+            {
+                var state = (Reader)peer.Tag;
+                XPubPeer greeted;
+                if (state != null && state.Hello != null && _greeted.TryGetValue(state.Subscriber, out greeted) && greeted == peer)
+                {
+                    _greeted.Remove(state.Subscriber);
+                }
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        void IXPubOwner.Rejected(string reason)
+        {
+            lock (_lock)
+            {
+                _rejected++;
+            }
+        }
+
+        private void HelloChanged(XPubPeer peer, Reader state, Hello hello, byte[] filter, bool isSubscribed)
+        {
+            if (!isSubscribed)
+            {
+                if (state.Hello != null && state.Subscriber == hello.Subscriber)
+                {
+                    _greeted.Remove(state.Subscriber);
+                    state.Hello = null;
+                    state.Level = 0;
+                    state.Window = null;
+                }
+            }
+            else
+            {
+                state.Subscriber = hello.Subscriber;
+                state.Hello = filter;
+                state.Level = hello.Level;
+                state.Window = hello.Level >= 2 ? new SendWindow() : null;
+                _greeted[hello.Subscriber] = peer;
+                Greet(peer, state);
+            }
+            Monitor.PulseAll(_lock);
+        }
+
+        private void Greet(XPubPeer peer, Reader state)
+        {
+            foreach (byte[][] kept in _history)
+            {
+                if (peer.Send(EncodedMessage.Message(WithFirst(state.Hello, kept))) && state.Window != null)
+                {
+                    state.Window.Sent(_seq, kept[1].Length);
+                }
+            }
+            peer.Send(Notice(state, 0));
+            if (_isClosing)
+            {
+                peer.Send(Notice(state, Header.Bye));
+            }
+        }
+
+        private void TakeAnswer(XPubPeer peer, Reader state, ReadAnswer answer, bool isSubscribed)
+        {
+            if (isSubscribed && state.Window != null && answer.Publisher == Record.Id && answer.Subscriber == state.Subscriber)
+            {
+                state.Window.Read(answer.Seq, answer.BoundBytes);
+                if (state.Window.IsToTell())
+                {
+                    peer.Send(Notice(state, 0));
+                }
+            }
+        }
+
+        private void SendTo(XPubPeer peer, Reader state, EncodedMessage message, int size)
+        {
+            SendWindow window = state.Window;
+            bool hasRoom = window == null || window.HasRoom(size);
+            if (!hasRoom || !peer.Send(message))
+            {
+                Dropped++;
+                if (window != null)
+                {
+                    window.Missed();
+                }
+            }
+            else if (window != null)
+            {
+                window.Sent(_seq, size);
+            }
+            if (window != null && window.IsToAsk(Clock.SteadyS, hasRoom))
+            {
+                peer.Send(Notice(state, 0));
+            }
+        }
+
+        private void Bye()
+        {
+            foreach (XPubPeer peer in _greeted.Values)
+            {
+                peer.Send(Notice((Reader)peer.Tag, Header.Bye));
+            }
+        }
+
+        private EncodedMessage Notice(Reader state, int flags)
+        {
+            var header = new Header { Codec = _codec, Flags = flags, Seq = _seq, StampNs = Clock.NowNs, Publisher = Record.Id };
+            return EncodedMessage.Message(state.Hello, header.ToBytes());
+        }
+
+        private byte[] HeaderOf(byte[] payload, byte[] extension)
+        {
+            var header = new Header { Codec = _codec, Seq = _seq, StampNs = _lastStampNs, Publisher = Record.Id, PayloadSize = (uint)payload.Length };
+            header.Flags = (Record.IsLatched ? Header.Latched : 0) | (extension != null ? Header.Extension : 0);
+            return header.ToBytes();
+        }
+
+        private void Keep(byte[][] tail)
+        {
+            if (_historySize > 0)
+            {
+                _history.Enqueue(tail);
+                while (_history.Count > _historySize)
+                {
+                    _history.Dequeue();
+                }
+            }
+        }
+
+        private byte[] Joined(byte[] header, byte[] payload)
+        {
+            var part = new byte[_topic.Length + header.Length + payload.Length];
+            Buffer.BlockCopy(_topic, 0, part, 0, _topic.Length);
+            Buffer.BlockCopy(header, 0, part, _topic.Length, header.Length);
+            Buffer.BlockCopy(payload, 0, part, _topic.Length + header.Length, payload.Length);
+            return part;
+        }
+
+        private static byte[][] WithFirst(byte[] first, byte[][] tail)
+        {
+            var parts = new byte[tail.Length + 1][];
+            parts[0] = first;
+            tail.CopyTo(parts, 1);
+            return parts;
+        }
+
+        /// <summary>Ports that programs of the original NEP expect to find something else on are left alone.</summary>
+        private static bool IsFreeForUs(int port)
+        {
+            return port != 7000 && port != 7777 && port != 7780 && port != 12345 && port != 50000 && (port < 9000 || port > 9999);
+        }
+
+        /// <summary>What one connection has subscribed to.</summary>
+        private sealed class Reader
+        {
+            public readonly HashSet<byte[]> TopicFilters = new HashSet<byte[]>(ByteOrder.Instance);
+            public ulong Subscriber;
+            public byte[] Hello;
+            public int Level;
+            public SendWindow Window;
+        }
+    }
+}

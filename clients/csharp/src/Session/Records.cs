@@ -1,0 +1,138 @@
+using System;
+using System.Collections.Generic;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A node as it presents itself to a master.</summary>
+    internal sealed class NodeRecord
+    {
+        public string Id;
+        public string Name;
+        public string Host;
+        public int Pid;
+        public ulong SinceNs;
+        public string Key;
+
+        public Dictionary<object, object> ToMap()
+        {
+            return new Dictionary<object, object>
+            {
+                { "id", Id }, { "name", Name }, { "host", Host }, { "pid", Pid }, { "language", "C#" }, { "since_ns", SinceNs }, { "key", Key },
+            };
+        }
+    }
+
+    /// <summary>A publisher as its node presents it.</summary>
+    internal sealed class PublisherRecord
+    {
+        public ulong Id;
+        public string Topic;
+        public string MsgType;
+        public string Codec;
+        public List<string> Endpoints = new List<string>();
+        public bool IsLatched;
+        public long Number;
+        public int History;
+
+        public Dictionary<object, object> ToMap()
+        {
+            var map = new Dictionary<object, object>
+            {
+                { "id", Id }, { "topic", Topic }, { "msg_type", MsgType }, { "codec", Codec }, { "endpoints", Endpoints }, { "number", Number },
+            };
+            if (IsLatched)
+            {
+                map["latched"] = true;
+            }
+            if (History > 0)
+            {
+                map["history"] = History;
+            }
+            return map;
+        }
+
+        public static PublisherRecord Read(Fields fields)
+        {
+            var record = new PublisherRecord();
+            record.Id = fields.Unsigned("id", 0);
+            record.Topic = fields.Text("topic", null);
+            record.MsgType = fields.Text("msg_type", null);
+            record.Codec = fields.Text("codec", null);
+            record.Endpoints = fields.Texts("endpoints");
+            record.IsLatched = fields.Flag("latched");
+            record.History = (int)Math.Min(int.MaxValue, fields.Unsigned("history", 0));
+            return record;
+        }
+    }
+
+    /// <summary>A subscriber as its node presents it.</summary>
+    internal sealed class SubscriberRecord
+    {
+        public ulong Id;
+        public string Topic;
+        public string MsgType;
+        public long Number;
+
+        public Dictionary<object, object> ToMap()
+        {
+            return new Dictionary<object, object> { { "id", Id }, { "topic", Topic }, { "msg_type", MsgType }, { "number", Number } };
+        }
+    }
+
+    /// <summary>A publisher with the node that it belongs to and the endpoint at which this node reaches it.</summary>
+    internal sealed class RemotePublisher
+    {
+        public PublisherRecord Publisher;
+        public string NodeName;
+
+        /// <summary>Endpoint to connect to, or null when there is none for this node.</summary>
+        public string Endpoint;
+
+        public static RemotePublisher Read(Fields fields, MasterAddress master)
+        {
+            var remote = new RemotePublisher();
+            remote.Publisher = PublisherRecord.Read(fields.Map("publisher"));
+            remote.NodeName = fields.Text("node_name", null);
+            remote.Endpoint = Nearest(remote.Publisher.Endpoints, master);
+            return remote;
+        }
+
+        private static string Nearest(List<string> endpoints, MasterAddress master)
+        {
+            foreach (string each in endpoints)
+            {
+                ZmtpEndpoint endpoint;
+                if (!ZmtpEndpoint.TryParse(each, out endpoint))
+                {
+                    continue; // nanomsg, or nonsense
+                }
+                if (master.IsNear ? endpoint.Host == MasterAddress.Loopback : !endpoint.IsLoopback)
+                {
+                    return endpoint.Host == "0.0.0.0" ? ZmtpEndpoint.Format(master.Host, endpoint.Port) : each;
+                }
+            }
+            ZmtpEndpoint first;
+            return master.IsNear && endpoints.Count > 0 && ZmtpEndpoint.TryParse(endpoints[0], out first) ? endpoints[0] : null;
+        }
+    }
+
+    /// <summary>A subscriber that a new publisher waits for.</summary>
+    internal sealed class ExpectedSubscriber
+    {
+        public ulong Id;
+        public string NodeName;
+
+        public static List<ExpectedSubscriber> ReadAll(List<object> list)
+        {
+            var all = new List<ExpectedSubscriber>();
+            foreach (object each in list)
+            {
+                var fields = new Fields(each);
+                all.Add(new ExpectedSubscriber { Id = fields.Unsigned("id", 0), NodeName = fields.Text("node_name", null) });
+            }
+            return all;
+        }
+    }
+}

@@ -1,0 +1,369 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A subscriber's SUB socket and its inbox. Thread-safe.</summary>
+    internal sealed class SubscriberSocket : ISubOwner, ISessionSubscriber
+    {
+        private readonly object _lock = new object();
+        private readonly SubSocket _socket;
+        private readonly HeardPublishers _sources = new HeardPublishers();
+        private readonly HashSet<ulong> _closedEarly = new HashSet<ulong>();
+        private readonly Queue<Message> _inbox = new Queue<Message>();
+        private readonly SubscriberOptions _options;
+        private readonly byte[] _topic;
+        private readonly byte[] _hello;
+        private long _inboxBytes;
+        private long _rejected;
+        private string _rejection = "";
+        private double _rejectedAtS;
+        private bool _isClosed;
+
+        public SubscriberSocket(SubscriberRecord record, SubscriberOptions options)
+        {
+            Record = record;
+            _options = options;
+            _topic = Names.TopicPart(record.Topic);
+            _hello = Filters.Hello(record.Id, record.Topic, 3);
+            _socket = new SubSocket(this, new ZmtpLimits { MaxParts = 4 }, NullMechanism.Create);
+            _socket.Subscribe(_topic);
+            _socket.Subscribe(_hello);
+        }
+
+        /// <summary>Called after messages were put into the inbox, without the lock.</summary>
+        public Action Arrived { get; set; }
+
+        public SubscriberRecord Record { get; private set; }
+
+        public long Received
+        {
+            get { lock (_lock) { return _sources.Received; } }
+        }
+
+        public long Lost
+        {
+            get { lock (_lock) { return _sources.Lost; } }
+        }
+
+        public long Rejected
+        {
+            get { lock (_lock) { return _rejected; } }
+        }
+
+        public bool IsClosed
+        {
+            get { lock (_lock) { return _isClosed; } }
+        }
+
+        /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
+        public Message Take(int timeoutMs, CancellationToken cancellation)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (_inbox.Count == 0)
+                {
+                    int leftMs = timeoutMs < 0 ? Timeout.Infinite : Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds);
+                    if (_isClosed || leftMs == 0 || cancellation.IsCancellationRequested)
+                    {
+                        return null;
+                    }
+                    Monitor.Wait(_lock, leftMs);
+                }
+                Message message = _inbox.Dequeue();
+                _inboxBytes -= message.Size;
+                return message;
+            }
+        }
+
+        /// <summary>Let those who wait look again.</summary>
+        public void Wake()
+        {
+            lock (_lock)
+            {
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        /// <summary>Wait until all listed publishers have echoed.</summary>
+        public void WaitForEchoes(int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (!AllHaveEchoed())
+                {
+                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                    if (leftMs <= 0)
+                    {
+                        return;
+                    }
+                    Monitor.Wait(_lock, leftMs);
+                }
+            }
+        }
+
+        public Dictionary<object, object> Statistics()
+        {
+            lock (_lock)
+            {
+                var statistics = new Dictionary<object, object> { { "id", Record.Id }, { "received", Math.Max(0, _sources.Received) }, { "lost", Math.Max(0, _sources.Lost) } };
+                if (_rejected > 0 && Clock.SteadyS < _rejectedAtS + 5.0)
+                {
+                    statistics["problem"] = "a message was rejected: " + _rejection + " (" + _rejected + " so far)";
+                }
+                return statistics;
+            }
+        }
+
+        public void Connect(RemotePublisher remote)
+        {
+            lock (_lock)
+            {
+                if (_isClosed || _closedEarly.Contains(remote.Publisher.Id))
+                {
+                    return;
+                }
+                foreach (ulong old in _sources.ReplacedBy(remote))
+                {
+                    _sources.Closing(old, 0);
+                }
+                LeaveOthersAt(remote);
+                HeardPublisher source = _sources.Listed(remote);
+                if (remote.Endpoint == null || source.Connection != null && source.Connection.Endpoint == remote.Endpoint)
+                {
+                    return;
+                }
+                if (source.Connection != null)
+                {
+                    _socket.Disconnect(source.Connection);
+                    source.HasEchoed = false;
+                }
+                source.Connection = _socket.Connect(remote.Endpoint, null);
+            }
+        }
+
+        public void Gone(ulong publisher, ulong lastSeq, bool isClosed)
+        {
+            lock (_lock)
+            {
+                if (!isClosed)
+                {
+                    _sources.Lapsed(publisher, lastSeq);
+                }
+                else if (_sources.Find(publisher) != null)
+                {
+                    _sources.Closing(publisher, lastSeq);
+                }
+                else if (_closedEarly.Count < 1000)
+                {
+                    _closedEarly.Add(publisher); // the reply that still names it may come later
+                }
+            }
+        }
+
+        public void Reconcile(IList<RemotePublisher> remotes)
+        {
+            lock (_lock)
+            {
+                var listed = new HashSet<ulong>();
+                foreach (RemotePublisher each in remotes)
+                {
+                    listed.Add(each.Publisher.Id);
+                }
+                foreach (KeyValuePair<ulong, HeardPublisher> each in _sources.All)
+                {
+                    if (each.Value.Remote != null && !listed.Contains(each.Key) && each.Value.EndsAtS == null)
+                    {
+                        each.Value.IsLapsed = true;
+                    }
+                }
+                foreach (RemotePublisher each in remotes)
+                {
+                    Connect(each);
+                }
+            }
+        }
+
+        public void Tick(Dictionary<ulong, ulong> lastSeqs)
+        {
+            lock (_lock)
+            {
+                foreach (KeyValuePair<ulong, ulong> each in lastSeqs)
+                {
+                    _sources.PromisedBy(each.Key, each.Value);
+                }
+                foreach (ulong each in _sources.Ended())
+                {
+                    _sources.Settle(each);
+                    Leave(each);
+                }
+            }
+        }
+
+        public void Close()
+        {
+            lock (_lock)
+            {
+                _isClosed = true;
+                _socket.Dispose();
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        // ---- in the connections' threads
+
+        void ISubOwner.Received(SubConnection from, byte[][] parts)
+        {
+            bool hasNew = false;
+            lock (_lock)
+            {
+                if (_isClosed)
+                {
+                    return;
+                }
+                try
+                {
+                    hasNew = Take(from, parts);
+                }
+                catch (WireException exception)
+                {
+                    _rejected++;
+                    _rejection = exception.Code;
+                    _rejectedAtS = Clock.SteadyS;
+                }
+                Monitor.PulseAll(_lock);
+            }
+            Action arrived = Arrived;
+            if (hasNew && arrived != null)
+            {
+                arrived();
+            }
+        }
+
+        void ISubOwner.Disconnected(SubConnection from, string reason)
+        {
+        }
+
+        private bool Take(SubConnection from, byte[][] parts)
+        {
+            bool isAlone = parts.Length > 1 && ByteOrder.Instance.Equals(parts[0], _hello);
+            int cut = isAlone ? 0 : WireReader.CheckFirst(parts);
+            if (!isAlone && (cut != _topic.Length || !ByteOrder.StartsWith(parts[0], _topic)))
+            {
+                throw new WireException("first-part");
+            }
+            if (isAlone && parts.Length == 2)
+            {
+                TakeNotice(from, Header.Read(parts[1], 0, parts[1].Length));
+                return false;
+            }
+            bool hasNew = false;
+            foreach (WireMessage each in WireReader.ReadRest(Record.Topic, parts, cut))
+            {
+                hasNew |= Take(each, isAlone);
+            }
+            return hasNew;
+        }
+
+        private bool Take(WireMessage message, bool isAlone)
+        {
+            ulong publisher = message.Header.Publisher;
+            if (!isAlone && _sources.IsEarly(publisher) || !_sources.Arrived(publisher, message.Header.Seq, isAlone))
+            {
+                return false;
+            }
+            if ((message.Header.Flags & Header.Shared) != 0)
+            {
+                _sources.Dropped(1);
+                throw new WireException("shared-memory"); // nobody was told that it would be read
+            }
+            RemotePublisher remote = _sources.Get(publisher).Remote;
+            Put(new Message(message, remote == null ? Record.MsgType : remote.Publisher.MsgType));
+            return true;
+        }
+
+        private void Put(Message message)
+        {
+            if (_options.KeepLatest)
+            {
+                _inbox.Clear();
+                _inboxBytes = 0;
+            }
+            _inbox.Enqueue(message);
+            _inboxBytes += message.Size;
+            while (_inbox.Count > 1 && (_inbox.Count > _options.MaxMessages || _inboxBytes > _options.MaxBytes))
+            {
+                _inboxBytes -= _inbox.Dequeue().Size;
+                _sources.Dropped(1);
+            }
+        }
+
+        private void TakeNotice(SubConnection from, Header header)
+        {
+            HeardPublisher source = _sources.Get(header.Publisher);
+            bool isPossible = _sources.Reached(header.Publisher, header.Seq);
+            if ((header.Flags & Header.Bye) != 0)
+            {
+                Leave(header.Publisher);
+            }
+            else if ((header.Flags & Header.Offer) == 0)
+            {
+                if (source.HasEchoed)
+                {
+                    ulong bound = (ulong)(SendWindow.MaxBytes / Math.Max(1, _sources.EchoingCount()));
+                    _socket.Signal(from, Filters.Read(new ReadAnswer { Subscriber = Record.Id, Publisher = header.Publisher, Seq = header.Seq, BoundBytes = bound }));
+                }
+                source.HasEchoed = true;
+            }
+            if (!isPossible)
+            {
+                throw new WireException("seq-leap");
+            }
+        }
+
+        private bool AllHaveEchoed()
+        {
+            foreach (KeyValuePair<ulong, HeardPublisher> each in _sources.All)
+            {
+                if (each.Value.Connection != null && !each.Value.HasEchoed && !each.Value.IsLapsed)
+                {
+                    return false;
+                }
+            }
+            return true;
+        }
+
+        private void LeaveOthersAt(RemotePublisher remote)
+        {
+            var others = new List<ulong>();
+            foreach (KeyValuePair<ulong, HeardPublisher> each in _sources.All)
+            {
+                if (each.Key != remote.Publisher.Id && remote.Endpoint != null && each.Value.Connection != null
+                    && each.Value.Connection.Endpoint == remote.Endpoint)
+                {
+                    others.Add(each.Key);
+                }
+            }
+            foreach (ulong each in others)
+            {
+                _sources.Settle(each);
+                Leave(each);
+            }
+        }
+
+        private void Leave(ulong publisher)
+        {
+            HeardPublisher source = _sources.Remove(publisher);
+            if (source != null && source.Connection != null)
+            {
+                _socket.Disconnect(source.Connection);
+            }
+        }
+    }
+}

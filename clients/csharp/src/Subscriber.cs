@@ -1,0 +1,109 @@
+using System;
+using System.Threading;
+using System.Threading.Tasks;
+using Nep.Session;
+
+namespace Nep
+{
+    /// <summary>Receives the messages of one topic. Created by <see cref="Node.CreateSubscriber(string, string, SubscriberOptions)"/>. Thread-safe.</summary>
+    /// <example>
+    /// <code>
+    /// using (var node = new Node("receiver"))
+    /// using (Subscriber subscriber = node.CreateSubscriber("example"))
+    /// {
+    ///     Message message;
+    ///     while (subscriber.TryReceive(TimeSpan.FromSeconds(10), out message))
+    ///     {
+    ///         Console.WriteLine(message.Text);
+    ///     }
+    /// }
+    /// </code>
+    /// </example>
+    public sealed partial class Subscriber : IDisposable
+    {
+        private readonly Node _node;
+        private readonly SubscriberSocket _socket;
+
+        internal Subscriber(Node node, SubscriberSocket socket)
+        {
+            _node = node;
+            _socket = socket;
+        }
+
+        /// <summary>Topic.</summary>
+        public string Topic
+        {
+            get { return _socket.Record.Topic; }
+        }
+
+        /// <summary>Number of messages that arrived and were not dropped.</summary>
+        public long Received
+        {
+            get { return _socket.Received; }
+        }
+
+        /// <summary>Number of messages that were sent and did not arrive, or were dropped because they were not read in time.</summary>
+        public long Lost
+        {
+            get { return _socket.Lost; }
+        }
+
+        /// <summary>Number of malformed messages that were rejected.</summary>
+        public long Rejected
+        {
+            get { return _socket.Rejected; }
+        }
+
+        internal SubscriberSocket Socket
+        {
+            get { return _socket; }
+        }
+
+        /// <summary>Wait for the next message.</summary>
+        /// <returns>The message, or null when the subscriber was closed.</returns>
+        public Message Receive()
+        {
+            return _socket.Take(-1, CancellationToken.None);
+        }
+
+        /// <summary>Wait for the next message, for a limited time.</summary>
+        /// <param name="timeout">Longest wait; <see cref="TimeSpan.Zero"/> does not wait.</param>
+        /// <param name="message">The message, or null.</param>
+        /// <returns>Whether there was one.</returns>
+        public bool TryReceive(TimeSpan timeout, out Message message)
+        {
+            message = _socket.Take((int)timeout.TotalMilliseconds, CancellationToken.None);
+            return message != null;
+        }
+
+        /// <summary>Wait for the next message without blocking the caller.</summary>
+        /// <param name="cancellation">Ends the wait.</param>
+        /// <returns>The message; null when the subscriber was closed.</returns>
+        /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
+        public async Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
+        {
+            using (cancellation.Register(_socket.Wake))
+            {
+                Message message = await Task.Factory.StartNew(() => _socket.Take(-1, cancellation), cancellation,
+                    TaskCreationOptions.LongRunning, TaskScheduler.Default).ConfigureAwait(false);
+                if (message == null)
+                {
+                    cancellation.ThrowIfCancellationRequested();
+                }
+                return message;
+            }
+        }
+
+        /// <summary>Close; a waiting <see cref="Receive"/> returns null.</summary>
+        public void Close()
+        {
+            _node.Close(this);
+        }
+
+        /// <summary>Same as <see cref="Close"/>.</summary>
+        public void Dispose()
+        {
+            Close();
+        }
+    }
+}
