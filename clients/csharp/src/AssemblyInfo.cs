@@ -1,4 +1,4 @@
 using System.Runtime.CompilerServices;
 
-[assembly: InternalsVisibleTo("Nep.Tests")]
+[assembly: InternalsVisibleTo("WirePeer")]
 [assembly: InternalsVisibleTo("ZmtpPeer")]

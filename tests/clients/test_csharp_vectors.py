@@ -1,0 +1,113 @@
+"""The C# client against the vectors that all implementations of the wire share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+
+from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+
+pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
+DATA = Path(__file__).parents[1] / "data" / "wire"
+HAS_CODES = (DATA / "malformed.json").exists()  # vectors with numbers as text and errors as codes
+
+
+def vectors(name: str) -> Any:
+    return json.loads((DATA / f"{name}.json").read_text("utf-8"))
+
+
+@pytest.fixture(scope="module")
+def wire() -> Iterator[MonoProgram]:
+    with running(program("WirePeer.exe", CSHARP / "tests" / "peer" / "WirePeer.cs")) as made:
+        yield made
+
+
+def read(wire: MonoProgram, parts: list[str]) -> Any:
+    return json.loads(wire.ask(" ".join(["message", *("." + part for part in parts)])))
+
+
+def as_text(value: object) -> object:
+    return str(value) if isinstance(value, int) else value
+
+
+def test_messages_are_read_and_written_as_the_vectors_say(wire: MonoProgram) -> None:
+    for vector in vectors("messages"):
+        answer = read(wire, vector["parts"])
+        if "error" in vector:
+            assert "error" in answer, vector["name"]
+            assert not HAS_CODES or answer["error"] == vector["error"], vector["name"]
+            continue
+        (message,) = answer
+        means = vector["means"]
+        for field in ("topic", "codec", "flags", "payload"):
+            assert message[field] == means[field], vector["name"]
+        for field in ("seq", "stamp_ns", "publisher"):
+            assert message[field] == as_text(means[field]), vector["name"]
+        whole = message["first"] + message["header"] + message["payload"]
+        assert whole == "".join(vector["parts"][:3])
+        if means["extension"]:
+            assert msgpack.unpackb(bytes.fromhex(message["extension"])) == means["extension"]
+
+
+def test_batches_are_read_as_the_vectors_say(wire: MonoProgram) -> None:
+    for vector in vectors("batches"):
+        answer = read(wire, [vector["part"]])
+        if "error" in vector:
+            assert not HAS_CODES or answer == {"error": vector["error"]}, vector["name"]
+            assert "error" in answer
+            continue
+        assert len(answer) == len(vector["means"])
+        for message, means in zip(answer, vector["means"], strict=True):
+            assert {field: message[field] for field in means} == {
+                field: value if field == "codec" else as_text(value) for field, value in means.items()
+            }
+
+
+def test_ids_come_from_the_key(wire: MonoProgram) -> None:
+    for node in vectors("ids")["nodes"]:
+        key = "e9" if node["key"] == "\u00e9" else node["key"]
+        assert json.loads(wire.ask(f"id {key}")) == node["node_id"]
+        for number, wanted in node["ids"].items():
+            assert json.loads(wire.ask(f"id {key} {number}")) == wanted
+
+
+def test_answers_of_the_master_survive_decoding_and_encoding(wire: MonoProgram) -> None:
+    for asked in vectors("master")["asked"]:
+        for body in (asked["request"], asked["answer"]):
+            again = bytes.fromhex(json.loads(wire.ask(f"pack {body}")))
+            options = {"strict_map_key": False}
+            assert msgpack.unpackb(again, **options) == msgpack.unpackb(bytes.fromhex(body), **options)
+
+
+@pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
+def test_malformed_messages_are_refused_with_the_same_codes(wire: MonoProgram) -> None:
+    wrong = [
+        (vector, answer)
+        for vector in vectors("malformed")
+        if (answer := read(wire, vector[1:])) != {"error": vector[0]}
+    ]
+    assert wrong == []
+
+
+@pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
+def test_filters_and_notices_are_read_and_written_as_the_vectors_say(wire: MonoProgram) -> None:
+    for vector in vectors("filters"):
+        answer = json.loads(wire.ask(f"filter {vector['filter']}"))
+        if "error" in vector:
+            assert answer == {"error": vector["error"]}, vector["name"]
+            continue
+        means = vector["means"]
+        assert {field: answer[field] for field in means if field in answer} == {
+            field: means[field] for field in means if field in answer
+        }
+        assert answer.get("again", vector["filter"]) == vector["filter"]
+    for vector in vectors("notices"):
+        header = json.loads(wire.ask(f"header {vector['parts'][1]}"))
+        assert header["header"] == vector["parts"][1]
+        for field in ("seq", "stamp_ns", "publisher"):
+            assert header[field] == vector["means"][field], vector["name"]
