@@ -48,7 +48,10 @@ def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
             made = BUILD / "new" / name  # the file's name becomes the assembly's
             made.parent.mkdir(exist_ok=True)
             done = subprocess.run(
-                [*COMPILE, *options, f"-out:{made}", *map(str, files)], capture_output=True, text=True, check=False
+                [*COMPILE, *options, f"-out:{made}", *map(str, files)],
+                capture_output=True,
+                text=True,
+                check=False,
             )
             assert done.returncode == 0, done.stdout + done.stderr
             made.replace(target)

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 import pytest
 import zmq
 
-from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
 TOPIC = b"example\0"
@@ -51,7 +51,12 @@ def test_dealer_exchanges_messages_of_any_size(context, stack: ExitStack) -> Non
     echo, endpoint = bound(context, zmq.DEALER)
     with echo:
         dealer = started(stack, "dealer", endpoint)
-        for parts in ([b"a"], [b"", b"b" * 255, b"c" * 256], [b"x" * 70_000, b""], [bytes(range(256)) * 24_000]):
+        for parts in (
+            [b"a"],
+            [b"", b"b" * 255, b"c" * 256],
+            [b"x" * 70_000, b""],
+            [bytes(range(256)) * 24_000],
+        ):
             echo.send_multipart(parts)
             assert echo.recv_multipart() == parts
 
@@ -174,7 +179,9 @@ READY = b"\x04\x19\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
         (GREETING[:40], "handshake-timeout"),
     ],
 )
-def test_malformed_peer_is_disconnected_and_counted_with_a_reason(stack: ExitStack, said: bytes, code: str) -> None:
+def test_malformed_peer_is_disconnected_and_counted_with_a_reason(
+    stack: ExitStack, said: bytes, code: str
+) -> None:
     xpub = started(stack, "xpub", "127.0.0.1", "handshake_ms=300")
     port = int(xpub.line().split()[1])
     with socket.create_connection(("127.0.0.1", port), timeout=40.0) as stranger:

@@ -1,6 +1,7 @@
 using System;
 using System.Collections.Generic;
 using Nep.Session;
+using Nep.Wire;
 
 namespace Nep
 {
@@ -75,6 +76,11 @@ namespace Nep
         /// <exception cref="ObjectDisposedException">The publisher was closed.</exception>
         public void Publish(object payload)
         {
+            if (_codec.Number == 5)
+            {
+                PublishImage(payload as byte[] ?? new byte[0]);
+                return;
+            }
             byte[] encoded;
             try
             {
@@ -99,6 +105,20 @@ namespace Nep
                 throw new PayloadException("A topic of type '" + _codec.Name + "' carries no JSON.");
             }
             _socket.Send(Codec.CheckedJson(json), null);
+        }
+
+        /// <summary>Publish a JPEG or PNG file on a topic of type <c>image</c>.</summary>
+        /// <param name="file">Bytes of the file. They are copied.</param>
+        /// <exception cref="PayloadException">The topic has another type, or it is neither JPEG nor PNG.</exception>
+        /// <exception cref="ObjectDisposedException">The publisher was closed.</exception>
+        public void PublishImage(byte[] file)
+        {
+            if (_codec.Number != 5)
+            {
+                throw new PayloadException("A topic of type '" + _codec.Name + "' carries no images.");
+            }
+            byte[] extension = MessagePackWriter.Write(ImageHeader.Describe(file));
+            _socket.Send(_codec.Encode(file), extension);
         }
 
         /// <summary>Close: subscribers receive what was published, within <see cref="NodeOptions.CloseTimeout"/>.</summary>

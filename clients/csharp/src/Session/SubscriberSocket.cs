@@ -30,7 +30,7 @@ namespace Nep.Session
             _options = options;
             _topic = Names.TopicPart(record.Topic);
             _hello = Filters.Hello(record.Id, record.Topic, 3);
-            _socket = new SubSocket(this, new ZmtpLimits { MaxParts = 4 }, NullMechanism.Create);
+            _socket = new SubSocket(this, new ZmtpLimits(), NullMechanism.Create);
             _socket.Subscribe(_topic);
             _socket.Subscribe(_hello);
         }

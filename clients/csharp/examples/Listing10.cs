@@ -1,0 +1,20 @@
+using System;
+using Nep;
+
+// The program of the paper's listing 10: wait for messages and print them.
+namespace Example
+{
+    class Program
+    {
+        static void Main(string[] args)
+        {
+            Nep.Node node = new Nep.Node("csharp_receiver");
+            Nep.Subscriber sub = node.new_sub("test");
+            while (true)
+            {
+                string msg = sub.listen();
+                Console.WriteLine(msg);
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+"""Programs in C# and in Python in one network."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import nep
+from nep.masters.master import Master
+from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+from tests.nep.programs import eventually
+
+pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
+Node = Any
+LONG_S = 20.0
+
+
+def example(name: str) -> Path:
+    return program(f"{name}.exe", CSHARP / "examples" / f"{name}.cs")
+
+
+def peer(name: str) -> Path:
+    return program(f"{name}.exe", CSHARP / "tests" / "peer" / f"{name}.cs")
+
+
+class Adapter:
+    """The adapter of the conformance tester, asked from here."""
+
+    def __init__(self, started: MonoProgram) -> None:
+        self.program = started
+        self.events: list[dict[str, Any]] = []
+        self._asked = 0
+
+    def ask(self, what: str, **members: object) -> dict[str, Any]:
+        self._asked += 1
+        self.program.say(json.dumps({"id": self._asked, "do": what, **members}))
+        while (said := json.loads(self.program.line())).get("re") != self._asked:
+            self.events.append(said)
+        assert "error" not in said, said
+        return said
+
+    def heard(self, count: int) -> list[dict[str, Any]]:
+        """Wait for so many messages and return them."""
+        while len(self.events) < count:
+            self.events.append(json.loads(self.program.line()))
+        return self.events
+
+
+@pytest.fixture
+def adapter(master: Master) -> Iterator[Adapter]:
+    with running(program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")) as started:
+        made = Adapter(started)
+        made.ask("node", name="csharp")
+        yield made
+
+
+@pytest.fixture
+def node(master: Master) -> Iterator[Node]:
+    with nep.node("python") as made:
+        yield made
+
+
+def listen(subscriber: Any) -> Any:
+    is_there, payload = subscriber.listen(timeout_s=LONG_S)
+    assert is_there
+    return payload
+
+
+def test_listing_9_delivers_its_message_and_ends(node: Node) -> None:
+    subscriber = node.new_sub("test", "json")
+    with running(example("Listing9")) as sender:
+        assert listen(subscriber) == {"message": "hello"}
+        assert sender.process.wait(LONG_S) == 0
+
+
+def test_listing_10_prints_what_is_published(node: Node) -> None:
+    with running(example("Listing10")) as receiver:
+        publisher = node.new_pub("test", "json")
+        eventually(lambda: publisher.subscribers > 0)
+        publisher.publish({"message": "hello"})
+        assert json.loads(receiver.line()) == {"message": "hello"}
+
+
+def test_names_of_version_0_0_0_5_work(node: Node) -> None:
+    subscriber = node.new_sub("answer", "json")
+    ask = node.new_pub("ask", "json")
+    called = node.new_pub("called", "json")
+    with running(peer("OldNames")) as old:
+        assert old.line() == "ready"
+        called.publish({"a": "b c"})
+        assert listen(subscriber) == {"a": "b c"}
+        ask.publish({"say": "the end"})
+        assert json.loads(listen(subscriber)["heard"]) == {"say": "the end"}
+        assert old.process.wait(LONG_S) == 0
+
+
+@pytest.mark.parametrize(
+    ("codec", "member", "sent", "received"),
+    [
+        ("json", "value", {"text": "grüß 🤖", "list": [1, 2.5, None, True]}, None),
+        ("string", "text", "grüß\n🤖", None),
+        ("bytes", "bytes", "AAEC/w==", b"\0\1\2\xff"),
+        ("msgpack", "value", {"big": 2**62, "deep": [[{"a": -1}]]}, None),
+    ],
+)
+def test_payloads_of_every_type_arrive_in_both_directions(
+    adapter: Adapter, node: Node, codec: str, member: str, sent: Any, received: Any
+) -> None:
+    payload = sent if received is None else received
+    subscriber = node.new_sub("there", codec)
+    pub = adapter.ask("publisher", topic="there", type=codec)["pub"]
+    adapter.ask("publish", pub=pub, **{member: sent})
+    assert listen(subscriber) == payload
+    adapter.ask("subscriber", topic="back", type=codec)
+    node.new_pub("back", codec).publish(payload)
+    (event,) = adapter.heard(1)
+    assert event["codec"] == codec
+    assert event.get("value", event["payload"]) == sent
+
+
+def test_bursts_and_large_messages_arrive_whole_in_both_directions(adapter: Adapter, node: Node) -> None:
+    sub = adapter.ask("subscriber", topic="burst", type="json")["sub"]
+    publisher = node.new_pub("burst", "json")
+    for number in range(2000):
+        publisher.publish({"n": number})
+    assert [each["value"]["n"] for each in adapter.heard(2000)] == list(range(2000))
+    assert adapter.ask("counts", sub=sub)["lost"] == "0"
+    subscriber = node.new_sub("large", "string")
+    pub = adapter.ask("publisher", topic="large", type="string")["pub"]
+    text = "x" * 6_000_000
+    adapter.ask("publish", pub=pub, text=text, count=20)
+    assert all(listen(subscriber) == text for _ in range(20))
+    assert subscriber.lost == 0
+    adapter.ask("publish", pub=pub, text=text, count=50)  # more than may be under way to one subscriber
+    deadline, received = time.monotonic() + LONG_S, 0
+    while received + subscriber.lost < 50 and time.monotonic() < deadline:
+        received += subscriber.listen(timeout_s=0.1)[0]
+    assert received + subscriber.lost == 50
+    assert received >= 32  # 192 MB
+
+
+def test_late_subscriber_receives_latched_message_and_history(adapter: Adapter, node: Node) -> None:
+    latched = adapter.ask("publisher", topic="state", type="json", latched=True)["pub"]
+    history = adapter.ask("publisher", topic="log", type="json", latched=True, history=3)["pub"]
+    adapter.ask("publish", pub=latched, value={}, count=5)
+    adapter.ask("publish", pub=history, value={}, count=5)
+    assert listen(node.new_sub("state", "json")) == {"n": 5}
+    late = node.new_sub("log", "json")
+    assert [listen(late)["n"] for _ in range(3)] == [3, 4, 5]
+    node.new_pub("theirs", "json", latched=True, history=2).publish({"n": 1})
+    adapter.ask("subscriber", topic="theirs", type="json")
+    assert adapter.heard(1)[0]["value"] == {"n": 1}
+
+
+def test_master_restart_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Master("127.0.0.1:0", learn_s=0.0) as first:
+        address = first.address
+        monkeypatch.setenv("NEP_MASTER", address)
+        with (
+            nep.node("python") as node,
+            running(program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")) as started,
+        ):
+            adapter = Adapter(started)
+            adapter.ask("node", name="csharp")
+            sub = adapter.ask("subscriber", topic="in", type="json")["sub"]
+            pub = adapter.ask("publisher", topic="out", type="json")["pub"]
+            subscriber, publisher = node.new_sub("out", "json"), node.new_pub("in", "json")
+
+            def exchange() -> None:
+                publisher.publish({})
+                adapter.ask("publish", pub=pub, value={})
+                listen(subscriber)
+
+            exchange()
+            first.close()
+            exchange()
+            with Master(address, learn_s=0.0):
+                eventually(lambda: exchange() or {"python", "csharp"} <= names(node))
+                counts = adapter.ask("counts", sub=sub)
+                assert (counts["lost"], subscriber.lost) == ("0", 0)
+                eventually(lambda: adapter.ask("counts", sub=sub)["received"] == str(publisher.count))
+
+
+def names(node: Node) -> set[str]:
+    """Return the names of all nodes in the graph."""
+    return {each.name for each in node.graph().nodes.values()}
+
+
+def test_killed_program_leaves_the_graph_and_a_restarted_one_is_heard(master: Master, node: Node) -> None:
+    subscriber = node.new_sub("test", "json")
+    adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
+    for is_last in (False, True):
+        with running(adapter_program) as started:
+            adapter = Adapter(started)
+            adapter.ask("node", name="victim")
+            pub = adapter.ask("publisher", topic="test", type="json")["pub"]
+            adapter.ask("publish", pub=pub, value={"a": 1})
+            assert listen(subscriber) == {"a": 1}
+            assert "victim" in names(node)
+            started.process.kill()
+            started.process.wait()
+            if not is_last:
+                eventually(lambda: "victim" not in names(node))
+    assert subscriber.lost == 0
+
+
+def test_slow_subscriber_counts_exactly_what_it_loses(node: Node) -> None:
+    with running(peer("SlowReader")) as slow:
+        assert slow.line() == "ready"
+        publisher = node.new_pub("fast", "json")
+        for number in range(3000):
+            publisher.publish({"n": number})
+
+        def all_counted() -> bool:
+            received, lost = map(int, slow.ask("counts").split())
+            return received + lost == 3000 and lost > 0
+
+        eventually(all_counted)
+        assert slow.end() == 0
