@@ -122,6 +122,23 @@ def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
     assert system.ran == []
 
 
+def test_mono_is_installed_for_root_and_named_to_others(capsys: pytest.CaptureFixture[str]) -> None:
+    system = FakeSystem(listed=set(system_packages.MONO))
+    system_packages.bring_mono(system.computer(root=False))
+    assert system.ran == []
+    assert "mono-mcs" in capsys.readouterr().out
+    system_packages.bring_mono(system.computer())
+    assert set(system_packages.MONO) <= system.installed
+    system.ran.clear()
+    system_packages.bring_mono(system.computer())
+    assert system.ran == []
+
+
+def test_mono_that_cannot_be_had_is_no_failure(capsys: pytest.CaptureFixture[str]) -> None:
+    system_packages.bring_mono(FakeSystem().computer())
+    assert "skipped" in capsys.readouterr().out
+
+
 def test_bringing_them_is_a_command_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
     system = FakeSystem(installed=set(PACKAGES) - {"libnss3"}, listed={"libnss3"})
     assert system_packages.main(system.computer(root=False)) == 2

@@ -41,6 +41,10 @@ QT_LIBRARIES = (
 )
 
 
+MONO = ("mono-mcs", "mono-runtime", "libnewtonsoft-json5.0-cil")
+"""What compiles and runs the C# client in tests. Without it those tests are skipped."""
+
+
 def wanted_packages(computer: Computer) -> list[str]:
     """The system packages that this computer must have, with ``|`` between names that mean the same."""
     wanted = list(QT_LIBRARIES)
@@ -91,6 +95,23 @@ def bring_system_packages(computer: Computer) -> None:
         )
     with timed(f"bringing {len(missing)} system packages with apt (the first time some 70 MB)"):
         apt_install(computer, missing, names, unknown)
+
+
+def bring_mono(computer: Computer) -> None:
+    """Install mono for the tests of the C# client (root), or print one line that they are skipped."""
+    if not computer.has_apt:
+        return
+    lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *MONO]).splitlines()
+    missing = [name for name in MONO if f"{name} installed" not in lines]
+    if not missing:
+        return
+    try:
+        if not computer.root:
+            raise Trouble(f"sudo apt-get install -y --no-install-recommends {' '.join(missing)}")
+        with timed("bringing mono with apt for the C# client"):
+            apt_install(computer, missing, *available(computer, missing))
+    except Trouble as trouble:
+        print(f"· The tests of the C# client are skipped without mono: {trouble}")
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:

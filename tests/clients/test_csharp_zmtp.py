@@ -50,7 +50,7 @@ def bound(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> tuple[zmq.Socke
 def test_dealer_exchanges_messages_of_any_size(context, stack: ExitStack) -> None:
     echo, endpoint = bound(context, zmq.DEALER)
     with echo:
-        dealer = started(stack, "dealer", endpoint)
+        started(stack, "dealer", endpoint)
         for parts in (
             [b"a"],
             [b"", b"b" * 255, b"c" * 256],

@@ -53,7 +53,7 @@ internal static class Adapter
         {
             case "features":
                 answer["language"] = "C#";
-                answer["version"] = "0.2.0";
+                answer["version"] = "0.1.0";
                 answer["features"] = new JArray("hello1", "hello2", "hello3", "losses", "latched", "history", "latest", "statistics", "keys");
                 break;
             case "node":
