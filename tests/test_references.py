@@ -90,12 +90,9 @@ def _is_there(dotted: str) -> bool:
 @cache
 def _words() -> frozenset[str]:
     """Every word of the sources that stands outside of quotation by backticks."""
-    return frozenset(
-        word
-        for place, text in _texts().items()
-        if not place.endswith(".md")
-        for word in _WORD.findall(_QUOTED.sub(" ", text))
-    )
+    texts = [text for place, text in _texts().items() if not place.endswith(".md")]
+    texts += [path.read_text(encoding="utf-8") for path in (ROOT / "clients").glob("*/src/**/*.cs")]
+    return frozenset(word for text in texts for word in _WORD.findall(_QUOTED.sub(" ", text)))
 
 
 def _quoted() -> Iterator[tuple[str, str]]:

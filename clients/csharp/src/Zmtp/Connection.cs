@@ -173,6 +173,7 @@ namespace Nep.Zmtp
             string theirs = _mechanism.PeerProperties.TryGetValue("Socket-Type", out value) ? Encoding.ASCII.GetString(value) : "";
             string[] allowed = _socketType == "DEALER" ? new[] { "ROUTER", "DEALER", "REP" }
                 : _socketType == "SUB" ? new[] { "PUB", "XPUB" }
+                : _socketType == "ROUTER" ? new[] { "DEALER", "REQ", "ROUTER" }
                 : new[] { "SUB", "XSUB" };
             if (Array.IndexOf(allowed, theirs) < 0)
             {

@@ -1,8 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Net;
-using System.Net.Sockets;
-using System.Threading;
 
 namespace Nep.Zmtp
 {
@@ -78,20 +75,14 @@ namespace Nep.Zmtp
     }
 
     /// <summary>XPUB that is bound at one or more addresses. Thread-safe.</summary>
-    internal sealed class XPubSocket : IDisposable
+    internal sealed class XPubSocket : IAcceptorOwner, IDisposable
     {
         /// <summary>Longest subscription in bytes; who sends more is disconnected.</summary>
         public const int MaxFilterBytes = 4096;
 
-        private readonly object _lock = new object();
-        private readonly Dictionary<string, Listener> _listeners = new Dictionary<string, Listener>();
-        private readonly HashSet<Connection> _pending = new HashSet<Connection>();
-        private readonly List<XPubPeer> _peers = new List<XPubPeer>();
         private readonly IXPubOwner _owner;
         private readonly ZmtpLimits _limits;
-        private readonly MechanismFactory _mechanism;
-        private XPubPeer[] _snapshot = new XPubPeer[0];
-        private bool _isClosed;
+        private readonly Acceptor _acceptor;
 
         public XPubSocket(IXPubOwner owner, ZmtpLimits limits, MechanismFactory mechanism)
         {
@@ -99,82 +90,48 @@ namespace Nep.Zmtp
             _limits = limits;
             _limits.MaxMessageBytes = MaxFilterBytes + 1;
             _limits.MaxParts = 1;
-            _mechanism = mechanism;
-            Refused = new CloseCounter();
+            _acceptor = new Acceptor("XPUB", this, limits, mechanism);
         }
 
         /// <summary>Connections that were closed because of what the peer sent, or for lack of room.</summary>
-        public CloseCounter Refused { get; private set; }
-
-        /// <summary>Connections after their handshake.</summary>
-        public XPubPeer[] Peers
+        public CloseCounter Refused
         {
-            get { return _snapshot; }
+            get { return _acceptor.Refused; }
         }
 
-        /// <summary>Bind at a free port of an address and return it.</summary>
-        /// <param name="host">An IPv4 or IPv6 address, or a name of this computer.</param>
-        /// <param name="isAllowed">Ports that may be taken; others are given back.</param>
-        /// <exception cref="SocketException">The address cannot be bound.</exception>
+        /// <summary>Subscribers after their handshake.</summary>
+        public IEnumerable<XPubPeer> Peers
+        {
+            get
+            {
+                foreach (Connection each in _acceptor.Connections)
+                {
+                    var peer = (XPubPeer)each.Tag;
+                    if (peer != null)
+                    {
+                        yield return peer;
+                    }
+                }
+            }
+        }
+
+        /// <summary>Bind at a free port of an address and return it: see <see cref="Acceptor.Bind"/>.</summary>
         public int Bind(string host, Predicate<int> isAllowed)
         {
-            ZmtpEndpoint endpoint;
-            if (!ZmtpEndpoint.TryParse(ZmtpEndpoint.Format(host, 1), out endpoint))
-            {
-                throw new SocketException((int)SocketError.HostNotFound);
-            }
-            IPAddress address = endpoint.Resolve()[0];
-            var rejected = new List<Socket>();
-            try
-            {
-                while (true)
-                {
-                    var socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp);
-                    rejected.Add(socket);
-                    socket.Bind(new IPEndPoint(address, 0));
-                    int port = ((IPEndPoint)socket.LocalEndPoint).Port;
-                    if (isAllowed(port))
-                    {
-                        rejected.Remove(socket);
-                        socket.Listen(128);
-                        Listen(host, socket);
-                        return port;
-                    }
-                    if (rejected.Count > 100)
-                    {
-                        throw new SocketException((int)SocketError.AddressAlreadyInUse);
-                    }
-                }
-            }
-            finally
-            {
-                foreach (Socket each in rejected)
-                {
-                    each.Close();
-                }
-            }
+            return _acceptor.Bind(host, isAllowed);
         }
 
         /// <summary>Accept no further connections at an address. Present ones stay.</summary>
         public void Unbind(string host)
         {
-            Listener listener;
-            lock (_lock)
-            {
-                if (!_listeners.TryGetValue(host, out listener))
-                {
-                    return;
-                }
-                _listeners.Remove(host);
-            }
-            listener.Close();
+            _acceptor.Unbind(host);
         }
 
         /// <summary>Send to every peer with a filter that <paramref name="first"/> begins with; returns how many took it.</summary>
         public int Send(byte[] first, EncodedMessage message)
         {
             int count = 0;
-            foreach (XPubPeer peer in _snapshot)
+            foreach (XPubPeer peer in Peers)
             {
                 if (peer.Wants(first) && peer.Send(message))
                 {
@@ -187,36 +144,7 @@ namespace Nep.Zmtp
         /// <summary>Deliver what is queued, for <paramref name="lingerMs"/> at most, and close.</summary>
         public void Close(int lingerMs)
         {
-            var watch = System.Diagnostics.Stopwatch.StartNew();
-            foreach (XPubPeer peer in _snapshot)
-            {
-                int left = lingerMs - (int)watch.ElapsedMilliseconds;
-                if (left > 0)
-                {
-                    peer.Connection.Flush(left);
-                }
-            }
-            List<Connection> open;
-            List<Listener> listeners;
-            lock (_lock)
-            {
-                _isClosed = true;
-                listeners = new List<Listener>(_listeners.Values);
-                _listeners.Clear();
-                open = new List<Connection>(_pending);
-                foreach (XPubPeer peer in _peers)
-                {
-                    open.Add(peer.Connection);
-                }
-            }
-            foreach (Listener each in listeners)
-            {
-                each.Close();
-            }
-            foreach (Connection each in open)
-            {
-                each.Close();
-            }
+            _acceptor.Close(lingerMs);
         }
 
         public void Dispose()
@@ -224,107 +152,19 @@ namespace Nep.Zmtp
             Close(0);
         }
 
-        private void Listen(string host, Socket socket)
+        void IAcceptorOwner.Opened(Connection connection)
         {
-            var listener = new Listener(socket, Accept);
-            lock (_lock)
-            {
-                if (_isClosed)
-                {
-                    socket.Close();
-                    throw new ObjectDisposedException("XPubSocket");
-                }
-                _listeners[host] = listener;
-            }
-            listener.Start();
+            connection.Tag = new XPubPeer(connection);
         }
 
-        private void Accept(Socket socket)
+        void IAcceptorOwner.Received(Connection connection, byte[][] parts)
         {
-            Connection connection;
-            try
-            {
-                connection = new Connection(socket, "XPUB", true, _limits, _mechanism);
-            }
-            catch (SocketException)
-            {
-                socket.Close(); // it is gone already
-                return;
-            }
-            lock (_lock)
-            {
-                bool hasRoom = _pending.Count < _limits.MaxPendingHandshakes && _peers.Count < _limits.MaxConnections;
-                if (_isClosed || !hasRoom)
-                {
-                    if (!_isClosed)
-                    {
-                        Refused.Add("too-many-connections");
-                    }
-                    connection.Close();
-                    return;
-                }
-                _pending.Add(connection);
-            }
-            var thread = new Thread(() => Serve(connection), 256 * 1024) { IsBackground = true, Name = "nep xpub" };
-            thread.Start();
+            TakeSubscription((XPubPeer)connection.Tag, parts);
         }
 
-        private void Serve(Connection connection)
+        void IAcceptorOwner.Closed(Connection connection)
         {
-            XPubPeer peer = null;
-            try
-            {
-                connection.Handshake();
-                peer = Admit(connection);
-                while (peer != null)
-                {
-                    TakeSubscription(peer, connection.ReadMessage());
-                }
-            }
-            catch (ZmtpException exception)
-            {
-                Refused.Add(exception.Code);
-            }
-            catch (ConnectionClosedException)
-            {
-            }
-            catch (Exception exception) // whatever a peer sends, the thread goes on
-            {
-                Refused.Add("unexpected-" + exception.GetType().Name);
-            }
-            finally
-            {
-                connection.Close();
-                lock (_lock)
-                {
-                    _pending.Remove(connection);
-                    if (peer != null)
-                    {
-                        _peers.Remove(peer);
-                        _snapshot = _peers.ToArray();
-                    }
-                }
-                if (peer != null)
-                {
-                    _owner.Left(peer);
-                }
-            }
-        }
-
-        private XPubPeer Admit(Connection connection)
-        {
-            lock (_lock)
-            {
-                _pending.Remove(connection);
-                if (_isClosed)
-                {
-                    return null;
-                }
-                var peer = new XPubPeer(connection);
-                _peers.Add(peer);
-                _snapshot = _peers.ToArray();
-                return peer;
-            }
+            _owner.Left((XPubPeer)connection.Tag);
         }
 
         private void TakeSubscription(XPubPeer peer, byte[][] parts)
@@ -349,61 +189,6 @@ namespace Nep.Zmtp
             else if (peer.Remove(filter))
             {
                 _owner.FilterChanged(peer, filter, false);
-            }
-        }
-
-        /// <summary>A listening socket with the thread that accepts.</summary>
-        private sealed class Listener
-        {
-            private readonly Socket _socket;
-            private readonly Action<Socket> _accepted;
-            private volatile bool _isClosed;
-
-            public Listener(Socket socket, Action<Socket> accepted)
-            {
-                _socket = socket;
-                _accepted = accepted;
-                _socket.Blocking = false;
-            }
-
-            public void Start()
-            {
-                new Thread(Run, 128 * 1024) { IsBackground = true, Name = "nep listener" }.Start();
-            }
-
-            public void Close()
-            {
-                _isClosed = true;
-                _socket.Close();
-            }
-
-            private void Run()
-            {
-                while (!_isClosed)
-                {
-                    try
-                    {
-                        if (_socket.Poll(500000, SelectMode.SelectRead))
-                        {
-                            _accepted(_socket.Accept());
-                        }
-                    }
-                    catch (ObjectDisposedException)
-                    {
-                        return;
-                    }
-                    catch (SocketException exception)
-                    {
-                        if (_isClosed)
-                        {
-                            return;
-                        }
-                        if (exception.SocketErrorCode != SocketError.WouldBlock)
-                        {
-                            Thread.Sleep(100); // too many open files: the connection waits in the backlog
-                        }
-                    }
-                }
             }
         }
     }
