@@ -44,6 +44,12 @@ class Adapter:
         assert "error" not in said, said
         return said
 
+    def refused(self, what: str, **members: object) -> str:
+        """Ask for something that fails and return the sentence."""
+        self._asked += 1
+        self.program.say(json.dumps({"id": self._asked, "do": what, **members}))
+        return str(json.loads(self.program.line())["error"])
+
     def heard(self, count: int) -> list[dict[str, Any]]:
         """Wait for so many messages and return them."""
         while len(self.events) < count:
@@ -222,3 +228,28 @@ def test_slow_subscriber_counts_exactly_what_it_loses(node: Node) -> None:
 
         eventually(all_counted)
         assert slow.end() == 0
+
+
+def test_services_are_called_in_both_directions(adapter: Adapter, node: Node) -> None:
+    adapter.ask("serve", service="/echo")
+    client = node.new_client("/echo", timeout_s=LONG_S)
+    assert client.call({"a": [1, "grüß"]}) == {"a": [1, "grüß"]}
+    assert client.call([1] * 100_000) == [1] * 100_000
+    node.new_server("/double", lambda request: {"twice": 2 * request["n"]}, threads=1)
+    asked = {"service": "/double", "timeout_s": LONG_S}
+    assert adapter.ask("call", value={"n": 21}, **asked)["value"] == {"twice": 42}
+
+
+def test_failed_calls_tell_the_client_why(adapter: Adapter, node: Node) -> None:
+    def fail(request: object) -> object:
+        raise ValueError("too hot")
+
+    node.new_server("/fail", fail, threads=1)
+    assert "too hot" in adapter.refused("call", service="/fail", value={}, timeout_s=LONG_S)
+    assert "No server" in adapter.refused("call", service="/none", value={}, timeout_s=0.05)
+    adapter.ask("serve", service="/gone")
+    client = node.new_client("/gone", timeout_s=LONG_S)
+    assert client.call({}) == {}
+    adapter.ask("close")
+    with pytest.raises(nep.NoServerError):
+        node.new_client("/gone", timeout_s=0.05).call({})

@@ -54,7 +54,7 @@ internal static class Adapter
             case "features":
                 answer["language"] = "C#";
                 answer["version"] = "0.1.0";
-                answer["features"] = new JArray("hello1", "hello2", "hello3", "losses", "latched", "history", "latest", "statistics", "keys");
+                answer["features"] = new JArray("hello1", "hello2", "hello3", "losses", "latched", "history", "latest", "statistics", "keys", "services");
                 break;
             case "node":
                 _node = new Node((string)request["name"]);
@@ -76,6 +76,15 @@ internal static class Adapter
                 break;
             case "close_subscriber":
                 Subscribers[(long)request["sub"]].Close();
+                break;
+            case "serve":
+                _node.CreateServer<JToken, JToken>((string)request["service"], value => value);
+                break;
+            case "call":
+                using (Client client = _node.CreateClient((string)request["service"]))
+                {
+                    answer["value"] = client.Call<JToken>(request["value"], TimeSpan.FromSeconds((double)request["timeout_s"]));
+                }
                 break;
             case "close":
                 _node.Close();

@@ -33,6 +33,19 @@ namespace Nep
             return new Codec((byte)(number < 1 ? 1 : number));
         }
 
+        /// <summary>The codec of a call or answer; null when it has none.</summary>
+        public static Codec Numbered(int number)
+        {
+            return number >= 1 && number <= 4 ? new Codec((byte)number) : null;
+        }
+
+        /// <exception cref="PayloadException">It can't be decoded, or is of another type.</exception>
+        public T Decode<T>(byte[] payload)
+        {
+            var header = new Header { Codec = Number };
+            return new Message(new WireMessage { Header = header, Payload = new ArraySegment<byte>(payload) }, Name).As<T>();
+        }
+
         /// <exception cref="PayloadException">The payload has no form in this codec.</exception>
         public byte[] Encode(object payload)
         {
@@ -88,10 +101,7 @@ namespace Nep
         public static byte[] CheckedJson(string text)
         {
             byte[] bytes = Encoding.UTF8.GetBytes(text);
-            if (Json.IsTooDeep(bytes, 0, bytes.Length))
-            {
-                throw new PayloadException("The payload has more than 64 levels of lists and objects.");
-            }
+            Json.Check(bytes, 0, bytes.Length);
             return bytes;
         }
     }

@@ -39,24 +39,20 @@ namespace Nep
             }
         }
 
-        /// <summary>Whether lists and objects are nested more deeply than the wire allows.</summary>
-        internal static bool IsTooDeep(byte[] json, int offset, int count)
+        /// <summary>Check what serializers accept silently: too many levels, an end that comes too early, nothing at all.</summary>
+        /// <exception cref="PayloadException">The bytes are not one JSON value with at most 64 levels.</exception>
+        internal static void Check(byte[] json, int offset, int count)
         {
             int level = 0;
-            bool isText = false;
+            bool isText = false, isEmpty = true;
             for (int i = offset; i < offset + count; i++)
             {
                 byte each = json[i];
+                isEmpty &= each <= ' ';
                 if (isText)
                 {
-                    if (each == '\\')
-                    {
-                        i++;
-                    }
-                    else if (each == '"')
-                    {
-                        isText = false;
-                    }
+                    i += each == '\\' ? 1 : 0;
+                    isText = each != '"';
                 }
                 else if (each == '"')
                 {
@@ -66,7 +62,7 @@ namespace Nep
                 {
                     if (++level > Wire.MessagePackReader.MaxLevels)
                     {
-                        return true;
+                        throw new PayloadException("The JSON has more than 64 levels of lists and objects.");
                     }
                 }
                 else if (each == ']' || each == '}')
@@ -74,7 +70,10 @@ namespace Nep
                     level--;
                 }
             }
-            return false;
+            if (level != 0 || isText || isEmpty)
+            {
+                throw new PayloadException("The JSON ends too early.");
+            }
         }
     }
 }

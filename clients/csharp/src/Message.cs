@@ -133,10 +133,7 @@ namespace Nep
                 }
                 throw new PayloadException("A message of codec '" + Codec + "' can't be converted to " + typeof(T).Name + ".");
             }
-            if (Json.IsTooDeep(_wire.Payload.Array, _wire.Payload.Offset, _wire.Payload.Count))
-            {
-                throw new PayloadException("The message has more than 64 levels of lists and objects.");
-            }
+            Json.Check(_wire.Payload.Array, _wire.Payload.Offset, _wire.Payload.Count);
             string text = Text;
             try
             {

@@ -38,7 +38,12 @@ namespace Nep
         {
             using (var reader = new JsonTextReader(new StringReader(json)))
             {
-                return _serializer.Deserialize(reader, type);
+                object value = _serializer.Deserialize(reader, type);
+                if (reader.Read())
+                {
+                    throw new JsonReaderException("something follows the JSON value");
+                }
+                return value;
             }
         }
 

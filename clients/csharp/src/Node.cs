@@ -17,6 +17,7 @@ namespace Nep
     {
         private const int HandshakeMs = 500;
         private const int LeaveMs = 300;
+        internal const string ServicePrefix = "nep.service:";
         private static readonly HashSet<Node> Open = new HashSet<Node>();
         private static bool _closesAtExit;
 
@@ -26,6 +27,8 @@ namespace Nep
         private readonly Dictionary<string, MasterSession> _sessions = new Dictionary<string, MasterSession>();
         private readonly Dictionary<Publisher, MasterSession> _publishers = new Dictionary<Publisher, MasterSession>();
         private readonly Dictionary<Subscriber, MasterSession> _subscribers = new Dictionary<Subscriber, MasterSession>();
+        private readonly Dictionary<Server, MasterSession> _servers = new Dictionary<Server, MasterSession>();
+        private readonly Dictionary<Client, MasterSession> _clients = new Dictionary<Client, MasterSession>();
         private readonly List<Subscription> _subscriptions = new List<Subscription>();
         private long _numbers;
         private bool _isClosed;
@@ -189,6 +192,72 @@ namespace Nep
             return made;
         }
 
+        /// <summary>Answer the calls of a service.</summary>
+        /// <typeparam name="TRequest">Type of requests, as for <see cref="Message.As{T}"/>; <c>object</c> takes any.</typeparam>
+        /// <typeparam name="TAnswer">Type of answers.</typeparam>
+        /// <param name="service">Name, 1 to 188 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
+        /// <param name="callback">Called in a background thread of the server; an exception of it is raised at the client.</param>
+        /// <param name="threads">How many calls are answered at the same time, at least 1.</param>
+        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        public Server CreateServer<TRequest, TAnswer>(string service, Func<TRequest, TAnswer> callback, int threads = 1)
+        {
+            CheckTopic(ServicePrefix + service);
+            if (callback == null || threads < 1)
+            {
+                throw new ArgumentException("A server has a callback and at least one thread.");
+            }
+            long number = Interlocked.Increment(ref _numbers);
+            var record = new PublisherRecord
+            {
+                Id = Ids.Id(_record.Key, number), Number = number, Topic = ServicePrefix + service, MsgType = "service", Codec = "service",
+            };
+            MasterSession session = SessionOf(null);
+            var socket = new ServerSocket(record);
+            try
+            {
+                if (!socket.Move(session.Hosts()))
+                {
+                    throw new NepException("No port could be opened for the service '" + service + "'.");
+                }
+                session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout));
+            }
+            catch
+            {
+                socket.Finish(0);
+                throw;
+            }
+            var made = new Server(this, socket, (payload, codec) => Answer(callback, payload, codec), threads);
+            lock (_lock)
+            {
+                _servers[made] = session;
+            }
+            return made;
+        }
+
+        /// <summary>Create a client of a service. Its server need not be there yet.</summary>
+        /// <param name="service">Name, as for <see cref="CreateServer{TRequest, TAnswer}"/>.</param>
+        /// <param name="type"><c>json</c> or <c>msgpack</c>.</param>
+        /// <exception cref="ArgumentException">The name is not allowed.</exception>
+        /// <exception cref="MasterUnreachableException">No master answered in time.</exception>
+        /// <exception cref="ObjectDisposedException">The node was closed.</exception>
+        public Client CreateClient(string service, string type = "json")
+        {
+            CheckTopic(ServicePrefix + service);
+            long number = Interlocked.Increment(ref _numbers);
+            var record = new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = ServicePrefix + service, MsgType = "service" };
+            MasterSession session = SessionOf(null);
+            var socket = new ClientSocket(record, service);
+            session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
+            var made = new Client(this, socket, Codec.For(type));
+            lock (_lock)
+            {
+                _clients[made] = session;
+            }
+            return made;
+        }
+
         /// <summary>Run waiting callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
         /// <param name="budget">No further callback is begun after this time.</param>
         /// <returns>Number of callbacks that ran.</returns>
@@ -227,6 +296,8 @@ namespace Nep
             List<MasterSession> sessions;
             List<Publisher> publishers;
             List<Subscriber> subscribers;
+            List<Server> servers;
+            List<Client> clients;
             lock (_lock)
             {
                 if (_isClosed)
@@ -237,6 +308,8 @@ namespace Nep
                 sessions = new List<MasterSession>(_sessions.Values);
                 publishers = new List<Publisher>(_publishers.Keys);
                 subscribers = new List<Subscriber>(_subscribers.Keys);
+                servers = new List<Server>(_servers.Keys);
+                clients = new List<Client>(_clients.Keys);
             }
             lock (Open)
             {
@@ -244,9 +317,15 @@ namespace Nep
             }
             Stopwatch watch = Stopwatch.StartNew();
             sessions.ForEach(each => each.BeginLeave());
+            servers.ForEach(each => each.Socket.BeginClose());
             publishers.ForEach(each => each.Socket.SayBye());
             sessions.ForEach(each => each.Close(LeaveMs));
             subscribers.ForEach(each => each.Socket.Close());
+            clients.ForEach(each => each.Socket.Close());
+            foreach (Server each in servers)
+            {
+                each.Socket.Finish(Math.Max(0, TimeoutMs(_options.CloseTimeout) - (int)watch.ElapsedMilliseconds));
+            }
             foreach (Publisher each in publishers)
             {
                 each.Socket.Finish(Math.Max(0, TimeoutMs(_options.CloseTimeout) - (int)watch.ElapsedMilliseconds));
@@ -290,6 +369,37 @@ namespace Nep
             subscriber.Socket.Close();
         }
 
+        internal void Close(Server server)
+        {
+            MasterSession session;
+            lock (_lock)
+            {
+                if (_isClosed || !_servers.TryGetValue(server, out session))
+                {
+                    return;
+                }
+                _servers.Remove(server);
+            }
+            session.RemovePublisher(server.Socket.Record.Id, (ulong)server.Socket.Calls);
+            server.Socket.BeginClose();
+            server.Socket.Finish(TimeoutMs(_options.CloseTimeout));
+        }
+
+        internal void Close(Client client)
+        {
+            MasterSession session;
+            lock (_lock)
+            {
+                if (_isClosed || !_clients.TryGetValue(client, out session))
+                {
+                    return;
+                }
+                _clients.Remove(client);
+            }
+            session.RemoveSubscriber(client.Socket.Record.Id);
+            client.Socket.Close();
+        }
+
         internal void Forget(Subscription subscription)
         {
             lock (_lock)
@@ -311,6 +421,24 @@ namespace Nep
             }
         }
 
+        private static byte[] Answer<TRequest, TAnswer>(Func<TRequest, TAnswer> callback, byte[] payload, Codec codec)
+        {
+            TRequest request;
+            if (codec == null)
+            {
+                throw new RequestRefusedException("the call has an unknown codec");
+            }
+            try
+            {
+                request = codec.Decode<TRequest>(payload);
+            }
+            catch (PayloadException exception)
+            {
+                throw new RequestRefusedException(exception.Message);
+            }
+            return codec.Encode(callback(request));
+        }
+
         private static void CloseAll(object sender, EventArgs arguments)
         {
             List<Node> open;
@@ -329,7 +457,7 @@ namespace Nep
             }
         }
 
-        private static int TimeoutMs(TimeSpan timeout)
+        internal static int TimeoutMs(TimeSpan timeout)
         {
             return timeout < TimeSpan.Zero ? -1 : (int)Math.Min(int.MaxValue, timeout.TotalMilliseconds);
         }

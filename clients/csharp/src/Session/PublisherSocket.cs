@@ -1,7 +1,6 @@
 using System;
 using System.Collections.Generic;
 using System.Diagnostics;
-using System.Net.Sockets;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -19,7 +18,7 @@ namespace Nep.Session
         private readonly byte[] _topic;
         private readonly byte _codec;
         private readonly Dictionary<ulong, XPubPeer> _greeted = new Dictionary<ulong, XPubPeer>();
-        private readonly Dictionary<string, string> _bound = new Dictionary<string, string>();
+        private readonly Bindings _bindings;
         private readonly Queue<byte[][]> _history = new Queue<byte[][]>();
         private readonly int _historySize;
         private ulong _seq;
@@ -36,6 +35,7 @@ namespace Nep.Session
             _topic = Names.TopicPart(record.Topic);
             _historySize = record.IsLatched ? Math.Max(1, record.History) : record.History;
             _socket = new XPubSocket(this, new ZmtpLimits(), NullMechanism.Create);
+            _bindings = new Bindings(_socket.Acceptor);
         }
 
         public PublisherRecord Record { get; private set; }
@@ -92,40 +92,7 @@ namespace Nep.Session
         {
             lock (_lock)
             {
-                if (_isClosing)
-                {
-                    return false;
-                }
-                foreach (string host in new List<string>(_bound.Keys))
-                {
-                    if (!hosts.Contains(host))
-                    {
-                        _socket.Unbind(host);
-                        _bound.Remove(host);
-                    }
-                }
-                var endpoints = new List<string>();
-                foreach (string host in hosts)
-                {
-                    if (!_bound.ContainsKey(host))
-                    {
-                        try
-                        {
-                            _bound[host] = ZmtpEndpoint.Format(host, _socket.Bind(host, IsFreeForUs));
-                        }
-                        catch (SocketException)
-                        {
-                            continue; // the address has gone; tried again within a second
-                        }
-                    }
-                    endpoints.Add(_bound[host]);
-                }
-                if (endpoints.Count == 0 || string.Join(" ", endpoints.ToArray()) == string.Join(" ", Record.Endpoints.ToArray()))
-                {
-                    return false;
-                }
-                Record.Endpoints = endpoints;
-                return true;
+                return !_isClosing && _bindings.Move(hosts, Record);
             }
         }
 
@@ -399,12 +366,6 @@ namespace Nep.Session
             parts[0] = first;
             tail.CopyTo(parts, 1);
             return parts;
-        }
-
-        /// <summary>Ports that programs of the original NEP expect to find something else on are left alone.</summary>
-        private static bool IsFreeForUs(int port)
-        {
-            return port != 7000 && port != 7777 && port != 7780 && port != 12345 && port != 50000 && (port < 9000 || port > 9999);
         }
 
         /// <summary>What one connection has subscribed to.</summary>

@@ -115,16 +115,10 @@ namespace Nep.Zmtp
             }
         }
 
-        /// <summary>Bind at a free port of an address and return it: see <see cref="Acceptor.Bind"/>.</summary>
-        public int Bind(string host, Predicate<int> isAllowed)
+        /// <summary>Addresses and connections.</summary>
+        public Acceptor Acceptor
         {
-            return _acceptor.Bind(host, isAllowed);
-        }
-
-        /// <summary>Accept no further connections at an address. Present ones stay.</summary>
-        public void Unbind(string host)
-        {
-            _acceptor.Unbind(host);
+            get { return _acceptor; }
         }
 
         /// <summary>Send to every peer with a filter that <paramref name="first"/> begins with; returns how many took it.</summary>

@@ -202,7 +202,7 @@ internal static class ZmtpPeer
         public XPubPeerProgram(string host, ZmtpLimits limits)
         {
             _socket = new XPubSocket(this, limits, NullMechanism.Create);
-            Say("bound " + _socket.Bind(host, port => true));
+            Say("bound " + _socket.Acceptor.Bind(host, port => true));
         }
 
         public int Run()

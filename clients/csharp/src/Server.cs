@@ -1,0 +1,86 @@
+using System;
+using System.Threading;
+using Nep.Session;
+using Nep.Wire;
+
+namespace Nep
+{
+    /// <summary>Answers the calls of one service. Created by <see cref="Node.CreateServer{TRequest, TAnswer}"/>.</summary>
+    public sealed class Server : IDisposable
+    {
+        private readonly Node _node;
+        private readonly ServerSocket _socket;
+        private readonly Func<byte[], Codec, byte[]> _answer;
+
+        internal Server(Node node, ServerSocket socket, Func<byte[], Codec, byte[]> answer, int threads)
+        {
+            _node = node;
+            _socket = socket;
+            _answer = answer;
+            for (int i = 0; i < threads; i++)
+            {
+                new Thread(Run) { IsBackground = true, Name = "nep server " + Service }.Start();
+            }
+        }
+
+        /// <summary>Name of the service.</summary>
+        public string Service
+        {
+            get { return _socket.Record.Topic.Substring(Node.ServicePrefix.Length); }
+        }
+
+        /// <summary>Number of calls that were answered, also with an error.</summary>
+        public long Calls
+        {
+            get { return _socket.Calls; }
+        }
+
+        /// <summary>Number of calls whose callback threw an exception.</summary>
+        public long Errors
+        {
+            get { return _socket.Errors; }
+        }
+
+        /// <summary>Number of calls that were not carried out: malformed, too many, or while closing.</summary>
+        public long Refused
+        {
+            get { return _socket.Refused; }
+        }
+
+        internal ServerSocket Socket
+        {
+            get { return _socket; }
+        }
+
+        /// <summary>Close: refuses waiting calls and lets running callbacks answer, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
+        public void Dispose()
+        {
+            _node.Close(this);
+        }
+
+        private void Run()
+        {
+            for (IncomingCall call = _socket.Take(); call != null; call = _socket.Take())
+            {
+                byte kind = ServiceHeader.Answer;
+                byte[] payload;
+                try
+                {
+                    payload = _answer(call.Payload, Codec.Numbered(call.Header.Codec));
+                }
+                catch (RequestRefusedException exception)
+                {
+                    kind = ServiceHeader.Refused;
+                    payload = ServiceFailure.Encode("", exception.Message);
+                }
+                catch (Exception exception) // it is the client's to handle
+                {
+                    kind = ServiceHeader.Error;
+                    payload = ServiceFailure.Encode(exception.GetType().Name, exception.Message);
+                    _node.OnCallbackError(exception);
+                }
+                _socket.Answer(call, kind, payload);
+            }
+        }
+    }
+}

@@ -1,0 +1,532 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Globalization;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A call that waits for a server's callback.</summary>
+    internal sealed class IncomingCall
+    {
+        public Connection From;
+        public ServiceHeader Header;
+        public byte[] Payload;
+        public double? UntilS;
+    }
+
+    /// <summary>A server's ROUTER socket with the calls that wait. Thread-safe.</summary>
+    internal sealed class ServerSocket : IRouterOwner, ISessionPublisher
+    {
+        private const int MaxWaiting = 1000;
+        private const long MaxWaitingBytes = 256L << 20;
+
+        private readonly object _lock = new object();
+        private readonly Queue<IncomingCall> _waiting = new Queue<IncomingCall>();
+        private readonly RouterSocket _socket;
+        private readonly Bindings _bindings;
+        private long _waitingBytes;
+        private int _running;
+        private bool _isClosing;
+
+        public ServerSocket(PublisherRecord record)
+        {
+            Record = record;
+            var limits = new ZmtpLimits { MaxMessageBytes = ServiceHeader.MaxPayloadBytes + 1024, MaxConnections = 1000 };
+            _socket = new RouterSocket(this, limits, NullMechanism.Create);
+            _bindings = new Bindings(_socket.Acceptor);
+        }
+
+        public PublisherRecord Record { get; private set; }
+
+        public long Calls { get; private set; }
+
+        public long Errors { get; private set; }
+
+        public long Refused { get; private set; }
+
+        public long Bytes { get; private set; }
+
+        public bool Move(IList<string> hosts)
+        {
+            lock (_lock)
+            {
+                return !_isClosing && _bindings.Move(hosts, Record);
+            }
+        }
+
+        public Dictionary<object, object> Statistics()
+        {
+            lock (_lock)
+            {
+                return new Dictionary<object, object>
+                {
+                    { "id", Record.Id }, { "count", Calls }, { "bytes", Bytes }, { "last_seq", Calls }, { "errors", Errors },
+                };
+            }
+        }
+
+        /// <summary>Next call that somebody still waits for; null when the server closes.</summary>
+        public IncomingCall Take()
+        {
+            lock (_lock)
+            {
+                while (true)
+                {
+                    while (_waiting.Count == 0 && !_isClosing)
+                    {
+                        Monitor.Wait(_lock);
+                    }
+                    if (_isClosing)
+                    {
+                        return null;
+                    }
+                    IncomingCall call = _waiting.Dequeue();
+                    _waitingBytes -= call.Payload.Length;
+                    if (call.UntilS == null || Clock.SteadyS < call.UntilS)
+                    {
+                        _running++;
+                        return call;
+                    }
+                }
+            }
+        }
+
+        /// <summary>Answer a call that <see cref="Take"/> gave.</summary>
+        public void Answer(IncomingCall call, byte kind, byte[] payload)
+        {
+            lock (_lock)
+            {
+                _running--;
+                if (kind == ServiceHeader.Refused)
+                {
+                    Refused++;
+                }
+                else
+                {
+                    Calls++;
+                    Bytes += payload.Length;
+                    Errors += kind == ServiceHeader.Error ? 1 : 0;
+                }
+                Monitor.PulseAll(_lock);
+            }
+            Send(call, kind, payload);
+        }
+
+        /// <summary>Refuse what waits and what still comes.</summary>
+        public void BeginClose()
+        {
+            List<IncomingCall> refused;
+            lock (_lock)
+            {
+                _isClosing = true;
+                refused = new List<IncomingCall>(_waiting);
+                _waiting.Clear();
+                Monitor.PulseAll(_lock);
+            }
+            refused.ForEach(each => Refuse(each, "the server closes"));
+        }
+
+        /// <summary>Let the callbacks that run answer, and close.</summary>
+        public void Finish(int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                int leftMs = timeoutMs;
+                while (_running > 0 && leftMs > 0)
+                {
+                    Monitor.Wait(_lock, leftMs);
+                    leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                }
+            }
+            _socket.Acceptor.Close(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+        }
+
+        void IRouterOwner.Received(Connection from, byte[][] parts)
+        {
+            IncomingCall call;
+            try
+            {
+                call = new IncomingCall { From = from, Header = ServiceHeader.Read(parts, true), Payload = parts[1] };
+            }
+            catch (WireException exception)
+            {
+                _socket.Acceptor.Refused.Add(exception.Code); // counted and not answered; the connection stays
+                return;
+            }
+            if (call.Payload.Length > ServiceHeader.MaxPayloadBytes)
+            {
+                throw new ZmtpException("message-too-large", "a call has more than 64 MB");
+            }
+            if (call.Header.TimeoutMs > 0)
+            {
+                call.UntilS = Clock.SteadyS + call.Header.TimeoutMs / 1000.0;
+            }
+            string reason = null;
+            lock (_lock)
+            {
+                if (_isClosing)
+                {
+                    reason = "the server closes";
+                }
+                else if (_waiting.Count >= MaxWaiting || _waitingBytes + call.Payload.Length > MaxWaitingBytes)
+                {
+                    reason = "too many calls wait for the server";
+                }
+                else
+                {
+                    _waiting.Enqueue(call);
+                    _waitingBytes += call.Payload.Length;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+            if (reason != null)
+            {
+                Refuse(call, reason);
+            }
+        }
+
+        void IRouterOwner.Left(Connection connection)
+        {
+        }
+
+        private void Refuse(IncomingCall call, string reason)
+        {
+            lock (_lock)
+            {
+                Refused++;
+            }
+            Send(call, ServiceHeader.Refused, ServiceFailure.Encode("", reason));
+        }
+
+        private static void Send(IncomingCall call, byte kind, byte[] payload)
+        {
+            bool isFailure = kind != ServiceHeader.Answer;
+            var header = new ServiceHeader { Kind = kind, Codec = isFailure ? (ushort)1 : call.Header.Codec, Number = call.Header.Number };
+            call.From.Send(EncodedMessage.Message(header.ToBytes(), payload));
+        }
+    }
+
+    /// <summary>Payload of an error or refusal.</summary>
+    internal static class ServiceFailure
+    {
+        public static byte[] Encode(string kind, string reason)
+        {
+            var failure = new Dictionary<string, string> { { "nep_error", kind }, { "reason", reason } };
+            return Codec.CheckedJson(Json.Serializer.Serialize(failure));
+        }
+
+        public static NepException Decode(byte kind, byte[] payload)
+        {
+            Dictionary<string, string> failure = null;
+            try
+            {
+                string text = Names.StrictUtf8.GetString(payload);
+                failure = (Dictionary<string, string>)Json.Serializer.Deserialize(text, typeof(Dictionary<string, string>));
+            }
+            catch (Exception) // whatever the other side sent
+            {
+            }
+            string name = "", reason = "the server told no reason";
+            if (failure != null)
+            {
+                failure.TryGetValue("nep_error", out name);
+                failure.TryGetValue("reason", out reason);
+            }
+            return kind == ServiceHeader.Error ? (NepException)new ServiceException(name, reason) : new RequestRefusedException(reason);
+        }
+    }
+
+    /// <summary>A call that a client waits for.</summary>
+    internal sealed class OutgoingCall
+    {
+        public ulong Number;
+        public ServerLink Link;
+        public byte Kind;
+        public int Codec;
+        public byte[] Payload;
+    }
+
+    /// <summary>A client's connection to one server.</summary>
+    internal sealed class ServerLink : IDealerOwner
+    {
+        private readonly ClientSocket _client;
+
+        public ServerLink(ClientSocket client, RemotePublisher remote, ZmtpEndpoint endpoint)
+        {
+            _client = client;
+            Id = remote.Publisher.Id;
+            Endpoint = remote.Endpoint;
+            Socket = new DealerSocket(endpoint, this, new ZmtpLimits { MaxMessageBytes = ServiceHeader.MaxPayloadBytes + 1024 }, NullMechanism.Create);
+        }
+
+        public ulong Id { get; private set; }
+
+        public string Endpoint { get; private set; }
+
+        public DealerSocket Socket { get; private set; }
+
+        public bool IsConnected { get; set; }
+
+        /// <summary>It is not listed any more: gets no further calls.</summary>
+        public bool IsGone { get; set; }
+
+        void IDealerOwner.Connected()
+        {
+            _client.Changed(this, true);
+        }
+
+        void IDealerOwner.Received(byte[][] parts)
+        {
+            _client.Received(this, parts);
+        }
+
+        void IDealerOwner.Disconnected(string reason)
+        {
+            _client.Changed(this, false);
+        }
+    }
+
+    /// <summary>A client's connections to the servers of a service, in the order in which they registered. Thread-safe.</summary>
+    internal sealed class ClientSocket : ISessionSubscriber
+    {
+        private readonly object _lock = new object();
+        private readonly List<ServerLink> _links = new List<ServerLink>();
+        private readonly Dictionary<ulong, OutgoingCall> _calls = new Dictionary<ulong, OutgoingCall>();
+        private readonly string _service;
+        private ulong _numbers;
+        private long _answered;
+        private long _failed;
+        private bool _isClosed;
+
+        public ClientSocket(SubscriberRecord record, string service)
+        {
+            Record = record;
+            _service = service;
+        }
+
+        public SubscriberRecord Record { get; private set; }
+
+        /// <summary>Answers that came after their call had ended, or are none.</summary>
+        public long Late { get; private set; }
+
+        public Dictionary<object, object> Statistics()
+        {
+            lock (_lock)
+            {
+                return new Dictionary<object, object> { { "id", Record.Id }, { "received", _answered }, { "lost", _failed } };
+            }
+        }
+
+        /// <summary>Send a call and wait for its answer.</summary>
+        public OutgoingCall Call(byte codec, byte[] payload, int timeoutMs, CancellationToken cancellation)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                ServerLink link;
+                while ((link = FirstConnected()) == null)
+                {
+                    Wait(watch, timeoutMs, cancellation, () => new NoServerException(_service));
+                }
+                int leftMs = timeoutMs < 0 ? 0 : Math.Max(1, timeoutMs - (int)watch.ElapsedMilliseconds);
+                var call = new OutgoingCall { Number = ++_numbers, Link = link };
+                var header = new ServiceHeader { Kind = ServiceHeader.Call, Codec = codec, TimeoutMs = (uint)leftMs, Number = call.Number };
+                _calls[call.Number] = call;
+                try
+                {
+                    if (!link.Socket.Send(header.ToBytes(), payload))
+                    {
+                        throw new ServerGoneException(_service);
+                    }
+                    while (call.Payload == null)
+                    {
+                        if (call.Link == null)
+                        {
+                            throw new ServerGoneException(_service);
+                        }
+                        Wait(watch, timeoutMs, cancellation, () => new ServiceTimeoutException(_service));
+                    }
+                    _answered++;
+                    return call;
+                }
+                catch
+                {
+                    _failed++;
+                    throw;
+                }
+                finally
+                {
+                    _calls.Remove(call.Number);
+                }
+            }
+        }
+
+        public void Connect(RemotePublisher remote)
+        {
+            ZmtpEndpoint endpoint;
+            lock (_lock)
+            {
+                ServerLink known = _links.Find(each => each.Id == remote.Publisher.Id);
+                bool isOurs = remote.Publisher.Codec == "service" && ZmtpEndpoint.TryParse(remote.Endpoint, out endpoint);
+                if (_isClosed || !isOurs || known != null && known.Endpoint == remote.Endpoint)
+                {
+                    return;
+                }
+                if (known != null)
+                {
+                    Leave(known);
+                }
+                ZmtpEndpoint.TryParse(remote.Endpoint, out endpoint);
+                var link = new ServerLink(this, remote, endpoint);
+                _links.Add(link);
+                link.Socket.Start();
+            }
+        }
+
+        public void Gone(ulong publisher, ulong lastSeq, bool isClosed)
+        {
+            lock (_lock)
+            {
+                ServerLink link = _links.Find(each => each.Id == publisher);
+                if (link != null && isClosed)
+                {
+                    link.IsGone = true; // answers may still come; its connection ends by itself
+                    LeaveIfIdle(link);
+                }
+            }
+        }
+
+        public void Reconcile(IList<RemotePublisher> remotes)
+        {
+            lock (_lock)
+            {
+                foreach (ServerLink each in new List<ServerLink>(_links))
+                {
+                    bool isListed = false;
+                    foreach (RemotePublisher remote in remotes)
+                    {
+                        isListed |= remote.Publisher.Id == each.Id;
+                    }
+                    if (!isListed && !each.IsConnected)
+                    {
+                        Leave(each);
+                    }
+                }
+                foreach (RemotePublisher each in remotes)
+                {
+                    Connect(each);
+                }
+            }
+        }
+
+        public void Tick(Dictionary<ulong, ulong> lastSeqs)
+        {
+        }
+
+        public void Close()
+        {
+            List<ServerLink> links;
+            lock (_lock)
+            {
+                _isClosed = true;
+                links = new List<ServerLink>(_links);
+                Monitor.PulseAll(_lock);
+            }
+            links.ForEach(each => each.Socket.Close(0));
+        }
+
+        /// <summary>Let those who wait look again.</summary>
+        public void Wake()
+        {
+            lock (_lock)
+            {
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        internal void Changed(ServerLink link, bool isConnected)
+        {
+            lock (_lock)
+            {
+                link.IsConnected = isConnected;
+                if (!isConnected)
+                {
+                    foreach (OutgoingCall each in _calls.Values)
+                    {
+                        each.Link = each.Link == link ? null : each.Link;
+                    }
+                    LeaveIfIdle(link);
+                }
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        internal void Received(ServerLink link, byte[][] parts)
+        {
+            lock (_lock)
+            {
+                try
+                {
+                    ServiceHeader header = ServiceHeader.Read(parts, false);
+                    OutgoingCall call;
+                    if (!_calls.TryGetValue(header.Number, out call) || call.Link != link)
+                    {
+                        Late++;
+                        return;
+                    }
+                    call.Kind = header.Kind;
+                    call.Codec = header.Codec;
+                    call.Payload = parts[1];
+                    Monitor.PulseAll(_lock);
+                }
+                catch (WireException)
+                {
+                    Late++;
+                }
+            }
+        }
+
+        private ServerLink FirstConnected()
+        {
+            return _links.Find(each => each.IsConnected && !each.IsGone);
+        }
+
+        private void LeaveIfIdle(ServerLink link)
+        {
+            bool isIdle = true;
+            foreach (OutgoingCall each in _calls.Values)
+            {
+                isIdle &= each.Link != link;
+            }
+            if (link.IsGone && isIdle)
+            {
+                Leave(link);
+            }
+        }
+
+        private void Leave(ServerLink link)
+        {
+            _links.Remove(link);
+            ThreadPool.QueueUserWorkItem(state => link.Socket.Close(0)); // which waits for the thread that may have called
+        }
+
+        private void Wait(Stopwatch watch, int timeoutMs, CancellationToken cancellation, Func<NepException> error)
+        {
+            cancellation.ThrowIfCancellationRequested();
+            if (_isClosed)
+            {
+                throw new ObjectDisposedException("Client");
+            }
+            int leftMs = timeoutMs < 0 ? Timeout.Infinite : timeoutMs - (int)watch.ElapsedMilliseconds;
+            if (timeoutMs >= 0 && leftMs <= 0)
+            {
+                throw error();
+            }
+            Monitor.Wait(_lock, leftMs);
+        }
+    }
+}

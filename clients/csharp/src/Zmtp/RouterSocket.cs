@@ -1,0 +1,39 @@
+namespace Nep.Zmtp
+{
+    /// <summary>What a <see cref="RouterSocket"/> tells its owner, in the thread of the connection.</summary>
+    internal interface IRouterOwner
+    {
+        void Received(Connection from, byte[][] parts);
+
+        void Left(Connection connection);
+    }
+
+    /// <summary>ROUTER that is bound at one or more addresses; answers go to a connection instead of a routing id. Thread-safe.</summary>
+    internal sealed class RouterSocket : IAcceptorOwner
+    {
+        private readonly IRouterOwner _owner;
+
+        public RouterSocket(IRouterOwner owner, ZmtpLimits limits, MechanismFactory mechanism)
+        {
+            _owner = owner;
+            Acceptor = new Acceptor("ROUTER", this, limits, mechanism);
+        }
+
+        /// <summary>Addresses and connections.</summary>
+        public Acceptor Acceptor { get; private set; }
+
+        void IAcceptorOwner.Opened(Connection connection)
+        {
+        }
+
+        void IAcceptorOwner.Received(Connection connection, byte[][] parts)
+        {
+            _owner.Received(connection, parts);
+        }
+
+        void IAcceptorOwner.Closed(Connection connection)
+        {
+            _owner.Left(connection);
+        }
+    }
+}
