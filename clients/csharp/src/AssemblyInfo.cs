@@ -2,3 +2,4 @@ using System.Runtime.CompilerServices;
 
 [assembly: InternalsVisibleTo("WirePeer")]
 [assembly: InternalsVisibleTo("ZmtpPeer")]
+[assembly: InternalsVisibleTo("Nep.Unity")]

@@ -67,8 +67,8 @@ namespace Nep
                 if (!_closesAtExit)
                 {
                     _closesAtExit = true;
-                    AppDomain.CurrentDomain.ProcessExit += CloseAll;
-                    AppDomain.CurrentDomain.DomainUnload += CloseAll;
+                    AppDomain.CurrentDomain.ProcessExit += OnExit;
+                    AppDomain.CurrentDomain.DomainUnload += OnExit;
                 }
             }
         }
@@ -439,7 +439,13 @@ namespace Nep
             return codec.Encode(callback(request));
         }
 
-        private static void CloseAll(object sender, EventArgs arguments)
+        private static void OnExit(object sender, EventArgs arguments)
+        {
+            CloseAll();
+        }
+
+        /// <summary>Close all nodes of this process.</summary>
+        internal static void CloseAll()
         {
             List<Node> open;
             lock (Open)

@@ -1,0 +1,20 @@
+using UnityEngine;
+
+namespace Nep.Unity
+{
+    /// <summary>Closes every node when the editor leaves play mode or reloads scripts, with and without domain reload.</summary>
+    internal static class PlayMode
+    {
+        [RuntimeInitializeOnLoadMethod(RuntimeInitializeLoadType.SubsystemRegistration)]
+        private static void Begin()
+        {
+            Node.CloseAll(); // nodes of an earlier play that a program kept in statics
+            Application.quitting -= Node.CloseAll;
+            Application.quitting += Node.CloseAll;
+#if UNITY_EDITOR
+            UnityEditor.AssemblyReloadEvents.beforeAssemblyReload -= Node.CloseAll;
+            UnityEditor.AssemblyReloadEvents.beforeAssemblyReload += Node.CloseAll;
+#endif
+        }
+    }
+}
