@@ -91,7 +91,10 @@ def _is_there(dotted: str) -> bool:
 def _words() -> frozenset[str]:
     """Every word of the sources that stands outside of quotation by backticks."""
     texts = [text for place, text in _texts().items() if not place.endswith(".md")]
-    texts += [path.read_text(encoding="utf-8") for path in (ROOT / "clients").glob("*/src/**/*.cs")]
+    csharp = (
+        path for folder in ("src", "unity") for path in (ROOT / "clients" / "csharp" / folder).rglob("*.cs")
+    )
+    texts += [path.read_text(encoding="utf-8") for path in csharp]
     return frozenset(word for text in texts for word in _WORD.findall(_QUOTED.sub(" ", text)))
 
 

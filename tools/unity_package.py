@@ -1,7 +1,8 @@
 """Build the Unity package of the C# client: ``python -m tools.unity_package FOLDER``.
 
-The package has the library's sources, not a copy that is kept in the repository. Unity ignores files of an installed
-package that have no ``.meta`` file, so one is made for each, with an id that depends on the file's place alone.
+The package has the library's sources, not a copy that is kept in the repository. Unity ignores files of an
+installed package that have no ``.meta`` file, so one is made for each, with an id that depends on the file's
+place alone.
 """
 
 from __future__ import annotations

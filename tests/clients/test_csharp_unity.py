@@ -37,7 +37,9 @@ def test_package_has_every_source_once_and_a_meta_file_with_its_own_id(tmp_path:
     assert len(runtime) == len(sources("src"))
     shown = [path for path in files if not path.endswith(".meta") and not path.startswith("Samples~/")]
     assert all(f"{path}.meta" in files for path in shown)
-    ids = re.findall(r"guid: (\w{32})\n", "".join(files[path].decode() for path in files if path.endswith(".meta")))
+    ids = re.findall(
+        r"guid: (\w{32})\n", "".join(files[path].decode() for path in files if path.endswith(".meta"))
+    )
     assert len(set(ids)) == len([path for path in files if path.endswith(".meta")])
 
 
