@@ -220,3 +220,42 @@ def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None
     while not (told := xpub.line()).startswith("refused"):
         pass
     assert "unexpected" not in told
+
+
+def test_silent_peer_is_left_and_one_that_answers_heartbeats_is_kept(context, stack: ExitStack) -> None:
+    with context.socket(zmq.DEALER) as peer, socket.create_server(("127.0.0.1", 0)) as silent:
+        port = peer.bind_to_random_port("tcp://127.0.0.1")
+        kept = started(stack, "dealer", f"tcp://127.0.0.1:{port}", "heartbeat_ms=50")
+        left = started(stack, "dealer", f"tcp://127.0.0.1:{silent.getsockname()[1]}", "heartbeat_ms=50")
+        with silent.accept()[0] as connection:
+            connection.sendall(GREETING + READY.replace(b"\x19", b"\x1c").replace(b"\x03SUB", b"\x06DEALER"))
+            assert [left.line(), left.line()] == ["connected", "disconnected"]
+        assert kept.line() == "connected"
+        assert kept.ask("refused") == "refused "  # nothing else was said meanwhile
+
+
+def test_mutated_publishers_do_not_stop_the_subscriber(context, stack: ExitStack) -> None:
+    sub = started(stack, "sub", "handshake_ms=200")
+    sub.say(f"subscribe {TOPIC.hex()}")
+    chance = random.Random(27)
+    ready = READY.replace(b"\x03SUB", b"\x03PUB")
+    good = GREETING + ready + b"\x01\x08" + TOPIC + b"\x01\x04head\x00\x04body\x02" + bytes(7) + b"\x01x"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        for _ in range(60):
+            sub.say(f"connect tcp://127.0.0.1:{server.getsockname()[1]}")
+            bad = bytearray(good)
+            for _ in range(chance.randrange(1, 6)):
+                bad[chance.randrange(len(bad))] = chance.randrange(256)
+            with server.accept()[0] as connection:
+                connection.sendall(bad[: chance.randrange(1, len(bad) + 1)])
+    publisher, endpoint = bound(context, zmq.XPUB)
+    with publisher:
+        sub.say(f"connect {endpoint}")
+        assert publisher.recv() == b"\1" + TOPIC
+        publisher.send_multipart([TOPIC, b"alive"])
+        while sub.line() != f"message {TOPIC.hex()} {b'alive'.hex()}":
+            pass
+    sub.say("refused")
+    while not (told := sub.line()).startswith("refused"):
+        pass
+    assert "unexpected" not in told

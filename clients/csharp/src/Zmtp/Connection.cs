@@ -40,7 +40,7 @@ namespace Nep.Zmtp
             RemoteAddress = remote == null ? null : remote.Address;
             var local = socket.LocalEndPoint as IPEndPoint;
             LocalAddress = local == null ? null : local.Address;
-            _isFar = RemoteAddress != null && !IPAddress.IsLoopback(RemoteAddress);
+            _isFar = limits.IsHeartbeatLocal || RemoteAddress != null && !IPAddress.IsLoopback(RemoteAddress);
         }
 
         /// <summary>Peer's address.</summary>
@@ -252,7 +252,7 @@ namespace Nep.Zmtp
 
         private void WaitForInput(Stopwatch handshake)
         {
-            int waitMs = IdlePollMs;
+            int waitMs = _isFar && _limits.HeartbeatMs > 0 ? Math.Min(IdlePollMs, _limits.HeartbeatMs) : IdlePollMs;
             if (handshake != null)
             {
                 waitMs = _limits.HandshakeTimeoutMs - (int)handshake.ElapsedMilliseconds;

@@ -38,6 +38,9 @@ namespace Nep.Zmtp
         /// <summary>Interval of PING on connections to other computers; 0 sends none.</summary>
         public int HeartbeatMs = 5000;
 
+        /// <summary>Whether peers on this computer are sent PING, too: for tests.</summary>
+        public bool IsHeartbeatLocal;
+
         /// <summary>A peer on another computer that is silent for longer is disconnected.</summary>
         public int HeartbeatTimeoutMs = 15000;
     }

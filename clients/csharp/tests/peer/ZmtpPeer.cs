@@ -24,9 +24,11 @@ internal static class ZmtpPeer
             {
                 limits.HandshakeTimeoutMs = int.Parse(each.Substring(13), CultureInfo.InvariantCulture);
             }
-            if (each.StartsWith("max_message=", StringComparison.Ordinal))
+            if (each.StartsWith("heartbeat_ms=", StringComparison.Ordinal))
             {
-                limits.MaxMessageBytes = long.Parse(each.Substring(12), CultureInfo.InvariantCulture);
+                limits.HeartbeatMs = int.Parse(each.Substring(13), CultureInfo.InvariantCulture);
+                limits.HeartbeatTimeoutMs = 5 * limits.HeartbeatMs;
+                limits.IsHeartbeatLocal = true;
             }
         }
         if (arguments[0] == "dealer")
