@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import queue
 import shutil
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
 
 ROOT = Path(__file__).parents[2]
 CSHARP = ROOT / "clients" / "csharp"
 BUILD = CSHARP / "build"
 JSON = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")
 COMPILE = ("mcs", "-langversion:7", "-warnaserror", "-nowarn:0649,0169", "-debug-")
-HAS_MONO = bool(shutil.which("mcs") and shutil.which("mono") and JSON.exists())
+HAS_MONO = sys.platform != "win32" and bool(shutil.which("mcs") and shutil.which("mono") and JSON.exists())
 WITHOUT = "mono-mcs, mono-runtime or libnewtonsoft-json5.0-cil is missing: the C# client is not tested"
 _LINE_S = 20.0
 

@@ -253,3 +253,14 @@ def test_failed_calls_tell_the_client_why(adapter: Adapter, node: Node) -> None:
     adapter.ask("close")
     with pytest.raises(nep.NoServerError):
         node.new_client("/gone", timeout_s=0.05).call({})
+
+
+def test_subscriber_with_wildcards_hears_all_topics_that_match(adapter: Adapter, node: Node) -> None:
+    early = node.new_pub("robots/one/state", "json")
+    adapter.ask("subscriber", topic="robots/*/state", type="json", pattern=True)
+    late = node.new_pub("robots/two/state", "json")
+    other = node.new_pub("robots/two/camera", "json")
+    for number, publisher in enumerate((early, other, late)):
+        publisher.publish({"n": number})
+    heard = {(each["topic"], each["value"]["n"]) for each in adapter.heard(2)}
+    assert heard == {("robots/one/state", 0), ("robots/two/state", 2)}

@@ -54,7 +54,7 @@ internal static class Adapter
             case "features":
                 answer["language"] = "C#";
                 answer["version"] = "0.1.0";
-                answer["features"] = new JArray("hello1", "hello2", "hello3", "losses", "latched", "history", "latest", "statistics", "keys", "services");
+                answer["features"] = new JArray("hello1", "hello2", "hello3", "losses", "latched", "history", "latest", "statistics", "keys", "services", "patterns");
                 break;
             case "node":
                 _node = new Node((string)request["name"]);
@@ -106,12 +106,8 @@ internal static class Adapter
 
     private static void AddSubscriber(JObject request, JObject answer)
     {
-        if ((bool?)request["pattern"] ?? false)
-        {
-            throw new NotSupportedException("patterns are not supported");
-        }
         long number = ++_last;
-        var options = new SubscriberOptions { KeepLatest = (bool?)request["latest"] ?? false };
+        var options = new SubscriberOptions { KeepLatest = (bool?)request["latest"] ?? false, Wildcards = (bool?)request["pattern"] ?? false };
         Subscription made = _node.Subscribe((string)request["topic"], message => Report(number, message), (string)request["type"], options);
         Subscribers[number] = made.Subscriber;
         answer["sub"] = number;

@@ -133,7 +133,10 @@ namespace Nep
         }
 
         /// <summary>Create a subscriber. It receives the next message of every publisher that is registered.</summary>
-        /// <param name="topic">Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>.</param>
+        /// <param name="topic">
+        /// Topic, 1 to 200 bytes of UTF-8 without white space, control characters or <c>{</c>; with a level <c>*</c> (any one level) or
+        /// <c>**</c> (any number of levels) all topics that match, such as <c>robot/*/camera</c>.
+        /// </param>
         /// <param name="type">Type that is expected; what a message holds is told by the message.</param>
         /// <param name="options">Options, or null for the defaults.</param>
         /// <exception cref="ArgumentException">The topic is not allowed.</exception>
@@ -150,7 +153,10 @@ namespace Nep
             long number = Interlocked.Increment(ref _numbers);
             var record = new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type };
             MasterSession session = SessionOf(options.Master);
-            var socket = new SubscriberSocket(record, options);
+            record.IsPattern = options.Wildcards && TopicPattern.IsPattern(topic);
+            ISubscriberSocket socket = record.IsPattern
+                ? (ISubscriberSocket)new PatternSocket(record, options)
+                : new SubscriberSocket(record, new Inbox(options), true);
             try
             {
                 session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));

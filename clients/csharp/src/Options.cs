@@ -34,6 +34,9 @@ namespace Nep
         /// <summary>Whether only the newest message is kept; older ones that were not read are replaced and not counted as lost. Default: false.</summary>
         public bool KeepLatest { get; set; }
 
+        /// <summary>Whether a level <c>*</c> or <c>**</c> of the topic stands for other topics. Default: true.</summary>
+        public bool Wildcards { get; set; } = true;
+
         /// <summary>Most messages that wait to be read; the oldest are dropped and counted in <see cref="Subscriber.Lost"/>. Default: 10 000.</summary>
         public int MaxMessages { get; set; } = 10000;
 

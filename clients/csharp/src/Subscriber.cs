@@ -22,15 +22,15 @@ namespace Nep
     public sealed partial class Subscriber : IDisposable
     {
         private readonly Node _node;
-        private readonly SubscriberSocket _socket;
+        private readonly ISubscriberSocket _socket;
 
-        internal Subscriber(Node node, SubscriberSocket socket)
+        internal Subscriber(Node node, ISubscriberSocket socket)
         {
             _node = node;
             _socket = socket;
         }
 
-        /// <summary>Topic.</summary>
+        /// <summary>Topic, or the pattern of topics.</summary>
         public string Topic
         {
             get { return _socket.Record.Topic; }
@@ -54,7 +54,7 @@ namespace Nep
             get { return _socket.Rejected; }
         }
 
-        internal SubscriberSocket Socket
+        internal ISubscriberSocket Socket
         {
             get { return _socket; }
         }
@@ -63,7 +63,7 @@ namespace Nep
         /// <returns>The message, or null when the subscriber was closed.</returns>
         public Message Receive()
         {
-            return _socket.Take(-1, CancellationToken.None);
+            return _socket.Inbox.Take(-1, CancellationToken.None);
         }
 
         /// <summary>Wait for the next message, for a limited time.</summary>
@@ -72,7 +72,7 @@ namespace Nep
         /// <returns>Whether there was one.</returns>
         public bool TryReceive(TimeSpan timeout, out Message message)
         {
-            message = _socket.Take((int)timeout.TotalMilliseconds, CancellationToken.None);
+            message = _socket.Inbox.Take((int)timeout.TotalMilliseconds, CancellationToken.None);
             return message != null;
         }
 
@@ -82,9 +82,9 @@ namespace Nep
         /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
         public async Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
         {
-            using (cancellation.Register(_socket.Wake))
+            using (cancellation.Register(_socket.Inbox.Wake))
             {
-                Message message = await Task.Factory.StartNew(() => _socket.Take(-1, cancellation), cancellation,
+                Message message = await Task.Factory.StartNew(() => _socket.Inbox.Take(-1, cancellation), cancellation,
                     TaskCreationOptions.LongRunning, TaskScheduler.Default).ConfigureAwait(false);
                 if (message == null)
                 {

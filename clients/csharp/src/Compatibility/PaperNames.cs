@@ -59,7 +59,7 @@ namespace Nep
         [EditorBrowsable(EditorBrowsableState.Never)]
         public bool listenNB(ref string msg)
         {
-            Message message = _socket.Take(0, CancellationToken.None);
+            Message message = _socket.Inbox.Take(0, CancellationToken.None);
             if (message == null)
             {
                 return false;

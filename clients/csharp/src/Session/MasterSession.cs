@@ -27,11 +27,14 @@ namespace Nep.Session
 
         void Connect(RemotePublisher remote);
 
-        /// <summary>A publisher is not listed any more.</summary>
-        void Gone(ulong publisher, ulong lastSeq, bool isClosed);
+        /// <summary>Whether it subscribes to a topic.</summary>
+        bool Hears(string topic);
 
-        /// <summary>These are all publishers that are listed.</summary>
-        void Reconcile(IList<RemotePublisher> remotes);
+        /// <summary>A publisher is not listed any more.</summary>
+        void Gone(string topic, ulong publisher, ulong lastSeq, bool isClosed);
+
+        /// <summary>These are all publishers of a topic that are listed; of all its topics when it is null.</summary>
+        void Reconcile(string topic, IList<RemotePublisher> remotes);
 
         /// <summary>A renewal was answered: the newest messages of publishers that the master knows.</summary>
         void Tick(Dictionary<ulong, ulong> lastSeqs);
@@ -307,7 +310,8 @@ namespace Nep.Session
             {
                 ulong id = what.Unsigned("id", 0), lastSeq = what.Unsigned("last_seq", 0);
                 bool isClosed = what.Flag("is_closed");
-                EachSubscriberOf(what.Text("topic", null), each => each.Gone(id, lastSeq, isClosed));
+                string topic = what.Text("topic", null);
+                EachSubscriberOf(topic, each => each.Gone(topic, id, lastSeq, isClosed));
             }
             if (_epoch != 0 && epoch != _epoch)
             {
@@ -365,7 +369,7 @@ namespace Nep.Session
         {
             foreach (ISessionSubscriber each in Subscribers())
             {
-                if (each.Record.Topic == topic)
+                if (each.Hears(topic))
                 {
                     action(each);
                 }
@@ -500,7 +504,8 @@ namespace Nep.Session
             {
                 var topic = new Fields(each);
                 List<RemotePublisher> remotes = ReadRemotes(topic.List("publishers"));
-                EachSubscriberOf(topic.Text("topic", null), subscriber => subscriber.Reconcile(remotes));
+                string name = topic.Text("topic", null);
+                EachSubscriberOf(name, subscriber => subscriber.Reconcile(name, remotes));
             }
             Dictionary<ulong, ulong> lastSeqs = answer.Numbers("last_seqs");
             foreach (ISessionSubscriber each in Subscribers())
@@ -552,7 +557,7 @@ namespace Nep.Session
             List<RemotePublisher> remotes = ReadRemotes(reply.List("publishers"));
             foreach (ISessionSubscriber each in subscribers)
             {
-                each.Reconcile(remotes.FindAll(remote => remote.Publisher.Topic == each.Record.Topic));
+                each.Reconcile(null, remotes.FindAll(remote => each.Hears(remote.Publisher.Topic)));
             }
         }
 

@@ -74,10 +74,16 @@ namespace Nep.Session
         public string Topic;
         public string MsgType;
         public long Number;
+        public bool IsPattern;
 
         public Dictionary<object, object> ToMap()
         {
-            return new Dictionary<object, object> { { "id", Id }, { "topic", Topic }, { "msg_type", MsgType }, { "number", Number } };
+            var map = new Dictionary<object, object> { { "id", Id }, { "topic", Topic }, { "msg_type", MsgType }, { "number", Number } };
+            if (IsPattern)
+            {
+                map["pattern"] = true;
+            }
+            return map;
         }
     }
 

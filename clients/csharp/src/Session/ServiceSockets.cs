@@ -321,6 +321,11 @@ namespace Nep.Session
             }
         }
 
+        public bool Hears(string topic)
+        {
+            return topic == Record.Topic;
+        }
+
         /// <summary>Send a call and wait for its answer.</summary>
         public OutgoingCall Call(byte codec, byte[] payload, int timeoutMs, CancellationToken cancellation)
         {
@@ -387,7 +392,7 @@ namespace Nep.Session
             }
         }
 
-        public void Gone(ulong publisher, ulong lastSeq, bool isClosed)
+        public void Gone(string topic, ulong publisher, ulong lastSeq, bool isClosed)
         {
             lock (_lock)
             {
@@ -400,7 +405,7 @@ namespace Nep.Session
             }
         }
 
-        public void Reconcile(IList<RemotePublisher> remotes)
+        public void Reconcile(string topic, IList<RemotePublisher> remotes)
         {
             lock (_lock)
             {

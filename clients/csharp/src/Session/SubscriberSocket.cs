@@ -7,27 +7,26 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A subscriber's SUB socket and its inbox. Thread-safe.</summary>
-    internal sealed class SubscriberSocket : ISubOwner, ISessionSubscriber
+    /// <summary>A subscriber's SUB socket, which fills an inbox. Thread-safe.</summary>
+    internal sealed class SubscriberSocket : ISubOwner, ISubscriberSocket
     {
         private readonly object _lock = new object();
         private readonly SubSocket _socket;
         private readonly HeardPublishers _sources = new HeardPublishers();
         private readonly HashSet<ulong> _closedEarly = new HashSet<ulong>();
-        private readonly Queue<Message> _inbox = new Queue<Message>();
-        private readonly SubscriberOptions _options;
+        private readonly bool _ownsInbox;
         private readonly byte[] _topic;
         private readonly byte[] _hello;
-        private long _inboxBytes;
         private long _rejected;
         private string _rejection = "";
         private double _rejectedAtS;
         private bool _isClosed;
 
-        public SubscriberSocket(SubscriberRecord record, SubscriberOptions options)
+        public SubscriberSocket(SubscriberRecord record, Inbox inbox, bool ownsInbox)
         {
             Record = record;
-            _options = options;
+            Inbox = inbox;
+            _ownsInbox = ownsInbox;
             _topic = Names.TopicPart(record.Topic);
             _hello = Filters.Hello(record.Id, record.Topic, 3);
             _socket = new SubSocket(this, new ZmtpLimits(), NullMechanism.Create);
@@ -35,8 +34,7 @@ namespace Nep.Session
             _socket.Subscribe(_hello);
         }
 
-        /// <summary>Called after messages were put into the inbox, without the lock.</summary>
-        public Action Arrived { get; set; }
+        public Inbox Inbox { get; private set; }
 
         public SubscriberRecord Record { get; private set; }
 
@@ -55,39 +53,14 @@ namespace Nep.Session
             get { lock (_lock) { return _rejected; } }
         }
 
-        public bool IsClosed
+        public bool HasPublishers
         {
-            get { lock (_lock) { return _isClosed; } }
+            get { lock (_lock) { return _sources.All.Count > 0; } }
         }
 
-        /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
-        public Message Take(int timeoutMs, CancellationToken cancellation)
+        public bool Hears(string topic)
         {
-            Stopwatch watch = Stopwatch.StartNew();
-            lock (_lock)
-            {
-                while (_inbox.Count == 0)
-                {
-                    int leftMs = timeoutMs < 0 ? Timeout.Infinite : Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds);
-                    if (_isClosed || leftMs == 0 || cancellation.IsCancellationRequested)
-                    {
-                        return null;
-                    }
-                    Monitor.Wait(_lock, leftMs);
-                }
-                Message message = _inbox.Dequeue();
-                _inboxBytes -= message.Size;
-                return message;
-            }
-        }
-
-        /// <summary>Let those who wait look again.</summary>
-        public void Wake()
-        {
-            lock (_lock)
-            {
-                Monitor.PulseAll(_lock);
-            }
+            return topic == Record.Topic;
         }
 
         /// <summary>Wait until all listed publishers have echoed.</summary>
@@ -148,7 +121,7 @@ namespace Nep.Session
             }
         }
 
-        public void Gone(ulong publisher, ulong lastSeq, bool isClosed)
+        public void Gone(string topic, ulong publisher, ulong lastSeq, bool isClosed)
         {
             lock (_lock)
             {
@@ -167,7 +140,7 @@ namespace Nep.Session
             }
         }
 
-        public void Reconcile(IList<RemotePublisher> remotes)
+        public void Reconcile(string topic, IList<RemotePublisher> remotes)
         {
             lock (_lock)
             {
@@ -214,13 +187,16 @@ namespace Nep.Session
                 _socket.Dispose();
                 Monitor.PulseAll(_lock);
             }
+            if (_ownsInbox)
+            {
+                Inbox.Close();
+            }
         }
 
         // ---- in the connections' threads
 
         void ISubOwner.Received(SubConnection from, byte[][] parts)
         {
-            bool hasNew = false;
             lock (_lock)
             {
                 if (_isClosed)
@@ -229,7 +205,7 @@ namespace Nep.Session
                 }
                 try
                 {
-                    hasNew = Take(from, parts);
+                    Take(from, parts);
                 }
                 catch (WireException exception)
                 {
@@ -239,18 +215,13 @@ namespace Nep.Session
                 }
                 Monitor.PulseAll(_lock);
             }
-            Action arrived = Arrived;
-            if (hasNew && arrived != null)
-            {
-                arrived();
-            }
         }
 
         void ISubOwner.Disconnected(SubConnection from, string reason)
         {
         }
 
-        private bool Take(SubConnection from, byte[][] parts)
+        private void Take(SubConnection from, byte[][] parts)
         {
             bool isAlone = parts.Length > 1 && ByteOrder.Instance.Equals(parts[0], _hello);
             int cut = isAlone ? 0 : WireReader.CheckFirst(parts);
@@ -261,22 +232,20 @@ namespace Nep.Session
             if (isAlone && parts.Length == 2)
             {
                 TakeNotice(from, Header.Read(parts[1], 0, parts[1].Length));
-                return false;
+                return;
             }
-            bool hasNew = false;
             foreach (WireMessage each in WireReader.ReadRest(Record.Topic, parts, cut))
             {
-                hasNew |= Take(each, isAlone);
+                Take(each, isAlone);
             }
-            return hasNew;
         }
 
-        private bool Take(WireMessage message, bool isAlone)
+        private void Take(WireMessage message, bool isAlone)
         {
             ulong publisher = message.Header.Publisher;
             if (!isAlone && _sources.IsEarly(publisher) || !_sources.Arrived(publisher, message.Header.Seq, isAlone))
             {
-                return false;
+                return;
             }
             if ((message.Header.Flags & Header.Shared) != 0)
             {
@@ -284,24 +253,7 @@ namespace Nep.Session
                 throw new WireException("shared-memory"); // nobody was told that it would be read
             }
             RemotePublisher remote = _sources.Get(publisher).Remote;
-            Put(new Message(message, remote == null ? Record.MsgType : remote.Publisher.MsgType));
-            return true;
-        }
-
-        private void Put(Message message)
-        {
-            if (_options.KeepLatest)
-            {
-                _inbox.Clear();
-                _inboxBytes = 0;
-            }
-            _inbox.Enqueue(message);
-            _inboxBytes += message.Size;
-            while (_inbox.Count > 1 && (_inbox.Count > _options.MaxMessages || _inboxBytes > _options.MaxBytes))
-            {
-                _inboxBytes -= _inbox.Dequeue().Size;
-                _sources.Dropped(1);
-            }
+            _sources.Dropped(Inbox.Put(new Message(message, remote == null ? Record.MsgType : remote.Publisher.MsgType)));
         }
 
         private void TakeNotice(SubConnection from, Header header)

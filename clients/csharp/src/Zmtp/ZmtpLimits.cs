@@ -39,7 +39,7 @@ namespace Nep.Zmtp
         public int HeartbeatMs = 5000;
 
         /// <summary>Whether peers on this computer are sent PING, too: for tests.</summary>
-        public bool IsHeartbeatLocal;
+        public bool IsHeartbeatLocal = false;
 
         /// <summary>A peer on another computer that is silent for longer is disconnected.</summary>
         public int HeartbeatTimeoutMs = 15000;

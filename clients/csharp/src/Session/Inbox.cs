@@ -1,0 +1,84 @@
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+
+namespace Nep.Session
+{
+    /// <summary>Messages that wait to be read. Drops the oldest when it is full. Thread-safe.</summary>
+    internal sealed class Inbox
+    {
+        private readonly object _lock = new object();
+        private readonly Queue<Message> _messages = new Queue<Message>();
+        private readonly SubscriberOptions _options;
+        private long _bytes;
+        private bool _isClosed;
+
+        public Inbox(SubscriberOptions options)
+        {
+            _options = options;
+        }
+
+        /// <summary>Add a message and return how many others were dropped for it. Replacing the latest is no drop.</summary>
+        public int Put(Message message)
+        {
+            lock (_lock)
+            {
+                if (_options.KeepLatest)
+                {
+                    _messages.Clear();
+                    _bytes = 0;
+                }
+                _messages.Enqueue(message);
+                _bytes += message.Size;
+                int dropped = 0;
+                // The newest stays even when it alone is larger than the bound.
+                while (_messages.Count > 1 && (_messages.Count > _options.MaxMessages || _bytes > _options.MaxBytes))
+                {
+                    _bytes -= _messages.Dequeue().Size;
+                    dropped++;
+                }
+                Monitor.PulseAll(_lock);
+                return dropped;
+            }
+        }
+
+        /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
+        public Message Take(int timeoutMs, CancellationToken cancellation)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                while (_messages.Count == 0)
+                {
+                    int leftMs = timeoutMs < 0 ? Timeout.Infinite : timeoutMs - (int)watch.ElapsedMilliseconds;
+                    if (_isClosed || timeoutMs >= 0 && leftMs <= 0 || cancellation.IsCancellationRequested)
+                    {
+                        return null;
+                    }
+                    Monitor.Wait(_lock, leftMs);
+                }
+                Message message = _messages.Dequeue();
+                _bytes -= message.Size;
+                return message;
+            }
+        }
+
+        /// <summary>Let those who wait look again.</summary>
+        public void Wake()
+        {
+            lock (_lock)
+            {
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        public void Close()
+        {
+            lock (_lock)
+            {
+                _isClosed = true;
+                Monitor.PulseAll(_lock);
+            }
+        }
+    }
+}
