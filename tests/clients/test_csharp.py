@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import time
 from collections.abc import Iterator
@@ -18,6 +19,10 @@ from tests.nep.programs import eventually
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
 Node = Any
 LONG_S = 20.0
+PICTURE = bytes.fromhex(  # a red PNG of 3 x 2 pixels
+    "89504e470d0a1a0a0000000d49484452000000030000000208020000001216f14d000000104944415478da63f8"
+    "cfc000410c70160041d205fb6ff116c70000000049454e44ae426082"
+)
 
 
 def example(name: str) -> Path:
@@ -264,3 +269,12 @@ def test_subscriber_with_wildcards_hears_all_topics_that_match(adapter: Adapter,
         publisher.publish({"n": number})
     heard = {(each["topic"], each["value"]["n"]) for each in adapter.heard(2)}
     assert heard == {("robots/one/state", 0), ("robots/two/state", 2)}
+
+
+def test_image_files_arrive_as_pictures(adapter: Adapter, node: Node) -> None:
+    subscriber = node.new_sub("camera", "image")
+    pub = adapter.ask("publisher", topic="camera", type="image")["pub"]
+    adapter.ask("publish", pub=pub, bytes=base64.b64encode(PICTURE).decode())
+    picture = listen(subscriber)
+    assert picture.shape[:2] == (2, 3)
+    assert "JPEG or PNG" in adapter.refused("publish", pub=pub, bytes="AAEC")

@@ -2,6 +2,7 @@ using System;
 using System.Collections.Generic;
 using System.Diagnostics;
 using System.Net.Sockets;
+using System.Runtime.InteropServices;
 using System.Threading;
 
 namespace Nep.Zmtp
@@ -15,7 +16,7 @@ namespace Nep.Zmtp
     {
         private const int JoinBytes = 65536;
         private const int SendBufferBytes = 262144;
-        private static readonly bool IsMono = Type.GetType("Mono.Runtime") != null;
+        private static readonly bool IsMono = !RuntimeInformation.FrameworkDescription.StartsWith(".NET", StringComparison.Ordinal);
 
         private readonly object _lock = new object();
         private readonly Queue<EncodedMessage> _waiting = new Queue<EncodedMessage>();
@@ -39,7 +40,7 @@ namespace Nep.Zmtp
             _onFailure = onFailure;
             if (IsMono)
             {
-                // Mono (6.8) spins in Send on a non-blocking socket until all is sent. A writable socket has a third of
+                // Mono (6.8, also Unity's) spins in Send on a non-blocking socket until all is sent. A writable socket has a third of
                 // its buffer free, so what is an eighth of it never meets a full one.
                 socket.SendBufferSize = SendBufferBytes;
                 _maxChunk = Math.Max(2048, socket.SendBufferSize / 8);
