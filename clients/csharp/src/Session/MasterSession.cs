@@ -43,9 +43,7 @@ namespace Nep.Session
     /// <summary>A node's link to one master: registers, renews, hears of publishers, joins a master that was started again.</summary>
     internal sealed class MasterSession : IDealerOwner
     {
-        private const int AskAgainMs = 500;
         private const int JoinAgainMs = 500;
-        private const int MaxCalls = 256;
         private const double MinRenewS = 1.0;
         private const double MaxRenewS = 30.0;
 
@@ -56,18 +54,16 @@ namespace Nep.Session
         private readonly Dictionary<ulong, ISessionPublisher> _publishers = new Dictionary<ulong, ISessionPublisher>();
         private readonly Dictionary<ulong, ISessionSubscriber> _subscribers = new Dictionary<ulong, ISessionSubscriber>();
         private readonly HashSet<ulong> _confirmed = new HashSet<ulong>();
-        private readonly Dictionary<long, Call> _calls = new Dictionary<long, Call>();
+        private readonly MasterCalls _calls;
         private readonly Stopwatch _clock = Stopwatch.StartNew();
         private readonly Thread _thread;
         private List<string> _served = new List<string>();
         private string _ownHost = MasterAddress.Loopback;
-        private long _lastCall;
         private ulong _epoch;
         private ulong _revision;
         private double _renewS = MinRenewS;
         private double _dueAtS;
         private double _joinAgainAtS;
-        private bool _isConnected;
         private bool _isLeaving;
         private bool _isClosed;
 
@@ -77,6 +73,7 @@ namespace Nep.Session
             _address = address;
             var limits = new ZmtpLimits { MaxMessageBytes = 256L << 20, MaxReconnectMs = 400, HeartbeatMs = 1000, HeartbeatTimeoutMs = 3000 };
             _socket = new DealerSocket(address.Endpoint, this, limits, NullMechanism.Create);
+            _calls = new MasterCalls(address.ToString(), _socket);
             _socket.Start();
             _thread = new Thread(Run, 256 * 1024) { IsBackground = true, Name = "nep node" };
             _thread.Start();
@@ -119,7 +116,7 @@ namespace Nep.Session
                 do
                 {
                     var what = new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", publisher.Record.ToMap() } };
-                    Ask("publisher+", what, timeoutMs, reply =>
+                    _calls.Ask("publisher+", what, timeoutMs, reply =>
                     {
                         expected.AddRange(ExpectedSubscriber.ReadAll(reply.List("expected")));
                         lock (_lock)
@@ -150,7 +147,7 @@ namespace Nep.Session
             var what = new Dictionary<object, object> { { "node", _node.ToMap() }, { "subscriber", subscriber.Record.ToMap() } };
             try
             {
-                Ask("subscriber+", what, timeoutMs, reply =>
+                _calls.Ask("subscriber+", what, timeoutMs, reply =>
                 {
                     lock (_lock)
                     {
@@ -179,7 +176,7 @@ namespace Nep.Session
             }
             if (wasKnown)
             {
-                Tell("publisher-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id }, { "last_seq", lastSeq } }, null);
+                _calls.Tell("publisher-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id }, { "last_seq", lastSeq } }, null);
             }
         }
 
@@ -193,13 +190,13 @@ namespace Nep.Session
             }
             if (wasKnown)
             {
-                Tell("subscriber-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id } }, null);
+                _calls.Tell("subscriber-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id } }, null);
             }
         }
 
         public void ReportMissing(ulong publisher, List<ulong> subscribers)
         {
-            Tell("missing", new Dictionary<object, object> { { "node_id", _node.Id }, { "publisher_id", publisher }, { "subscriber_ids", subscribers } }, null);
+            _calls.Tell("missing", new Dictionary<object, object> { { "node_id", _node.Id }, { "publisher_id", publisher }, { "subscriber_ids", subscribers } }, null);
         }
 
         /// <summary>Renew once more and unregister the node with all that it has; waits for the answer in <see cref="Close"/>.</summary>
@@ -225,11 +222,11 @@ namespace Nep.Session
                 _subscribers.Clear();
                 _confirmed.Clear();
             }
-            if (_isConnected && _epoch != 0)
+            if (_calls.IsConnected && _epoch != 0)
             {
                 try
                 {
-                    Ask("leave", new Dictionary<object, object> { { "node_id", _node.Id } }, timeoutMs, null);
+                    _calls.Ask("leave", new Dictionary<object, object> { { "node_id", _node.Id } }, timeoutMs, null);
                 }
                 catch (NepException)
                 {
@@ -241,6 +238,7 @@ namespace Nep.Session
                 _isClosed = true;
                 Monitor.PulseAll(_lock);
             }
+            _calls.Close();
             _socket.Close(0);
         }
 
@@ -250,7 +248,7 @@ namespace Nep.Session
         {
             lock (_lock)
             {
-                _isConnected = true;
+                _calls.IsConnected = true;
                 _dueAtS = 0.0; // a node renews as soon as its connection is back
                 Monitor.PulseAll(_lock);
             }
@@ -260,7 +258,7 @@ namespace Nep.Session
         {
             lock (_lock)
             {
-                _isConnected = false;
+                _calls.IsConnected = false;
             }
         }
 
@@ -279,14 +277,6 @@ namespace Nep.Session
 
         private void Obey(string name, long number, Fields what)
         {
-            Call call = null;
-            lock (_lock)
-            {
-                if (number > 0 && _calls.TryGetValue(number, out call))
-                {
-                    _calls.Remove(number);
-                }
-            }
             ulong epoch = what.Unsigned("epoch", 0);
             bool isRegistration = name == "added" || name == "found";
             if (isRegistration || name == "renewed")
@@ -297,9 +287,9 @@ namespace Nep.Session
             {
                 _epoch = isRegistration && _epoch == 0 ? epoch : _epoch;
             }
-            if (call != null)
+            if (number > 0)
             {
-                Complete(call, name, what);
+                _calls.Complete(number, name, what);
             }
             else if (name == "publisher+")
             {
@@ -316,29 +306,6 @@ namespace Nep.Session
             if (_epoch != 0 && epoch != _epoch)
             {
                 Join();
-            }
-        }
-
-        private void Complete(Call call, string name, Fields what)
-        {
-            try
-            {
-                if (name == "refused")
-                {
-                    call.Refusal = what.Text("reason", "");
-                }
-                else if (call.Then != null)
-                {
-                    call.Then(what);
-                }
-            }
-            finally
-            {
-                lock (_lock)
-                {
-                    call.IsAnswered = true;
-                    Monitor.PulseAll(_lock);
-                }
             }
         }
 
@@ -445,7 +412,7 @@ namespace Nep.Session
                 }
                 if (isConfirmed && each.Move(hosts))
                 {
-                    Tell("publisher+", new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", each.Record.ToMap() } }, null);
+                    _calls.Tell("publisher+", new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", each.Record.ToMap() } }, null);
                 }
             }
         }
@@ -484,7 +451,7 @@ namespace Nep.Session
                 { "publishers", publishers.ConvertAll(each => (object)each.Statistics()) },
                 { "subscribers", subscribers.ConvertAll(each => (object)each.Statistics()) },
             };
-            Tell("renew", what, Renewed);
+            _calls.Tell("renew", what, Renewed);
         }
 
         private void Renewed(Fields answer)
@@ -534,7 +501,7 @@ namespace Nep.Session
                 { "publishers", publishers.ConvertAll(each => (object)each.Record.ToMap()) },
                 { "subscribers", subscribers.ConvertAll(each => (object)each.Record.ToMap()) },
             };
-            Tell("join", what, reply => Joined(reply, publishers, subscribers));
+            _calls.Tell("join", what, reply => Joined(reply, publishers, subscribers));
         }
 
         private void Joined(Fields reply, List<ISessionPublisher> publishers, List<ISessionSubscriber> subscribers)
@@ -559,77 +526,6 @@ namespace Nep.Session
             {
                 each.Reconcile(null, remotes.FindAll(remote => each.Hears(remote.Publisher.Topic)));
             }
-        }
-
-        // ---- calls
-
-        private void Tell(string name, Dictionary<object, object> what, Action<Fields> then)
-        {
-            Call call = Begin(name, what, then);
-            if (!_socket.Send(call.Body) || then == null)
-            {
-                lock (_lock)
-                {
-                    _calls.Remove(call.Number);
-                }
-            }
-        }
-
-        private void Ask(string name, Dictionary<object, object> what, int timeoutMs, Action<Fields> then)
-        {
-            Call call = Begin(name, what, then);
-            call.IsWaited = true;
-            Stopwatch watch = Stopwatch.StartNew();
-            long sentAtMs = -AskAgainMs;
-            lock (_lock)
-            {
-                while (!call.IsAnswered)
-                {
-                    long nowMs = watch.ElapsedMilliseconds;
-                    if (_isClosed || timeoutMs >= 0 && nowMs >= timeoutMs)
-                    {
-                        _calls.Remove(call.Number);
-                        throw new MasterUnreachableException(_address.ToString(), timeoutMs / 1000.0);
-                    }
-                    if (_isConnected && nowMs - sentAtMs >= AskAgainMs)
-                    {
-                        // It may have gone to a master that ended just then.
-                        sentAtMs = _socket.Send(call.Body) ? nowMs : nowMs - AskAgainMs + 20;
-                    }
-                    Monitor.Wait(_lock, 20);
-                }
-            }
-            if (call.Refusal != null)
-            {
-                throw new RequestRefusedException(call.Refusal);
-            }
-        }
-
-        private Call Begin(string name, Dictionary<object, object> what, Action<Fields> then)
-        {
-            var call = new Call { Then = then };
-            lock (_lock)
-            {
-                call.Number = ++_lastCall;
-                Call old;
-                if (_calls.TryGetValue(call.Number - MaxCalls, out old) && !old.IsWaited)
-                {
-                    _calls.Remove(old.Number); // its master has ended
-                }
-                _calls[call.Number] = call;
-            }
-            call.Body = MessagePackWriter.Write(new Dictionary<object, object> { { "do", name }, { "call", call.Number }, { "what", what } });
-            return call;
-        }
-
-        private sealed class Call
-        {
-            public long Number;
-            public byte[] Body;
-            public Action<Fields> Then;
-            public string Refusal;
-            public bool IsWaited;
-            public bool IsAnswered;
         }
     }
 }

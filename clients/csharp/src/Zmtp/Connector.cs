@@ -96,64 +96,67 @@ namespace Nep.Zmtp
         {
             while (!IsStopped)
             {
-                Connection connection = null;
-                string reason;
-                bool wasReady = false;
-                try
-                {
-                    connection = new Connection(Dial(), _socketType, false, _limits, _mechanism);
-                    connection.Handshake();
-                    _connection = connection;
-                    if (IsStopped)
-                    {
-                        break;
-                    }
-                    wasReady = true;
-                    _owner.Connected(this, connection);
-                    _waitMs = _limits.MinReconnectMs;
-                    while (true)
-                    {
-                        _owner.Received(this, connection.ReadMessage());
-                    }
-                }
-                catch (ZmtpException exception)
-                {
-                    _refused.Add(exception.Code);
-                    reason = exception.Message;
-                }
-                catch (ConnectionClosedException exception)
-                {
-                    reason = exception.Message;
-                }
-                catch (SocketException exception)
-                {
-                    reason = exception.Message;
-                }
-                catch (ObjectDisposedException)
-                {
-                    reason = "this side closed the connection";
-                }
-                catch (Exception exception) // whatever a peer sends, the thread goes on
-                {
-                    _refused.Add("unexpected-" + exception.GetType().Name);
-                    reason = exception.Message;
-                }
+                string reason = ServeOne();
+                bool wasReady = _connection != null;
+                Connection last = _connection;
                 _connection = null;
-                if (connection != null)
-                {
-                    connection.Close();
-                }
                 if (wasReady)
                 {
+                    last.Close();
                     _owner.Disconnected(this, reason);
                 }
                 _stop.WaitOne(NextWaitMs());
             }
-            Connection last = _connection;
-            _connection = null;
-            if (last != null)
+        }
+
+        /// <summary>Dial, and read until the connection ends; returns why it ended.</summary>
+        private string ServeOne()
+        {
+            Connection connection = null;
+            try
             {
-                last.Close();
+                connection = new Connection(Dial(), _socketType, false, _limits, _mechanism);
+                connection.Handshake();
+                _connection = connection;
+                if (IsStopped)
+                {
+                    return "this side closed the connection";
+                }
+                _owner.Connected(this, connection);
+                _waitMs = _limits.MinReconnectMs;
+                while (true)
+                {
+                    _owner.Received(this, connection.ReadMessage());
+                }
+            }
+            catch (ZmtpException exception)
+            {
+                _refused.Add(exception.Code);
+                return exception.Message;
+            }
+            catch (ConnectionClosedException exception)
+            {
+                return exception.Message;
+            }
+            catch (SocketException exception)
+            {
+                return exception.Message;
+            }
+            catch (ObjectDisposedException)
+            {
+                return "this side closed the connection";
+            }
+            catch (Exception exception) // whatever a peer sends, the thread goes on
+            {
+                _refused.Add("unexpected-" + exception.GetType().Name);
+                return exception.Message;
+            }
+            finally
+            {
+                if (connection != null)
+                {
+                    connection.Close();
+                }
             }
         }
 

@@ -1,0 +1,165 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>Requests to a master and its replies. Thread-safe.</summary>
+    internal sealed class MasterCalls
+    {
+        private const int AskAgainMs = 500;
+        private const int SendAgainMs = 20;
+        private const int MaxCalls = 256;
+
+        private readonly object _lock = new object();
+        private readonly Dictionary<long, Call> _calls = new Dictionary<long, Call>();
+        private readonly string _address;
+        private readonly DealerSocket _socket;
+        private long _lastNumber;
+        private bool _isConnected;
+        private bool _isClosed;
+
+        public MasterCalls(string address, DealerSocket socket)
+        {
+            _address = address;
+            _socket = socket;
+        }
+
+        public bool IsConnected
+        {
+            get
+            {
+                lock (_lock)
+                {
+                    return _isConnected;
+                }
+            }
+            set
+            {
+                lock (_lock)
+                {
+                    _isConnected = value;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        /// <summary>Send a request if there is a connection; <paramref name="then"/> gets its reply, in the socket's thread.</summary>
+        public void Tell(string name, Dictionary<object, object> what, Action<Fields> then)
+        {
+            Call call = Begin(name, what, then, false);
+            if (!_socket.Send(call.Body) || then == null)
+            {
+                lock (_lock)
+                {
+                    _calls.Remove(call.Number);
+                }
+            }
+        }
+
+        /// <summary>Send a request, repeat it while no reply comes, and wait; <paramref name="then"/> runs before this returns.</summary>
+        /// <exception cref="MasterUnreachableException">No reply came in time (-1: wait for ever).</exception>
+        /// <exception cref="RequestRefusedException">The master refused it.</exception>
+        public void Ask(string name, Dictionary<object, object> what, int timeoutMs, Action<Fields> then)
+        {
+            Call call = Begin(name, what, then, true);
+            Stopwatch watch = Stopwatch.StartNew();
+            long sendAtMs = 0;
+            lock (_lock)
+            {
+                while (!call.IsAnswered)
+                {
+                    long nowMs = watch.ElapsedMilliseconds;
+                    if (_isClosed || timeoutMs >= 0 && nowMs >= timeoutMs)
+                    {
+                        _calls.Remove(call.Number);
+                        throw new MasterUnreachableException(_address, Math.Max(0, timeoutMs) / 1000.0);
+                    }
+                    if (_isConnected && nowMs >= sendAtMs)
+                    {
+                        // It may have gone to a master that ended just then.
+                        sendAtMs = nowMs + (_socket.Send(call.Body) ? AskAgainMs : SendAgainMs);
+                    }
+                    Monitor.Wait(_lock, SendAgainMs);
+                }
+            }
+            if (call.Refusal != null)
+            {
+                throw new RequestRefusedException(call.Refusal);
+            }
+        }
+
+        /// <summary>A reply came.</summary>
+        public void Complete(long number, string name, Fields what)
+        {
+            Call call;
+            lock (_lock)
+            {
+                if (!_calls.TryGetValue(number, out call))
+                {
+                    return; // a repeated request is answered twice
+                }
+                _calls.Remove(number);
+            }
+            try
+            {
+                if (name == "refused")
+                {
+                    call.Refusal = what.Text("reason", "");
+                }
+                else if (call.Then != null)
+                {
+                    call.Then(what);
+                }
+            }
+            finally
+            {
+                lock (_lock)
+                {
+                    call.IsAnswered = true;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        /// <summary>Let those who wait give up.</summary>
+        public void Close()
+        {
+            lock (_lock)
+            {
+                _isClosed = true;
+                Monitor.PulseAll(_lock);
+            }
+        }
+
+        private Call Begin(string name, Dictionary<object, object> what, Action<Fields> then, bool isWaited)
+        {
+            var call = new Call { Then = then, IsWaited = isWaited };
+            lock (_lock)
+            {
+                call.Number = ++_lastNumber;
+                Call old;
+                if (_calls.TryGetValue(call.Number - MaxCalls, out old) && !old.IsWaited)
+                {
+                    _calls.Remove(old.Number); // its master has ended
+                }
+                _calls[call.Number] = call;
+            }
+            call.Body = MessagePackWriter.Write(new Dictionary<object, object> { { "do", name }, { "call", call.Number }, { "what", what } });
+            return call;
+        }
+
+        private sealed class Call
+        {
+            public long Number;
+            public byte[] Body;
+            public Action<Fields> Then;
+            public string Refusal;
+            public bool IsWaited;
+            public bool IsAnswered;
+        }
+    }
+}

@@ -1,0 +1,211 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+using Nep.Wire;
+using Nep.Zmtp;
+
+namespace Nep.Session
+{
+    /// <summary>A call that waits for a server's callback.</summary>
+    internal sealed class IncomingCall
+    {
+        public Connection From;
+        public ServiceHeader Header;
+        public byte[] Payload;
+        public double? UntilS;
+    }
+
+    /// <summary>A server's ROUTER socket with the calls that wait. Thread-safe.</summary>
+    internal sealed class ServerSocket : IRouterOwner, ISessionPublisher
+    {
+        private const int MaxWaiting = 1000;
+        private const long MaxWaitingBytes = 256L << 20;
+
+        private readonly object _lock = new object();
+        private readonly Queue<IncomingCall> _waiting = new Queue<IncomingCall>();
+        private readonly RouterSocket _socket;
+        private readonly Bindings _bindings;
+        private long _waitingBytes;
+        private int _running;
+        private bool _isClosing;
+
+        public ServerSocket(PublisherRecord record)
+        {
+            Record = record;
+            var limits = new ZmtpLimits { MaxMessageBytes = ServiceHeader.MaxPayloadBytes + 1024, MaxConnections = 1000 };
+            _socket = new RouterSocket(this, limits, NullMechanism.Create);
+            _bindings = new Bindings(_socket.Acceptor);
+        }
+
+        public PublisherRecord Record { get; private set; }
+
+        public long Calls { get; private set; }
+
+        public long Errors { get; private set; }
+
+        public long Refused { get; private set; }
+
+        public long Bytes { get; private set; }
+
+        public bool Move(IList<string> hosts)
+        {
+            lock (_lock)
+            {
+                return !_isClosing && _bindings.Move(hosts, Record);
+            }
+        }
+
+        public Dictionary<object, object> Statistics()
+        {
+            lock (_lock)
+            {
+                return new Dictionary<object, object>
+                {
+                    { "id", Record.Id }, { "count", Calls }, { "bytes", Bytes }, { "last_seq", Calls }, { "errors", Errors },
+                };
+            }
+        }
+
+        /// <summary>Next call that somebody still waits for; null when the server closes.</summary>
+        public IncomingCall Take()
+        {
+            lock (_lock)
+            {
+                while (true)
+                {
+                    while (_waiting.Count == 0 && !_isClosing)
+                    {
+                        Monitor.Wait(_lock);
+                    }
+                    if (_isClosing)
+                    {
+                        return null;
+                    }
+                    IncomingCall call = _waiting.Dequeue();
+                    _waitingBytes -= call.Payload.Length;
+                    if (call.UntilS == null || Clock.SteadyS < call.UntilS)
+                    {
+                        _running++;
+                        return call;
+                    }
+                }
+            }
+        }
+
+        /// <summary>Answer a call that <see cref="Take"/> gave.</summary>
+        public void Answer(IncomingCall call, byte kind, byte[] payload)
+        {
+            lock (_lock)
+            {
+                _running--;
+                if (kind == ServiceHeader.Refused)
+                {
+                    Refused++;
+                }
+                else
+                {
+                    Calls++;
+                    Bytes += payload.Length;
+                    Errors += kind == ServiceHeader.Error ? 1 : 0;
+                }
+                Monitor.PulseAll(_lock);
+            }
+            Send(call, kind, payload);
+        }
+
+        /// <summary>Refuse what waits and what still comes.</summary>
+        public void BeginClose()
+        {
+            List<IncomingCall> refused;
+            lock (_lock)
+            {
+                _isClosing = true;
+                refused = new List<IncomingCall>(_waiting);
+                _waiting.Clear();
+                Monitor.PulseAll(_lock);
+            }
+            refused.ForEach(each => Refuse(each, "the server closes"));
+        }
+
+        /// <summary>Let the callbacks that run answer, and close.</summary>
+        public void Finish(int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            lock (_lock)
+            {
+                int leftMs = timeoutMs;
+                while (_running > 0 && leftMs > 0)
+                {
+                    Monitor.Wait(_lock, leftMs);
+                    leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                }
+            }
+            _socket.Acceptor.Close(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+        }
+
+        void IRouterOwner.Received(Connection from, byte[][] parts)
+        {
+            IncomingCall call;
+            try
+            {
+                call = new IncomingCall { From = from, Header = ServiceHeader.Read(parts, true), Payload = parts[1] };
+            }
+            catch (WireException exception)
+            {
+                _socket.Acceptor.Refused.Add(exception.Code); // counted and not answered; the connection stays
+                return;
+            }
+            if (call.Payload.Length > ServiceHeader.MaxPayloadBytes)
+            {
+                throw new ZmtpException("message-too-large", "a call has more than 64 MB");
+            }
+            if (call.Header.TimeoutMs > 0)
+            {
+                call.UntilS = Clock.SteadyS + call.Header.TimeoutMs / 1000.0;
+            }
+            string reason = null;
+            lock (_lock)
+            {
+                if (_isClosing)
+                {
+                    reason = "the server closes";
+                }
+                else if (_waiting.Count >= MaxWaiting || _waitingBytes + call.Payload.Length > MaxWaitingBytes)
+                {
+                    reason = "too many calls wait for the server";
+                }
+                else
+                {
+                    _waiting.Enqueue(call);
+                    _waitingBytes += call.Payload.Length;
+                    Monitor.PulseAll(_lock);
+                }
+            }
+            if (reason != null)
+            {
+                Refuse(call, reason);
+            }
+        }
+
+        void IRouterOwner.Left(Connection connection)
+        {
+        }
+
+        private void Refuse(IncomingCall call, string reason)
+        {
+            lock (_lock)
+            {
+                Refused++;
+            }
+            Send(call, ServiceHeader.Refused, ServiceFailure.Encode("", reason));
+        }
+
+        private static void Send(IncomingCall call, byte kind, byte[] payload)
+        {
+            bool isFailure = kind != ServiceHeader.Answer;
+            var header = new ServiceHeader { Kind = kind, Codec = isFailure ? (ushort)1 : call.Header.Codec, Number = call.Header.Number };
+            call.From.Send(EncodedMessage.Message(header.ToBytes(), payload));
+        }
+    }
+}
