@@ -13,7 +13,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
@@ -80,6 +80,16 @@ def listen(subscriber: Any) -> Any:
     is_there, payload = subscriber.listen(timeout_s=LONG_S)
     assert is_there
     return payload
+
+
+def test_first_example_of_the_readme_prints_its_own_message(master: Master) -> None:
+    text = (CSHARP / "README.md").read_text("utf-8")
+    source = BUILD / "ReadmeExample.cs"
+    source.parent.mkdir(exist_ok=True)
+    source.write_text(text.split("```csharp\n")[1].split("```")[0], "utf-8")
+    with running(program("ReadmeExample.exe", source)) as hello:
+        assert hello.line() == '{"message":"hello"}'
+        assert hello.end() == 0
 
 
 def test_listing_9_delivers_its_message_and_ends(node: Node) -> None:

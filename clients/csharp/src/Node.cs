@@ -57,7 +57,7 @@ namespace Nep
                 Id = Ids.NodeId(key),
                 Name = name,
                 Host = HostName(),
-                Pid = Process.GetCurrentProcess().Id,
+                Pid = ProcessId(),
                 SinceNs = Clock.NowNs,
                 Key = key,
             };
@@ -480,9 +480,21 @@ namespace Nep
             {
                 return Dns.GetHostName();
             }
-            catch (System.Net.Sockets.SocketException)
+            catch (Exception) // some platforms of Unity have none
             {
                 return "unknown";
+            }
+        }
+
+        private static int? ProcessId()
+        {
+            try
+            {
+                return Process.GetCurrentProcess().Id;
+            }
+            catch (Exception) // IL2CPP has no processes
+            {
+                return null;
             }
         }
 

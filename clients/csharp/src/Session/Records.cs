@@ -11,7 +11,7 @@ namespace Nep.Session
         public string Id;
         public string Name;
         public string Host;
-        public int Pid;
+        public int? Pid;
         public ulong SinceNs;
         public string Key;
 

@@ -33,7 +33,8 @@ namespace Nep.Wire
 
         private static byte[] Digest(string text)
         {
-            using (SHA256 hash = SHA256.Create())
+            // By name: SHA256.Create finds its class by reflection, and IL2CPP's linker may have removed it.
+            using (var hash = new SHA256Managed())
             {
                 return hash.ComputeHash(Encoding.UTF8.GetBytes(text));
             }
