@@ -288,3 +288,9 @@ def test_image_files_arrive_as_pictures(adapter: Adapter, node: Node) -> None:
     picture = listen(subscriber)
     assert picture.shape[:2] == (2, 3)
     assert "JPEG or PNG" in adapter.refused("publish", pub=pub, bytes="AAEC")
+
+
+def test_public_calls_keep_their_promises(master: Master) -> None:
+    with running(peer("Api")) as api:
+        assert api.line() == "ok"
+        assert api.end() == 0

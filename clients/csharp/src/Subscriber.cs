@@ -67,12 +67,12 @@ namespace Nep
         }
 
         /// <summary>Wait for the next message, for a limited time.</summary>
-        /// <param name="timeout">Longest wait; <see cref="TimeSpan.Zero"/> does not wait.</param>
+        /// <param name="timeout">Longest wait; <see cref="TimeSpan.Zero"/> does not wait, <see cref="Timeout.InfiniteTimeSpan"/> waits for ever.</param>
         /// <param name="message">The message, or null.</param>
         /// <returns>Whether there was one.</returns>
         public bool TryReceive(TimeSpan timeout, out Message message)
         {
-            message = _socket.Inbox.Take((int)timeout.TotalMilliseconds, CancellationToken.None);
+            message = _socket.Inbox.Take(Node.TimeoutMs(timeout), CancellationToken.None);
             return message != null;
         }
 

@@ -23,6 +23,10 @@ namespace Nep.Session
         {
             lock (_lock)
             {
+                if (_isClosed)
+                {
+                    return 0;
+                }
                 if (_options.KeepLatest)
                 {
                     _messages.Clear();
@@ -72,11 +76,13 @@ namespace Nep.Session
             }
         }
 
+        /// <summary>Forget what was not read.</summary>
         public void Close()
         {
             lock (_lock)
             {
                 _isClosed = true;
+                _messages.Clear();
                 Monitor.PulseAll(_lock);
             }
         }

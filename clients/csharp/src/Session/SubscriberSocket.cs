@@ -10,6 +10,8 @@ namespace Nep.Session
     /// <summary>A subscriber's SUB socket, which fills an inbox. Thread-safe.</summary>
     internal sealed class SubscriberSocket : ISubOwner, ISubscriberSocket
     {
+        private const int MaxClosedEarly = 1000;
+
         private readonly object _lock = new object();
         private readonly SubSocket _socket;
         private readonly HeardPublishers _sources = new HeardPublishers();
@@ -133,8 +135,12 @@ namespace Nep.Session
                 {
                     _sources.Closing(publisher, lastSeq);
                 }
-                else if (_closedEarly.Count < 1000)
+                else
                 {
+                    if (_closedEarly.Count >= MaxClosedEarly)
+                    {
+                        _closedEarly.Clear();
+                    }
                     _closedEarly.Add(publisher); // the reply that still names it may come later
                 }
             }
