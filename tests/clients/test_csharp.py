@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,12 +16,20 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, ROOT, WITHOUT, MonoProgram, program, running
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
 Node = Any
 LONG_S = 20.0
+RULES = (
+    "first-message",
+    "closed-is-heard",
+    "lost-bye",
+    "batches-to-readers",
+    "malformed",
+    "service-malformed",
+)
 PICTURE = bytes.fromhex(  # a red PNG of 3 x 2 pixels
     "89504e470d0a1a0a0000000d49484452000000030000000208020000001216f14d000000104944415478da63f8"
     "cfc000410c70160041d205fb6ff116c70000000049454e44ae426082"
@@ -294,3 +305,30 @@ def test_public_calls_keep_their_promises(master: Master) -> None:
     with running(peer("Api")) as api:
         assert api.line() == "ok"
         assert api.end() == 0
+
+
+@pytest.mark.skipif(
+    not (ROOT / "nep" / "programs" / "conformance").exists(), reason="nep wire check is not there yet"
+)
+def test_conformance_tester_finds_no_broken_rule() -> None:
+    adapter = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
+    chosen = [word for rule in RULES for word in ("--rule", rule)]  # all of them take half a minute
+    done = subprocess.run(
+        [Path(sys.executable).parent / "nep", "wire", "check", *chosen, "--", "mono", adapter],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "NO_COLOR": "1"},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_talker_and_listener_of_the_examples_meet(master: Master) -> None:
+    with running(example("Talker")) as talker, running(example("Listener")) as listener:
+        assert listener.line().startswith("Press Enter")
+        assert [listener.line().split(": ")[1].lstrip("-").isdigit() for _ in range(2)] == [True, True]
+        listener.say("")
+        while " received, " not in (last := listener.line()):
+            pass
+        assert last.endswith(" 0 lost")
+        assert talker.end() == 0
