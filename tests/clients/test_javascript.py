@@ -333,8 +333,10 @@ const nep = require("nep-js");
 const node = new nep.Node("direct_sample");
 const [toJs, toPython] = process.argv.slice(2).map((port) => Number(port));
 const options = JSON.parse(process.env.DIRECT_OPTIONS);
-const publisher = node.new_pub("answers", "json", node.direct("127.0.0.1", toPython, "many2one", options));
-const asked = node.direct("127.0.0.1", toJs, "one2many", options);
+const mode = (name) => (options.generation === "A" ? undefined : name); // nep-js 0.1.1 has no modes
+const answers = node.direct("127.0.0.1", toPython, mode("many2one"), options);
+const publisher = node.new_pub("answers", "json", answers);
+const asked = node.direct("127.0.0.1", toJs, mode("one2many"), options);
 node.new_sub("questions", "json", (message) => publisher.publish(message), asked);
 """
 

@@ -3,6 +3,9 @@ import type { Generation } from "./pubsub/original.js";
 
 const MODES = ["one2many", "many2one", "many2many"] as const;
 
+/** Neither side binds; the default mode of nep-js 0.1.1. */
+type Mode = (typeof MODES)[number] | "connect";
+
 /** Connected through a master; made by `Node.hybrid`. */
 export interface HybridConfiguration {
   readonly kind: "hybrid";
@@ -14,9 +17,19 @@ export interface DirectConfiguration {
   readonly kind: "direct";
   readonly ip: string;
   readonly port: number;
-  readonly mode: (typeof MODES)[number];
+  readonly mode: Mode;
   readonly generation: Generation;
   readonly wire: "original" | "native";
+}
+
+/** A configuration as programs for nep-js 0.1.1 write it out instead of calling `direct`, `master` or `hybrid`. */
+export interface OriginalConfiguration {
+  readonly network: string;
+  readonly transport?: string;
+  readonly mode?: string;
+  readonly ip?: string;
+  readonly port?: number | string;
+  readonly master_ip?: string;
 }
 
 /** How a publisher or subscriber is connected. */
@@ -34,10 +47,10 @@ export interface DirectOptions {
 export function directConfiguration(
   ip: string,
   port: number | string,
-  mode: string,
+  mode: string | undefined,
   options: DirectOptions,
 ): DirectConfiguration {
-  const known = MODES.find((each) => each === mode);
+  const known = mode === undefined ? "connect" : MODES.find((each) => each === mode);
   if (!known) throw new NepError(`"${mode}" is no mode. Use ${MODES.join(", ")}.`);
   const number = Number(port);
   if (!Number.isInteger(number) || number < 1 || number > 65535)
@@ -61,6 +74,6 @@ export function attachment(
   if (direct.mode === "many2many") {
     return { endpoint: `tcp://${direct.ip}:${direct.port + (isPublisher ? 0 : 1)}`, how: "connect" };
   }
-  const binds = isPublisher === (direct.mode === "one2many");
+  const binds = direct.mode !== "connect" && isPublisher === (direct.mode === "one2many");
   return { endpoint: `tcp://${direct.ip}:${direct.port}`, how: binds ? "bind" : "connect" };
 }

@@ -7,6 +7,7 @@ import {
   directConfiguration,
   type DirectOptions,
   type HybridConfiguration,
+  type OriginalConfiguration,
 } from "./configuration.js";
 import { NepError } from "./errors.js";
 import { Publisher, type PublisherHost, type PublisherOptions } from "./pubsub/publisher.js";
@@ -333,12 +334,12 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   // ---- names of the original NEP
 
   /** Return a publisher at once. What is published before it is connected waits, also for a master. */
-  new_pub<T = unknown>(topic: string, type = "json", configuration?: Configuration): Publisher<T> {
-    return this.makePublisher<T>(topic, { type }, undefined, configuration);
+  new_pub<T = unknown>(topic: string, type = "json", configuration?: Configuration | OriginalConfiguration): Publisher<T> {
+    return this.makePublisher<T>(topic, { type }, undefined, this.configured(configuration));
   }
 
   /** Same as {@link new_pub}. */
-  new_publisher<T = unknown>(topic: string, type = "json", configuration?: Configuration): Publisher<T> {
+  new_publisher<T = unknown>(topic: string, type = "json", configuration?: Configuration | OriginalConfiguration): Publisher<T> {
     return this.new_pub<T>(topic, type, configuration);
   }
 
@@ -347,10 +348,10 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     topic: string,
     type = "json",
     callback?: PayloadCallback<T>,
-    configuration?: Configuration,
+    configuration?: Configuration | OriginalConfiguration,
   ): Subscriber<T> {
     const onMessage = callback && ((message: { readonly payload: T }): void => callback(message.payload));
-    return this.makeSubscriber<T>(topic, { type }, onMessage, undefined, configuration);
+    return this.makeSubscriber<T>(topic, { type }, onMessage, undefined, this.configured(configuration));
   }
 
   /** Same as {@link new_sub}, with a callback. */
@@ -358,7 +359,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
     topic: string,
     type: string,
     callback: PayloadCallback<T>,
-    configuration?: Configuration,
+    configuration?: Configuration | OriginalConfiguration,
   ): Subscriber<T> {
     return this.new_sub<T>(topic, type, callback, configuration);
   }
@@ -387,13 +388,14 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   /**
    * Connect to `ip:port` without a master, in the frames of the original NEP unless `options` say otherwise.
    *
-   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to a proxy.
+   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to a
+   *   proxy, subscribers to `port + 1`. Without a mode both connect to `port`, as in nep-js 0.1.1: the other program binds it.
    * @throws {NepError} for what is no address, port or mode.
    */
   direct(
     ip = LOOPBACK,
     port: number | string = 9000,
-    mode = "one2many",
+    mode?: string,
     options: DirectOptions = {},
   ): DirectConfiguration {
     return directConfiguration(ip, port, mode, options);
@@ -456,6 +458,13 @@ export class Node extends EventEmitter<{ warning: [string] }> {
       this.sessions.set(address, session);
     }
     return session;
+  }
+
+  private configured(given?: Configuration | OriginalConfiguration): Configuration | undefined {
+    if (given === undefined || "kind" in given) return given;
+    if (given.network === "broker") return this.hybrid(given.master_ip);
+    if (given.network === "direct") return this.direct(given.ip, given.port);
+    throw new NepError(`There is no network "${given.network}". Use node.hybrid(ip) or node.direct(ip, port, mode).`);
   }
 
   private nextNumber(): number {
