@@ -150,6 +150,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--long", action="store_true", help="let faults last, one after the other; also what is marked long"
     )
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
+    told = "the same for a driver in any language that this command starts (docs/write-a-driver.md)"
+    parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=told)
     if importlib.util.find_spec("pytestqt") is None:
         # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.
         for name in ("qt_api", "qt_log_level_fail", "qt_log_ignore"):

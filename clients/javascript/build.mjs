@@ -1,8 +1,9 @@
-// Adds the ES module entry to what tsc built. It re-exports the CommonJS build instead of being a second one,
+// Adds the ES module entries to what tsc built. They re-export the CommonJS build instead of being a second one,
 // so a program that uses both `import` and `require` has one set of classes.
 import { writeFileSync } from "node:fs";
 
-const dist = new URL("dist/", import.meta.url);
-const entry = 'export * from "./index.js";\nexport { default } from "./index.js";\n';
-writeFileSync(new URL("index.mjs", dist), entry);
-writeFileSync(new URL("index.d.mts", dist), entry);
+const named = 'export * from "./index.js";\n';
+const entries = { "dist/": `${named}export { default } from "./index.js";\n`, "dist/robot/": named };
+for (const [folder, entry] of Object.entries(entries)) {
+  for (const file of ["index.mjs", "index.d.mts"]) writeFileSync(new URL(folder + file, import.meta.url), entry);
+}

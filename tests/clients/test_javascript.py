@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -362,6 +363,23 @@ def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:
     is_there, payload = answers.listen(timeout_s=0.05)
     assert not is_there or payload == {"topic": "questions", "text": "grüß dich"}
     return is_there
+
+
+def test_robot_keeps_the_contract_of_drivers(tmp_path):
+    example = (PACKAGE / "examples" / "turntable.mjs").read_text(encoding="utf-8")
+    command, program = prepared(example, tmp_path, "turntable.mjs")
+    contract = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider"]
+    contract += ["tests/robots/driver/test_contract.py", "--driver-command"]
+    done = subprocess.run(
+        [*contract, shlex.join([command, str(tmp_path / program)])],
+        cwd=PACKAGE.parents[1],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "skipped" not in done.stdout
 
 
 def test_library_conforms_to_the_wire():

@@ -388,8 +388,9 @@ export class Node extends EventEmitter<{ warning: [string] }> {
   /**
    * Connect to `ip:port` without a master, in the frames of the original NEP unless `options` say otherwise.
    *
-   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to a
-   *   proxy, subscribers to `port + 1`. Without a mode both connect to `port`, as in nep-js 0.1.1: the other program binds it.
+   * @param mode `one2many`: the publisher binds the port; `many2one`: the subscriber does; `many2many`: both connect to
+   *   a proxy, subscribers to `port + 1`. Without a mode both connect to `port`, as in nep-js 0.1.1: the other program
+   *   binds it.
    * @throws {NepError} for what is no address, port or mode.
    */
   direct(

@@ -1,6 +1,7 @@
 """What every driver owes to the people who rely on it: one contract, over each robot and each example.
 
-With ``--driver FILE`` it is held against the robots of that file instead, wherever it lies.
+With ``--driver FILE`` it is held against the robots of that file instead, wherever it lies; with
+``--driver-command COMMAND`` against the robot of a program in any language (`driver_program`).
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import json
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import pytest
 
@@ -23,7 +25,9 @@ from app.robots.description.description import Action, Parameter, Robot, parse, 
 from app.robots.driver.driver import Driver
 from app.robots.identity import program_of
 from app.robots.kit import Kind
+from nep.masters.master import Master
 from tests.robots.conftest import Ears, FakeClock, eventually
+from tests.robots.driver.driver_program import ProgramDriver, ProgramKind, program_kind, running_driver
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 FINAL = {"succeeded", "failed", "canceled"}
@@ -47,11 +51,12 @@ def kinds_in(path: Path) -> list[Kind]:
     return found
 
 
-def kinds(drivers: Sequence[str]) -> Iterator[Kind]:
-    """The robots of those files; without any those of Studio, and whatever in examples/ declares one."""
-    if drivers:
+def kinds(drivers: Sequence[str], commands: Sequence[str]) -> Iterator[Kind | ProgramKind]:
+    """The robots of those files and commands; without any those of Studio, and of the files in examples/."""
+    if drivers or commands:
         for driver in drivers:
             yield from kinds_in(Path(driver).resolve())
+        yield from map(program_kind, commands)
         return
     yield simulated.ROBOT
     yield turtle.ROBOT
@@ -63,18 +68,25 @@ def kinds(drivers: Sequence[str]) -> Iterator[Kind]:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Each robot is a parameter of its own."""
     if "kind" in metafunc.fixturenames:
-        found = list(kinds(metafunc.config.getoption("--driver")))
+        option = metafunc.config.getoption
+        found = list(kinds(option("--driver"), option("--driver-command")))
         metafunc.parametrize("kind", found, ids=[each.model for each in found], scope="module")
+
+
+class ControlledClock(Protocol):
+    """A clock that a test advances."""
+
+    def advance(self, seconds: float) -> None: ...
 
 
 @dataclass
 class Bench:
     """A driver whose time a test holds in its hand, and ears on its topics."""
 
-    kind: Kind
-    driver: Driver
+    kind: Kind | ProgramKind
+    driver: Driver | ProgramDriver
     ears: Ears
-    clock: FakeClock
+    clock: ControlledClock
     count: int = 0
     times: dict[str, bool] = field(default_factory=dict)
 
@@ -172,20 +184,31 @@ def wrong_for(kind: str) -> object:
 
 
 @contextmanager
-def at_its_start(kind: Kind, name: str) -> Iterator[Bench]:
+def at_its_start(kind: Kind | ProgramKind, name: str, *, real_clock: bool = False) -> Iterator[Bench]:
     """A driver of its own, in a room of its own, as that is when the robot starts."""
-    clock, alone = FakeClock(), f"only {name}"  # who hears of another robot steps aside, and bumps elsewhere
-    with (
-        nep.node("contract", "memory", master=alone) as node,
-        nep.node("listener", "memory", master=alone) as other,
-    ):
+    with ExitStack() as opened:
+        if isinstance(kind, ProgramKind):
+            master = opened.enter_context(Master("127.0.0.1:0", learn_s=0.0)).address
+            other = opened.enter_context(nep.node("listener", master=master))
+            ears = Ears(other, name.replace(" ", "_"))
+            program, its_clock = opened.enter_context(
+                running_driver(kind, name, master, ears, real_clock=real_clock)
+            )
+            yield Bench(kind, program, ears, its_clock)
+            return
+        clock, alone = (
+            FakeClock(),
+            f"only {name}",
+        )  # who hears of another robot steps aside, and bumps elsewhere
+        node = opened.enter_context(nep.node("contract", "memory", master=alone))
+        other = opened.enter_context(nep.node("listener", "memory", master=alone))
         ears = Ears(other, name.replace(" ", "_"))
-        with Driver(kind, name, node, clock=clock) as driver:
+        with Driver(kind, name, node, clock=None if real_clock else clock) as driver:
             yield Bench(kind, driver, ears, clock)
 
 
 @pytest.fixture(scope="module")
-def shared(kind: Kind) -> Iterator[Bench]:
+def shared(kind: Kind | ProgramKind) -> Iterator[Bench]:
     with at_its_start(kind, f"The {kind.model}") as bench:
         bench.stop()  # an async one begins the robot's event loop, which lasts as long as the robot
         yield bench
@@ -201,12 +224,15 @@ def bench(shared: Bench) -> Iterator[Bench]:
 
 
 def test_its_description_is_valid_and_every_action_is_there(bench, request) -> None:
-    ours = not request.config.getoption("--driver")  # what we ask of our own robots, for the look of them
-    assert validate(bench.kind.thing_model) == ()
+    option = request.config.getoption
+    ours = not option("--driver") and not option(
+        "--driver-command"
+    )  # what we ask of our own robots, for the look of them
     described = json.loads(json.dumps(bench.driver.description))
+    assert validate(described) == ()
     assert parse(described) == bench.robot
     for action in bench.robot.actions:
-        assert callable(getattr(bench.driver.body, action.name))
+        assert isinstance(bench.driver, ProgramDriver) or callable(getattr(bench.driver.body, action.name))
         assert not (action.risk and not action.uses), f"{action.name} moves something, so it uses it"
         if not ours:
             continue
@@ -418,35 +444,30 @@ def test_the_same_command_twice_runs_once(bench) -> None:
 
 def test_closing_answers_what_is_open_and_leaves_no_thread(kind) -> None:
     name = f"Closing {kind.model}"
-    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
-        ears = Ears(other, name.replace(" ", "_"))
-        clock = FakeClock()
-        with Driver(kind, name, node, clock=clock) as driver:  # closes it once more
-            bench = Bench(kind, driver, ears, clock)
-            long = bench.any_action(long=True)
-            ears.invoke("1", long.name, **required(long))
-            eventually(lambda: "running" in ears.states("1"))
-            driver.close()
-            assert ears.final("1")["state"] == "canceled"
-            ears.invoke("2", long.name)
-            assert ears.answers("2") == []
+    with at_its_start(kind, name) as bench:  # closes it once more
+        ears = bench.ears
+        long = bench.any_action(long=True)
+        ears.invoke("1", long.name, **required(long))
+        eventually(lambda: "running" in ears.states("1"))
+        bench.driver.close()
+        assert ears.final("1")["state"] == "canceled"
+        ears.invoke("2", long.name)
+        assert ears.answers("2") == []
     assert [t.name for t in threading.enumerate() if t.name.startswith(name)] == []
 
 
 def test_what_its_description_suggests_can_be_done(kind) -> None:
     """With the computer's own clock, all at once where they use different things."""
-    with nep.node("contract", "memory") as node, nep.node("listener", "memory") as other:
-        name = f"Real_{kind.model}"
-        ears = Ears(other, name)
-        with Driver(kind, name, node) as driver:
-            taken: set[str] = set()
-            asked: dict[str, Mapping[str, object]] = {}
-            for action in driver.robot.actions:
-                made_up = any(p.required and p.default is None for p in action.parameters)
-                if taken & set(action.uses) or action.name == driver.robot.safe_stop.action or made_up:
-                    continue
-                taken |= set(action.uses)
-                asked[action.name] = required(action)
-                ears.invoke(action.name, action.name, **required(action))
-            for wanted in asked:
-                assert ears.final(wanted)["state"] == "succeeded", wanted
+    with at_its_start(kind, f"Real_{kind.model}", real_clock=True) as bench:
+        robot, ears = bench.robot, bench.ears
+        taken: set[str] = set()
+        asked: dict[str, Mapping[str, object]] = {}
+        for action in robot.actions:
+            made_up = any(p.required and p.default is None for p in action.parameters)
+            if taken & set(action.uses) or action.name == robot.safe_stop.action or made_up:
+                continue
+            taken |= set(action.uses)
+            asked[action.name] = required(action)
+            ears.invoke(action.name, action.name, **required(action))
+        for wanted in asked:
+            assert ears.final(wanted)["state"] == "succeeded", wanted

@@ -24,6 +24,12 @@ export interface SubscribeOptions {
   readonly maxMessages?: number;
   /** Inbox size in bytes. Default: 256 MiB. */
   readonly maxBytes?: number;
+  /**
+   * Gets each message at once, ahead of all queues, instead of a callback; must return quickly.
+   *
+   * @internal
+   */
+  readonly sink?: (message: Message) => void;
   /** Closes the subscriber when it is aborted. */
   readonly signal?: AbortSignal;
 }
@@ -218,6 +224,10 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
 
   private arrived(message: Message<T>, reader?: TopicReader): void {
     if (this.isClosed) return;
+    if (this.spec.sink) {
+      this.spec.sink(message as Message);
+      return;
+    }
     const waiter = this.inbox.length === 0 ? this.waiters.shift() : undefined;
     if (waiter) {
       waiter(message);
