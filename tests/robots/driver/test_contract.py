@@ -26,10 +26,12 @@ from app.robots.driver.driver import Driver
 from app.robots.identity import program_of
 from app.robots.kit import Kind
 from nep.masters.master import Master
+from tests import hostile
 from tests.robots.conftest import Ears, FakeClock, eventually
 from tests.robots.driver.driver_program import ProgramDriver, ProgramKind, program_kind, running_driver
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
+MAX_HOSTILE_BYTES = 60_000  # larger ones begin shared memory, which outlives the test
 FINAL = {"succeeded", "failed", "canceled"}
 PATIENCE_S = 3.0  # a loaded machine; what stops on its own within its `within` is measured in bench/stop.py
 
@@ -425,6 +427,18 @@ def test_messages_that_are_no_commands_change_nothing(bench, message) -> None:
     answer = bench.ears.final(wanted, "dance")
     assert "a command is invoke, cancel, stop or alive" in str(answer["error"])
     assert [a["id"] for a in bench.ears.heard["answer"][before:]] == [wanted]
+
+
+def test_robot_stops_after_every_hostile_message(bench) -> None:
+    command = {"id": "h", "op": "invoke", "action": bench.any_action().name, "from": "p", "input": {}}
+    small = [payload for payload in hostile.payloads(command) if len(payload) <= MAX_HOSTILE_BYTES]
+    for number, payload in enumerate(small):
+        bench.ears._command.publish_bytes(payload)
+        if number % 20 == 0:
+            assert bench.stop()["state"] == "succeeded", payload[:200]
+    assert bench.stop()["state"] == "succeeded"
+    wanted = bench.invoke(bench.any_action())
+    eventually(lambda: bench.ears.states(wanted))
 
 
 def test_the_same_command_twice_runs_once(bench) -> None:
