@@ -12,6 +12,8 @@ import { Tasks } from "./tasks.js";
 import { errorText, type Members } from "./text.js";
 
 const OWNER_CHECK_MS = 500;
+const MAX_WARNED = 100;
+const USAGE = "usage: [--name NAME] [--master HOST:PORT] [--owner-pid PID] [--test-clock]";
 
 /** How a robot is started. */
 export interface StartOptions {
@@ -65,7 +67,11 @@ export class Robot {
     if (this.running) throw new NepError(`${name} runs already.`);
     const description = describe(this.spec, name);
     const node = new Node(name, { master, masterWaitS: null });
-    node.on("warning", warn);
+    const warned = new Set<string>(); // each topic of the robot warns that there is no master
+    node.on("warning", (message) => {
+      if (!warned.has(message)) warn(message);
+      if (warned.size < MAX_WARNED) warned.add(message);
+    });
     const { withinS = 0.2, watchdogS = 1 } = this.spec.stop;
     const beat = (...told: Parameters<CommandDesk["beat"]>): void => desk.beat(...told);
     const tasks = new Tasks({ name, clock, withinS, watchdogS, stop: () => this.spec.stop.run(), beat, warn });
@@ -129,7 +135,7 @@ export class Robot {
   async main(argv: readonly string[] = process.argv.slice(2)): Promise<void> {
     const options = chosen(argv);
     if (options.help) {
-      console.log("usage: [--name NAME] [--master HOST:PORT] [--owner-pid PID] [--test-clock]");
+      console.log(USAGE);
       return;
     }
     const name = options.name ?? this.spec.title;
@@ -185,17 +191,19 @@ function warn(message: string): void {
 }
 
 function chosen(argv: readonly string[]) {
-  const { values } = parseArgs({
-    args: [...argv],
-    options: {
-      name: { type: "string" },
-      master: { type: "string" },
-      "owner-pid": { type: "string" },
-      "test-clock": { type: "boolean" },
-      help: { type: "boolean" },
-    },
-  });
-  return values;
+  const options = {
+    name: { type: "string" },
+    master: { type: "string" },
+    "owner-pid": { type: "string" },
+    "test-clock": { type: "boolean" },
+    help: { type: "boolean" },
+  } as const;
+  try {
+    return parseArgs({ args: [...argv], options }).values;
+  } catch (error) {
+    console.error(`${errorText(error)}\n${USAGE}`);
+    process.exit(2);
+  }
 }
 
 /** Call back on Ctrl+C, SIGTERM, or when the process that started this one is gone. */
