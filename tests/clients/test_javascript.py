@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import pytest
 
 import nep
+from app.robots.description.description import parse
 from nep.masters.master import Master
 from nep.messages.image_codec import raw_image
 from tests.clients.node_programs import (
@@ -58,6 +59,41 @@ SLOW_RULES = {
     "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
 }  # fmt: skip
 """They wait for renewals for seconds each; `nep wire check` without --rule has them, too."""
+ALL_TYPES = """\
+const { Robot } = require("nep-js/robot");
+
+const speed = { type: "number", minimum: 0, maximum: 1, unit: "m/s", step: 0.1 };
+const side = { type: "string", choices: ["left", "right"] };
+const parameters = {
+  number: { ...speed, default: 0.5 },
+  integer: { type: "integer", step: 2, optional: true },
+  colour: { type: "colour", default: "#ffffff" },
+  image: { type: "image" },
+  list: { type: "list", items: speed, minLength: 1, maxLength: 3, default: [0.1] },
+  object: { type: "object", fields: { x: speed, y: { type: "boolean" } } },
+  choice: { ...side, default: "left" },
+  named: { type: "string", choices: { l: "to the left", r: "to the right" }, suggested: "l" },
+  boolean: { type: "boolean", default: false, advanced: true },
+  text: { type: "string", minLength: 1, maxLength: 5, suggested: "hi" },
+};
+const robot = new Robot({
+  model: "all", title: "All", virtual: true, kinds: ["mobile"], description: "Has everything.",
+  actions: {
+    go: {
+      text: "go %number", says: "goes", category: "Movement", icon: "move", parameters, uses: ["wheels"],
+      onBusy: "reject", timeoutS: 3, risk: "locomotes", cancellable: false, repeatS: 1,
+      output: { moved: speed }, feedback: { moved: speed }, run() {},
+    },
+  },
+  sensors: {
+    camera: { type: "camera", width: 6, height: 4, hfovDeg: 60, rateHz: 10 },
+    pose: { type: "object", fields: { x: speed }, text: "pose" },
+  },
+  events: { bumped: { text: "when %robot bumps on the %side", icon: "zap", fields: { side }, choose: ["side"] } },
+  stop: { run() {} },
+});
+console.log(JSON.stringify(robot.describe("My robot")));
+"""
 MORTAL_SERVER = """
 import os, signal, threading, nep
 node = nep.node("mortal")
@@ -363,6 +399,20 @@ def answered(questions: nep.Publisher, answers: nep.Subscriber) -> bool:
     is_there, payload = answers.listen(timeout_s=0.05)
     assert not is_there or payload == {"topic": "questions", "text": "grüß dich"}
     return is_there
+
+
+def test_declared_types_are_described_as_in_python(tmp_path):
+    robot = parse(json.loads(run_script(ALL_TYPES, tmp_path).stdout))
+    (go, _stop) = robot.actions
+    assert [each.kind for each in go.parameters] == [
+        "number", "integer", "colour", "image", "list", "object", "choice", "choice", "boolean", "text",
+    ]  # fmt: skip
+    assert [each.name for each in go.parameters if each.required] == ["image", "object", "named", "text"]
+    assert [(each.kind, each.topic) for each in robot.sensors] == [
+        ("image", "/My_robot/camera"), ("object", "/My_robot/pose"),
+    ]  # fmt: skip
+    assert (go.on_busy, go.timeout_s, go.risk, go.repeat_s) == ("reject", 3, "locomotes", 1)
+    assert robot.events[0].filters == ("side",)
 
 
 def test_robot_keeps_the_contract_of_drivers(tmp_path):

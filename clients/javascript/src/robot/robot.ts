@@ -62,6 +62,11 @@ export class Robot {
     describe(spec, spec.title);
   }
 
+  /** Return the W3C Thing Description that the robot announces under a name. */
+  describe(name = this.spec.title): Members {
+    return describe(this.spec, name).document;
+  }
+
   /** Connect to a master (waiting for one), take commands, and announce the robot. */
   async start({ name = this.spec.title, master, clock = systemClock }: StartOptions = {}): Promise<void> {
     if (this.running) throw new NepError(`${name} runs already.`);
