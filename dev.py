@@ -12,7 +12,8 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     screenshots    the pictures of the README
     guide-pictures the pictures of the guide, in each language
     reference      the pages of docs/api, from the docstrings
-    package        the installers of this system, into dist/; -- --system windows makes Windows' (by Wine)
+    package        the installers of this system and the client libraries, into dist/; -- --system clients
+                   makes only those, -- --system windows Windows' installers (by Wine)
     setup          only make the environment
 
 What stands behind the command goes to the program that it starts. Standard library only.

@@ -1,6 +1,9 @@
-"""`python3 dev.py package`: NEP Studio's packages for Windows, macOS and Linux, into `dist/`.
+"""`python3 dev.py package`: NEP Studio's packages for Windows, macOS and Linux, and those of the clients.
 
-    python3 dev.py package                       the packages of this system
+They go into `dist/`.
+
+    python3 dev.py package                       the packages of this system and the client libraries
+    python3 dev.py package -- --system clients   only nep for JavaScript, C# (NuGet) and Unity
     python3 dev.py package -- --system windows   the Windows packages; on Linux through Wine
     python3 dev.py package -- --keep-frozen      pack once more what is frozen already
 
@@ -21,6 +24,7 @@ from typing import Protocol, cast
 from installers.context import APP, SYSTEMS, Context, PackageError, this_system
 
 SUMS = "SHA256SUMS"
+CLIENTS = "clients"
 
 
 class Packer(Protocol):
@@ -31,7 +35,7 @@ class Packer(Protocol):
 
 
 def packer_for(system: str) -> Packer:
-    """The packer of one of `SYSTEMS`."""
+    """The packer of one of `SYSTEMS`, or of the client libraries."""
     return cast("Packer", importlib.import_module(f"installers.{system}.packer"))
 
 
@@ -49,7 +53,7 @@ def write_sums(folder: Path) -> Path:
 
 def told(made: Iterable[Path]) -> str:
     """The files with their sizes, one a line."""
-    return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.0f} MB" for path in made)
+    return "\n".join(f"  {path.name}  {path.stat().st_size / 1e6:.1f} MB" for path in made)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,20 +61,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="dev.py package", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--system", choices=SYSTEMS, default=this_system())
+    parser.add_argument("--system", choices=[*SYSTEMS, CLIENTS])
     parser.add_argument("--keep-frozen", action="store_true", help=f"take the '{APP}' that is frozen already")
     options = parser.parse_args(arguments)
-    context = Context(options.system)
-    context.dist.mkdir(exist_ok=True)
+    contexts = [
+        Context(system) for system in ([options.system] if options.system else [this_system(), CLIENTS])
+    ]
+    dist = contexts[0].dist
+    dist.mkdir(exist_ok=True)
     begun = time.monotonic()
+    made: list[Path] = []
     try:
-        made = packer_for(options.system).build(context, keep_frozen=options.keep_frozen)
+        for context in contexts:
+            made += packer_for(context.system).build(context, keep_frozen=options.keep_frozen)
     except PackageError as error:
         print(f"package: {error}", file=sys.stderr)
         return 2
-    sums = write_sums(context.dist)
+    sums = write_sums(dist)
     print(
-        f"· in {context.dist.name}/, after {time.monotonic() - begun:.0f} s:\n{told([*made, sums])}",
+        f"· in {dist.name}/, after {time.monotonic() - begun:.0f} s:\n{told([*made, sums])}",
         flush=True,
     )
     return 0

@@ -195,8 +195,8 @@ def test_a_tag_that_is_not_the_version_stops_everything(place: Path) -> None:
     assert drafted(place) == 1
     assert not (place / "release").exists()
     jobs = workflow("release")["jobs"]
-    assert [jobs[name]["needs"] for name in ("library", "package")] == ["notes", "notes"]
-    assert (jobs["try"]["needs"], jobs["draft"]["needs"]) == ("package", ["library", "try"])
+    assert [jobs[name]["needs"] for name in ("library", "clients", "package")] == ["notes"] * 3
+    assert (jobs["try"]["needs"], jobs["draft"]["needs"]) == ("package", ["library", "clients", "try"])
 
 
 # ---- the trial of each package, with stand-ins for what only its system has ------------------------

@@ -48,10 +48,10 @@ def build_package() -> None:
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def run_npm(*arguments: str) -> None:
-    """Run npm in the package; skip the test when it fails."""
+def run_npm(*arguments: str, folder: Path = PACKAGE) -> None:
+    """Run npm in the package, or another folder; skip the test when it fails."""
     command = [str(npm), *arguments]
-    done = subprocess.run(command, cwd=PACKAGE, capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
         pytest.skip(f"npm could not install what nep-js needs: {lines[-1]}")

@@ -1,0 +1,1 @@
+"""Packages of nep for JavaScript, C# and Unity."""

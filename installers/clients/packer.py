@@ -1,0 +1,65 @@
+"""Pack the client libraries: `nep-js` for npm, `Nep` for NuGet, and the package of Unity.
+
+Only the .NET SDK builds the package for NuGet: what `mcs` compiles refers to `mscorlib`, not to
+`netstandard`.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from installers.context import Context, PackageError
+from tools import unity_package
+
+__all__ = ["build", "pack_built_javascript", "pack_javascript", "pack_nuget"]
+
+
+def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
+    """Return the packages; what this computer has no tools for is left out, and a line says so."""
+    del keep_frozen  # nothing of them is frozen
+    return [
+        *pack_javascript(context.root / "clients" / "javascript", context.dist),
+        *pack_nuget(context.root / "clients" / "csharp", context.dist),
+        unity_package.build(context.dist),
+    ]
+
+
+def pack_javascript(source: Path, target: Path) -> list[Path]:
+    """Return `nep-js-VERSION.tgz`, or nothing without npm."""
+    npm = shutil.which("npm")
+    if npm is None:
+        print("· nep-js is left out: it needs npm, which comes with Node.js", flush=True)
+        return []
+    if not (source / "node_modules" / "typescript").is_dir():
+        _run([npm, "ci", "--no-audit", "--no-fund", "--silent"], source)
+    shutil.rmtree(source / "dist", ignore_errors=True)  # a module that was renamed leaves its old file
+    _run([npm, "run", "--silent", "build"], source)
+    return [pack_built_javascript(npm, source, target)]
+
+
+def pack_built_javascript(npm: str, source: Path, target: Path) -> Path:
+    """Return the package of what `npm run build` has built."""
+    pack = [npm, "pack", "--silent", "--ignore-scripts", "--pack-destination", str(target)]
+    return target / _run(pack, source).split()[-1]
+
+
+def pack_nuget(source: Path, target: Path) -> list[Path]:
+    """Return `Nep.VERSION.nupkg`, or nothing without the .NET SDK."""
+    dotnet = shutil.which("dotnet")
+    if dotnet is None:
+        print("· Nep for NuGet is left out: it needs the .NET SDK", flush=True)
+        return []
+    for old in target.glob("Nep.*.nupkg"):
+        old.unlink()
+    _run([dotnet, "pack", "Nep.csproj", "--configuration", "Release", "--output", str(target)], source)
+    return sorted(target.glob("Nep.*.nupkg"))
+
+
+def _run(command: Sequence[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise PackageError(f"'{' '.join(command)}' failed:\n{done.stdout}{done.stderr}".rstrip())
+    return done.stdout

@@ -1,0 +1,68 @@
+"""Packages of the client libraries: nep-js installs from its file; a missing tool leaves its package out."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from installers.clients.packer import pack_built_javascript, pack_javascript, pack_nuget
+from installers.context import PackageError
+from tests.clients.node_programs import NEEDS_NODE, PACKAGE, build_package, node, npm, run_npm
+
+PROGRAMS = {
+    "require.cjs": 'const nep = require("nep-js"); console.log(typeof nep.Node, nep.Node === nep.node);',
+    "import.mjs": 'import nep, { Node } from "nep-js"; console.log(typeof Node, Node === nep.Node);',
+}
+
+
+def needs_node(test: Callable[[Path], None]) -> Callable[[Path], None]:
+    for mark in NEEDS_NODE:
+        test = mark(test)
+    return test
+
+
+@needs_node
+def test_installed_package_of_javascript_can_be_required_and_imported(tmp_path: Path) -> None:
+    build_package()
+    packed = pack_built_javascript(str(npm), PACKAGE, tmp_path)
+    install = ("install", "--prefer-offline", "--ignore-scripts", "--no-audit", "--no-fund", "--silent")
+    run_npm(*install, str(packed), folder=tmp_path)
+    for name, program in PROGRAMS.items():
+        (tmp_path / name).write_text(program, "utf-8")
+        done = subprocess.run(
+            [str(node), name], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+        )
+        assert (done.stdout, done.stderr) == ("function true\n", "")
+
+
+@pytest.mark.parametrize("pack", [pack_javascript, pack_nuget])
+def test_package_is_left_out_without_its_tool(
+    pack: Callable[[Path, Path], list[Path]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert pack(tmp_path, tmp_path) == []
+    assert len(capsys.readouterr().out.splitlines()) == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for dotnet is a shell script")
+def test_only_the_nuget_package_just_built_is_returned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dotnet, source, target = tmp_path / "dotnet", tmp_path / "source", tmp_path / "target"
+    source.mkdir()
+    target.mkdir()
+    (target / "Nep.0.0.9.nupkg").touch()
+    dotnet.write_text(f'#!/bin/sh\n[ "$1" = pack ] && : > "{target}/Nep.0.1.0.nupkg"\n', "utf-8")
+    dotnet.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert pack_nuget(source, target) == [target / "Nep.0.1.0.nupkg"]
+    dotnet.write_text("#!/bin/sh\necho no such project >&2; exit 1\n", "utf-8")
+    with pytest.raises(PackageError, match="no such project"):
+        pack_nuget(source, target)
