@@ -1,4 +1,4 @@
-"""Talkers and listeners in Python, JavaScript and C#, each with each, with the calls of the paper's listings."""
+"""Exchange between Python, JavaScript and C# in all nine directions, with the calls of the listings."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ import zmq
 import nep.errors
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
-from nep.programs.doctor import installs, processes
+from nep.programs.doctor import installs, namesakes, processes
 from nep.programs.doctor.facts import (
     ClockFact,
     Facts,
@@ -93,6 +93,8 @@ def collect_in_steps(
         packages=tuple(_packages()),
         strange_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
         shadow=_shadow(here or Path.cwd(), package),
+        path_package=namesakes.path_python_package(),
+        node_packages=namesakes.node_packages(here or Path.cwd()),
     )
     yield ("packages",), facts
     facts, master_pid, listening = _with_master(facts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Literal
 
 from nep.i18n import _
@@ -91,6 +92,59 @@ def _packages(facts: Facts) -> Iterator[Finding]:
     if not originals and not facts.strange_files:
         yield Finding(
             "package", "ok", _("“import nep” gives the one in {folder}.").format(folder=facts.nep_file)
+        )
+    yield from _namesakes(facts)
+
+
+def _namesakes(facts: Facts) -> Iterator[Finding]:
+    """Find packages of others that programs of another Python, or of Node.js, import instead of ours."""
+    if facts.path_package is not None:
+        yield Finding(
+            "package:python3",
+            "info",
+            _("“python3” of the terminal imports the original nep {version} from {folder}.").format(
+                version=facts.path_package.version, folder=facts.path_package.place
+            ),
+            _(
+                "Programs of the original NEP need it and join through the gateway. Start your other "
+                "programs with the Python that has NEP Studio."
+            ),
+        )
+    if not facts.node_packages:
+        return
+    imported, *hidden = facts.node_packages
+    ours = next((each for each in hidden if each.is_ours), None)
+    if imported.is_ours:
+        yield Finding(
+            "package:nep-js",
+            "ok",
+            _("Programs in JavaScript import NEP Studio's nep-js {version} from {folder}.").format(
+                version=imported.version, folder=imported.place
+            ),
+        )
+    elif ours is not None:
+        yield Finding(
+            "package:nep-js",
+            "warning",
+            _(
+                "Programs in JavaScript that start in this folder import another package nep-js {version} "
+                "from {folder}; NEP Studio's in {hidden} is hidden."
+            ).format(version=imported.version, folder=imported.place, hidden=ours.place),
+            _("Uninstall the other package, or start programs of the original NEP in a folder of their own."),
+            command=f'npm uninstall --prefix "{Path(imported.place).parent.parent}" nep-js',
+        )
+    else:
+        yield Finding(
+            "package:nep-js",
+            "info",
+            _(
+                "Programs in JavaScript that start in this folder import nep-js {version} from {folder}, "
+                "which is not NEP Studio's."
+            ).format(version=imported.version, folder=imported.place),
+            _(
+                "Programs of the original NEP join through the gateway. For the others install the file "
+                "nep-js-….tgz of NEP Studio's release in this folder."
+            ),
         )
 
 

@@ -53,11 +53,12 @@ class PortFact:
 
 @dataclass(frozen=True)
 class PackageFact:
-    """A package that is installed in this Python."""
+    """An installed package; not `is_ours`: another one with the name of one of NEP Studio's."""
 
     name: str
     version: str
     place: str
+    is_ours: bool = True
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,9 @@ class Facts:
     `answers_at` is the loopback address at which a master answers when none does at `address`, which is of
     this computer, too; "" when none answers there, either. `reach` is why the address of a master that is
     on another computer and does not answer is not reached, "" when somebody is there, None when it was not
-    tried.
+    tried. `packages` are those of this Python, `path_package` is the original `nep` that `python3` imports
+    when that is another Python, and `node_packages` are the `nep-js` that Node.js finds in this folder, the
+    one that programs import first.
     """
 
     now_s: float
@@ -137,6 +140,8 @@ class Facts:
     is_known: bool = True
     answers_at: str = ""
     reach: Reach | None = None
+    path_package: PackageFact | None = None
+    node_packages: tuple[PackageFact, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -234,6 +235,33 @@ def test_the_original_package_beside_ours_is_an_error_with_the_command():
     left = found(strange_files=("publisher.py", "master.py"))["package:files"]
     assert "publisher.py, master.py" in left.sentence
     assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
+
+
+OUR_JS = PackageFact("nep-js", "0.2.0", "/home/me/node_modules/nep-js")
+OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", is_ours=False)
+
+
+@pytest.mark.parametrize(
+    ("packages", "severity", "command"),
+    [
+        ((OUR_JS, OTHER_JS), "ok", ""),
+        ((OTHER_JS,), "info", ""),
+        ((OTHER_JS, OUR_JS), "warning", f'npm uninstall --prefix "{Path("/home/me/robot")}" nep-js'),
+    ],
+)
+def test_another_nep_js_is_a_warning_where_it_hides_ours(packages, severity, command):
+    one = found(node_packages=packages)["package:nep-js"]
+    assert (one.severity, one.command) == (severity, command)
+    assert packages[0].place in one.sentence
+    assert "package:nep-js" not in found()
+
+
+def test_original_package_of_the_terminals_python_is_told():
+    original = PackageFact("nep", "0.5.4.8", "/usr/lib/python3/dist-packages", is_ours=False)
+    one = found(path_package=original)["package:python3"]
+    assert one.severity == "info"
+    assert "0.5.4.8" in one.sentence
+    assert "/usr/lib/python3/dist-packages" in one.sentence
 
 
 def test_few_files_say_for_how_many_topics_that_is():

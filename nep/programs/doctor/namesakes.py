@@ -1,0 +1,77 @@
+"""Packages named `nep` and `nep-js` that programs on this computer import: NEP Studio's or others'.
+
+The names on the public registries belong to the original NEP. Nothing is imported or run to find out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from nep.programs.doctor.facts import PackageFact
+
+__all__ = ["node_packages", "path_python_package"]
+
+_SITES = ("lib/{}/site-packages", "lib/{}/dist-packages", "local/lib/{}/dist-packages", "Lib/site-packages")
+_ORIGINAL_BELOW = (0, 6)
+
+
+def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
+    """Return each `nep-js` that Node.js finds for a program in a folder; it imports the first."""
+    folder = here.absolute()
+    modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
+    more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
+    found = (_node_package(each / "nep-js") for each in dict.fromkeys((*modules, *more)))
+    return tuple(each for each in found if each is not None)
+
+
+def _node_package(folder: Path) -> PackageFact | None:
+    try:
+        described = json.loads((folder / "package.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    if not isinstance(described, dict):
+        return None
+    is_ours = isinstance(described.get("nep"), dict)  # clients/javascript/package.json has it
+    return PackageFact("nep-js", str(described.get("version", "")), str(folder), is_ours)
+
+
+def path_python_package(
+    path: str | None = None, own: Path = Path(sys.prefix), home: Path | None = None
+) -> PackageFact | None:
+    """Return the original `nep` that `python3` of the PATH imports, None when it imports none or is our own.
+
+    `own` is the environment of this program, whose packages are looked at on their own.
+    """
+    python = shutil.which("python3", path=path) or shutil.which("python", path=path)
+    if python is None:
+        return None
+    environment = Path(python).parent.resolve().parent
+    if environment == own.resolve():
+        return None
+    name = Path(python).resolve().name
+    names = (name, "python3") if name.startswith("python3.") else ("python3*",)
+    is_virtual = (environment / "pyvenv.cfg").exists()
+    users = [] if is_virtual else [(home or Path.home()) / ".local"]
+    return next(_originals((*users, environment), names), None)
+
+
+def _originals(environments: Iterable[Path], names: Iterable[str]) -> Iterator[PackageFact]:
+    patterns = dict.fromkeys(site.format(name) for name in names for site in _SITES)
+    for environment in environments:
+        for site in (site for pattern in patterns for site in sorted(environment.glob(pattern))):
+            package = site / "nep"
+            if not package.is_dir() or (package / "protocol").is_dir():  # the original has no such folder
+                continue
+            for info in (*site.glob("nep-*.dist-info"), *site.glob("nep-*.egg-info")):
+                version = info.name.removeprefix("nep-").partition("-py")[0].removesuffix(info.suffix)
+                if _numbers(version) < _ORIGINAL_BELOW:
+                    yield PackageFact("nep", version, str(site), is_ours=False)
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split(".") if part.isdecimal())
