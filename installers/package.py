@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--keep-frozen", action="store_true", help=f"take the '{APP}' that is frozen already")
     options = parser.parse_args(arguments)
     contexts = [
-        Context(system) for system in ([options.system] if options.system else [this_system(), CLIENTS])
+        Context(system) for system in ([options.system] if options.system else [CLIENTS, this_system()])
     ]
     dist = contexts[0].dist
     dist.mkdir(exist_ok=True)

@@ -6,10 +6,9 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -68,6 +67,40 @@ if (what === "talk") {
 }
 """
 
+TALKERS = {
+    "python": """
+import nep
+node = nep.node('python_sender')
+pub = node.new_pub('test', 'json')
+pub.publish({'message': 'hello'})
+""",
+    "javascript": """
+const nep = require("nep-js");
+var node = new nep.Node("publisher_sample");
+var publisher = node.new_pub("test", "json");
+var message = { message: "hello world" };
+publisher.publish(message);
+""",
+}
+LISTENERS = {
+    "python": """
+import nep
+def callback(message):
+    print(message)
+node = nep.node('python_callback')
+sub = node.new_callback('test', 'json', callback)
+node.spin()
+""",
+    "javascript": """
+const nep = require("nep-js");
+var node = new nep.Node("subscriber_sample");
+var callback = function (message) {
+  console.log(message);
+};
+var subscriber = node.new_callback("test", "json", callback);
+""",
+}
+
 
 @pytest.fixture
 def commands(tmp_path: Path) -> dict[str, list[str]]:
@@ -93,34 +126,79 @@ def subscriber_count(node: nep.node) -> int:
     return sum(len(topic.subscribers) for topic in node.graph().topics.values())
 
 
-def received(printed: Path, talker: str) -> list[Any]:
-    lines = printed.read_text("utf-8").splitlines()
-    return [message for topic, message in map(json.loads, lines) if topic == f"from_{talker}"]
+class Programs:
+    """Running programs that print into files of a folder; killed at the end."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._stack = ExitStack()
+        paths = {"PYTHONPATH": str(ROOT), "MONO_PATH": str(mono_programs.BUILD), "PYTHONUNBUFFERED": "1"}
+        self._environment = {**os.environ, **paths}
+
+    def start(self, name: str, command: list[str]) -> subprocess.Popen[bytes]:
+        output = self._stack.enter_context((self._folder / name).open("wb"))
+        process = subprocess.Popen(command, cwd=self._folder, env=self._environment, stdout=output)
+        self._stack.callback(process.wait)
+        self._stack.callback(process.kill)
+        return process
+
+    def lines(self, name: str) -> list[str]:
+        return (self._folder / name).read_text("utf-8").splitlines()
+
+    def close(self) -> None:
+        self._stack.close()
+
+
+@pytest.fixture
+def programs(tmp_path: Path, master: Master) -> Iterator[Programs]:
+    made = Programs(tmp_path)
+    yield made
+    made.close()
+
+
+def listing(language: str, scripts: Mapping[str, str], compiled: str, folder: Path) -> list[str]:
+    """Return the command that runs a listing of the paper."""
+    if language == "python":
+        return [sys.executable, "-c", scripts[language]]
+    if language == "javascript":
+        return prepared(scripts[language], folder, f"{compiled}.cjs")
+    example = mono_programs.CSHARP / "examples" / f"{compiled}.cs"
+    return ["mono", str(mono_programs.program(f"{compiled}.exe", example))]
+
+
+def test_listings_exchange_messages_in_all_nine_directions(
+    programs: Programs, python: nep.node, tmp_path: Path
+) -> None:
+    build_package()
+    for language in LANGUAGES:
+        programs.start(language, listing(language, LISTENERS, "Listing10", tmp_path))
+    eventually(lambda: subscriber_count(python) == len(LANGUAGES))
+    for count, language in enumerate(LANGUAGES, start=1):
+        talker = programs.start(f"{language}_talker", listing(language, TALKERS, "Listing9", tmp_path))
+        assert talker.wait(LONG_S) == 0
+        for listener in LANGUAGES:
+            eventually(lambda listener=listener, count=count: len(programs.lines(listener)) == count)
+            assert "hello" in programs.lines(listener)[-1], (language, listener)
 
 
 def test_messages_arrive_whole_and_in_order_in_all_nine_directions(
-    commands: dict[str, list[str]], python: nep.node, tmp_path: Path
+    commands: dict[str, list[str]], programs: Programs, python: nep.node
 ) -> None:
     topics = [f"from_{language}" for language in LANGUAGES]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MONO_PATH": str(mono_programs.BUILD)}
-    with ExitStack() as stack:
-
-        def started(language: str, *arguments: str) -> subprocess.Popen[bytes]:
-            output = stack.enter_context((tmp_path / f"{arguments[0]}_{language}").open("wb"))
-            command = [*commands[language], *arguments]
-            process = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=output)
-            stack.callback(process.wait)
-            stack.callback(process.kill)
-            return process
-
-        listeners = [started(language, "listen", str(COUNT), *topics) for language in LANGUAGES]
-        eventually(lambda: subscriber_count(python) == len(LANGUAGES) ** 2)
-        talkers = [started(language, "talk", str(COUNT), f"from_{language}") for language in LANGUAGES]
-        exit_codes = [process.wait(LONG_S) for process in (*talkers, *listeners)]
-    assert exit_codes == [0] * 6
+    listeners = [
+        programs.start(language, [*commands[language], "listen", str(COUNT), *topics])
+        for language in LANGUAGES
+    ]
+    eventually(lambda: subscriber_count(python) == len(LANGUAGES) ** 2)
+    talkers = [
+        programs.start(f"{language}_talker", [*commands[language], "talk", str(COUNT), f"from_{language}"])
+        for language in LANGUAGES
+    ]
+    assert [process.wait(LONG_S) for process in (*talkers, *listeners)] == [0] * 6
     messages = [{"number": number, "message": "x" * number * 2000 + 'grüß\n"🤖"'} for number in range(COUNT)]
     for listener in LANGUAGES:
+        received = [json.loads(line) for line in programs.lines(listener)]
         for talker in LANGUAGES:
-            heard = received(tmp_path / f"listen_{listener}", talker)
+            heard = [message for topic, message in received if topic == f"from_{talker}"]
             assert [each["number"] for each in heard] == list(range(COUNT)), (talker, listener)
             assert heard == messages, (talker, listener)
