@@ -99,8 +99,8 @@ def web(
         server = WebServer(settings)
         try:
             _start(server)
-            _say_running(server, terminal, token_file=None if token is None or is_file_new else token)
             interrupts.leave_when_told()
+            _say_running(server, terminal, token_file=None if token is None or is_file_new else token)
             while not server.wait(_SLICE_S):
                 pass  # in slices: Windows does not interrupt a wait for Ctrl+C
             if server.problem is not None:

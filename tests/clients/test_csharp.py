@@ -248,11 +248,17 @@ def test_slow_subscriber_counts_exactly_what_it_loses(node: Node) -> None:
         for number in range(3000):
             publisher.publish({"n": number})
 
+        seen: list[str] = []
+
         def all_counted() -> bool:
-            received, lost = map(int, slow.ask("counts").split())
+            seen.append(slow.ask("counts"))
+            received, lost = map(int, seen[-1].split())
             return received + lost == 3000 and lost > 0
 
-        eventually(all_counted)
+        try:
+            eventually(all_counted)
+        except AssertionError:
+            raise AssertionError(seen[-3:]) from None
         assert slow.end() == 0
 
 

@@ -89,7 +89,9 @@ const robot = new Robot({
     camera: { type: "camera", width: 6, height: 4, hfovDeg: 60, rateHz: 10 },
     pose: { type: "object", fields: { x: speed }, text: "pose" },
   },
-  events: { bumped: { text: "when %robot bumps on the %side", icon: "zap", fields: { side }, choose: ["side"] } },
+  events: {
+    bumped: { text: "when %robot bumps on the %side", icon: "zap", fields: { side }, choose: ["side"] },
+  },
   stop: { run() {} },
 });
 console.log(JSON.stringify(robot.describe("My robot")));

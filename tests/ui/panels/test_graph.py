@@ -14,9 +14,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from app.core.graph.activity import QUIET_S
+from app.core.graph.layout import GraphLayout, LayoutSizes
+from app.core.graph.node_graph import NodeGraph
 from app.core.graph.walk import GraphChoice
 from app.core.network.master import MasterState
 from app.ui.panels.graph.panel import DOT, PANEL, SVG, GraphPanel
+from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.words import line_width, short_rate
 from nep.protocol.graph_view import (
     ClientInfo,
@@ -588,6 +591,8 @@ def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:
     press(button(made, "Open the connection doctor"))
     assert window.asked_why == [(made, "")]
     assert made.picture() == b""
+    made.canvas.show_scene(GraphScene(made.theme, NodeGraph(), GraphLayout(), LayoutSizes(), "here"))
+    assert made.picture() == b"", "also once nothing was laid out"
     made.save(Path("nowhere.svg"), SVG)
     assert window.toasts == []
     window.session.master = MasterState("none", "127.0.0.1:7780")

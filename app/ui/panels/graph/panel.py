@@ -494,7 +494,7 @@ class GraphPanel(PanelWidget):
     def save(self, path: Path, kind: FileKind) -> None:
         """Write the graph there; the window says whether that went well."""
         scene = self.canvas.scene
-        if scene is None:
+        if scene is None or not scene.nodes:
             return
         data = self.picture() if kind is SVG else self.dot().encode("utf-8")
         try:
@@ -508,7 +508,7 @@ class GraphPanel(PanelWidget):
     def picture(self) -> bytes:
         """The whole graph as SVG, in the colours of the moment; b"" when there is none."""
         scene = self.canvas.scene
-        if scene is None:
+        if scene is None or not scene.nodes:
             return b""
         scene.complete(self._figures_of)
         area = scene.bounds.adjusted(-20, -20, 20, 20)
