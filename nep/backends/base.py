@@ -165,6 +165,15 @@ class PublisherTransport(Protocol):
 
 
 @runtime_checkable
+class KnowsSubscribers(Protocol):
+    """What a `PublisherTransport` may have besides: which subscribers of the graph are connected."""
+
+    @property
+    def subscriber_ids(self) -> frozenset[int]:
+        """Ids of the subscribers that are connected now."""
+
+
+@runtime_checkable
 class GivesPayloads(Protocol):
     """What a `SubscriberTransport` may have besides: payloads without messages, for who wants no more.
 

@@ -14,7 +14,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from nep.backends.base import PublisherSpec, PublisherTransport, PublishesQuickly, QuickPublish
+from nep.backends.base import (
+    KnowsSubscribers,
+    PublisherSpec,
+    PublisherTransport,
+    PublishesQuickly,
+    QuickPublish,
+)
 from nep.errors import ClosedError, EncodeError, WireError
 from nep.i18n import _
 from nep.messages.codecs import JsonEncoder, ordinary
@@ -85,6 +91,17 @@ class Publisher:
     def subscribers(self) -> int:
         """How many subscribers are connected now. Costs nothing."""
         return 0 if self._is_forked else self._transport.subscribers
+
+    @property
+    def subscriber_ids(self) -> frozenset[int]:
+        """Ids, as in the graph, of the subscribers that are connected now.
+
+        A subscriber whose program hangs leaves the graph after some seconds and stays connected. Empty for
+        back ends that can't tell them apart.
+        """
+        if self._is_forked or not isinstance(self._transport, KnowsSubscribers):
+            return frozenset()
+        return self._transport.subscriber_ids
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -305,7 +305,8 @@ class Fleet:
         """Take over a new graph: robots come and go."""
         self._told = True
         before, self._view = self._view, view
-        self._movable.view = self._own.view = view
+        self._movable.view = view
+        self._own.update(view)
         self._announcements.update(view)
         topics = (self._own.topics(link.robot) for link in self._links.values())
         self._senders.learn(view, {rize.ANSWERS}.union(*topics))

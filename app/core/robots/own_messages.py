@@ -21,6 +21,27 @@ class OwnMessages:
         self._senders, self._links = senders, links
         self.view = GraphView(0, 0)
         """The newest graph."""
+        self._lapsed: dict[str, dict[int, Identity]] = {}
+        """Programs that left the graph with their connection up, by robot and by their subscriber's id."""
+
+    def update(self, view: GraphView) -> None:
+        """Take over a new graph, and remember programs that left it although they may only hang."""
+        before, self.view = self.view, view
+        for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
+            topic, serving = before.topics.get(link.robot.topics.command), self._serving(link, before)
+            for each in topic.subscribers if topic is not None and link.robot.dialect == "native" else ():
+                if each.node_id in serving and each.node_id not in view.nodes:
+                    self._lapsed.setdefault(link.name, {})[each.id] = identity_of(before, each.node_id)
+        for name, lapsed in list(self._lapsed.items()):
+            ended = lapsed.keys() - self._connected(self._links.get(name))
+            for id in ended | {id for id, each in lapsed.items() if each.node_id in view.nodes}:
+                del lapsed[id]
+            if not lapsed:
+                del self._lapsed[name]
+
+    @staticmethod
+    def _connected(link: RobotLink | None) -> frozenset[int]:
+        return frozenset() if link is None or link.publisher is None else link.publisher.subscriber_ids
 
     @staticmethod
     def topics(robot: Robot) -> set[str]:
@@ -28,12 +49,17 @@ class OwnMessages:
         return {robot.topics.answer, *topics_of(robot)}
 
     def other_programs(self, name: str) -> list[Identity]:
-        """Return the programs besides a robot's own that hear its commands and answer them."""
+        """Return the programs besides a robot's own that hear its commands and answer them.
+
+        Those that hang are among them as long as they are connected: they hear what is sent when they go on.
+        """
         link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
             return []
         own = link.identity.node_id if link.identity is not None else ""
-        return [identity_of(self.view, node) for node in self._serving(link, self.view) if node != own]
+        listed = [identity_of(self.view, node) for node in self._serving(link, self.view) if node != own]
+        connected = self._connected(link)
+        return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
         """Return the programs that hear the robot's commands and answer them now, and did not ``before``."""

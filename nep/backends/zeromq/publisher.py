@@ -74,6 +74,12 @@ class GreetedPublisher:
         self._waited: set[int] = set()
 
     @property
+    def subscriber_ids(self) -> frozenset[int]:
+        """Ids of the subscribers that have said hello and have not gone."""
+        with self._changed:
+            return frozenset(self._seen)
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """Names of nodes that were expected and have not said hello."""
         with self._changed:

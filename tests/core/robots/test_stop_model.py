@@ -338,6 +338,12 @@ BROKEN_HISTORIES: dict[str, list[Step]] = {
         ("move_by_form", {"name": "Base", "action": "turn", "wait_s": 1.7}),
         ("press_stop", {"wait_s": 0.0}),
     ],
+    "the program that hangs without a lease hears what is sent to its twin": [
+        ("start_robot", {"name": "Arm", "late": False}),
+        ("halt", {"is_killed": False, "pick": 0, "wait_s": 1.7}),
+        ("move_by_form", {"name": "Arm", "action": "drive", "wait_s": 0.0}),
+        ("press_stop", {"wait_s": 0.0}),
+    ],
     "a second program was stopped while the frozen one still drives": [
         ("start_robot", {"name": "Arm", "late": False}),
         ("move_by_form", {"name": "Arm", "action": "drive", "wait_s": 0.0}),
@@ -374,3 +380,17 @@ def test_a_proven_stop_is_true_in_every_history() -> None:
             suppress_health_check=list(HealthCheck),
         ),
     )
+
+
+def test_killed_program_does_not_keep_a_stop_of_its_twin_from_being_proven() -> None:
+    model = StopModel()
+    try:
+        model.start(both=False)
+        model.start_robot(name="Arm", late=False)
+        model.halt(pick=0, is_killed=True, wait_s=1.7)
+        model.move_by_form(name="Arm", action="drive", wait_s=0.0)
+        model.press_stop(wait_s=1.7)
+        model.check()
+        assert model.studio.session.runs.state.state == "proven"
+    finally:
+        model.teardown()

@@ -61,7 +61,10 @@ def test_the_first_message_reaches_every_process_40_of_40(node: nep.Node) -> Non
         for n in range(40):
             with node.new_pub("topic") as pub:
                 assert (pub.subscribers, pub.missing) == (4, ())
+                assert len(pub.subscriber_ids) == 4
                 pub.publish(n)
+        with node.new_pub("topic") as pub:
+            assert pub.subscriber_ids == {each.id for each in node.graph().topics["topic"].subscribers}
         for program in programs:
             assert json.loads(program.line()) == list(range(40))
 

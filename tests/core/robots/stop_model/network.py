@@ -176,6 +176,14 @@ class SimulatedNode:
         """Freeze (SIGSTOP) or end (SIGKILL) its process."""
         self.is_frozen, self.is_dead = not is_dead, is_dead
         self.halted_s = self.network.now()
+        if is_dead:
+            self.disconnect()
+
+    def disconnect(self) -> None:
+        """End the connections of its subscribers, as the system does for a process that has ended."""
+        for node in self.network.nodes.values():
+            for publisher in node.publishers:
+                publisher.connected = [each for each in publisher.connected if each.node is not self]
 
     def unlist(self) -> None:
         """Let its lease end at the master; its connections stay up."""
@@ -190,6 +198,7 @@ class SimulatedNode:
     def close(self) -> None:
         """Leave the network properly: the master drops it at once."""
         self.is_dead = True
+        self.disconnect()
         self.unlist()
 
 
@@ -209,6 +218,10 @@ class SimulatedPublisher:
     @property
     def subscribers(self) -> int:
         return len(self.connected)
+
+    @property
+    def subscriber_ids(self) -> frozenset[int]:
+        return frozenset(each.id for each in self.connected)
 
     @property
     def missing(self) -> tuple[str, ...]:
