@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -72,7 +73,8 @@ def places(studio: Studio) -> dict[tuple[str, str, str], Sequence[float]]:
         inside = overlap(rect, banner) and rect[2] * rect[3] < banner[2] * banner[3]
         is_tool = kind.endswith("Button") or kind in TOOLS
         if is_tool and rect[2] > 0 and not (inside and rect[0] >= banner[0]):
-            found[kind, str(each["name"]), str(each["in"])] = rect
+            name = re.sub(r"\d+", "0", str(each["name"]))  # the status bar counts
+            found[kind, name, str(each["in"])] = rect
     return found
 
 
