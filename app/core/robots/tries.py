@@ -73,13 +73,18 @@ class Tries:
             self._take(link, made, answer)
 
     def _take(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
-        state = bounded_str(answer.get("state"))
-        if state not in FINAL_STATES and state not in ("accepted", "running"):
-            return  # no word of a robot
-        made.feedback = _object(answer.get("feedback")) or made.feedback
-        made.output = _object(answer.get("output")) or made.output
-        made.waits_for = _names(answer.get("waits_for")) or made.waits_for
-        made.replaces = _names(answer.get("replaces")) or made.replaces
+        state = answer.get("state")
+        if not isinstance(state, str) or (state not in FINAL_STATES and state not in ("accepted", "running")):
+            return
+        # Most answers have feedback only, and a robot may flood Studio with them.
+        if "feedback" in answer:
+            made.feedback = _object(answer["feedback"]) or made.feedback
+        if "output" in answer:
+            made.output = _object(answer["output"]) or made.output
+        if "waits_for" in answer:
+            made.waits_for = _names(answer["waits_for"]) or made.waits_for
+        if "replaces" in answer:
+            made.replaces = _names(answer["replaces"]) or made.replaces
         error = answer.get("error")
         if state in FINAL_STATES:
             self._end(link, made, state, said(error) if error else None)

@@ -205,8 +205,8 @@ def test_it_sends_what_is_no_json(session: Session, liar: Liar, tried: Invocatio
     tick_until(session, lambda: tried.state == "succeeded")
 
 
-MOST_CALLS_A_TICK = 96 * MESSAGES_PER_TOPIC
-"""A full topic's answers, each taken in with some 64 calls; how long they take depends on what else runs."""
+MOST_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
+"""A full topic's answers, each taken in with some 48 calls; how long they take depends on what else runs."""
 
 
 def calls_of(function: Callable[[], object]) -> int:
