@@ -6,7 +6,7 @@ import threading
 from collections.abc import Sequence
 
 from tests.e2e.hour import CANVAS, kind_of
-from tests.e2e.person import AGAIN_S, STEP_S, Person
+from tests.e2e.person import Person
 from tests.e2e.waiting import until
 
 PACE_S = 0.08  # the page moves its focus with the next picture, not with the key
@@ -81,9 +81,9 @@ class Fingers:
         """What has the focus in the page."""
         return str(self.studio.page(FOCUSED)).replace("\u00a0", " ")
 
-    def page_says(self, words: str, within_s: float = STEP_S) -> None:
+    def page_says(self, words: str) -> None:
         """Wait until what has the focus in the page says these words."""
-        until(lambda: words in self.focused(), lambda: f"{words}: {self.focused()}", within_s)
+        until(lambda: words in self.focused(), lambda: f"{words}: {self.focused()}")
 
     def until_in_page(self, key: str, words: str, held: Sequence[str] = ()) -> None:
         """Press a key in the block editor until what has the focus says these words."""
@@ -106,12 +106,8 @@ class Fingers:
 
     def find_block(self, words: str, kind: str) -> str:
         """Find a block by its words and put it where the keys were; its id."""
-        try:
-            self.press("f", held=["Ctrl", "Shift"])
-            self.page_says("Find a block", AGAIN_S)
-        except AssertionError:  # a tab that came to show took the keyboard
-            self.press("f", held=["Ctrl", "Shift"])
-            self.page_says("Find a block")
+        self.press("f", held=["Ctrl", "Shift"])
+        self.page_says("Find a block")
         self.write(words)
         first = f"{TAB}.querySelector('.blocklyFlyout.nepCategory .blocklyBlock')"
         until(

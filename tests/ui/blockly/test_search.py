@@ -339,3 +339,61 @@ def test_letters_that_are_typed_before_the_page_is_there_arrive(qtbot):
     qtbot.waitUntil(lambda: view.is_ready, timeout=WAIT_MS)
     them = Person(qtbot, view)
     them.wait_for(f"document.querySelector('{FIELD}')?.value", "wait")
+
+
+MORE = [robot("Pepper"), nao(), robot("Sonny")]
+"""The robots after another Pepper has arrived."""
+SAYS = f"document.querySelectorAll('{FLYOUT} .blocklyBlockCanvas > .robot_pepper_do_say').length"
+"""How many blocks that let a Pepper speak the toolbox shows."""
+
+
+def test_typed_words_and_the_focus_stay_when_a_robot_arrives(opened):
+    them = opened("en")
+    them.click(FIELD)
+    QTest.keyClicks(them.target, "sa")
+    them.box(f"{FLYOUT} .robot_pepper_do_say")
+    them.view.set_definitions(editor_definitions(MORE))
+    them.wait_for(SAYS, 2)
+    QTest.keyClicks(them.target, "y")
+    them.wait_for(f"document.querySelector({FIELD!r}).value", "say")
+    them.wait_for(f"document.activeElement === document.querySelector({FIELD!r})")
+
+
+def test_half_a_name_keeps_its_marked_letters_when_a_robot_arrives(opened):
+    them = opened("en")
+    them.click(FIELD)
+    QTest.keyClicks(them.target, "wait")
+    them.wait_for(f"document.querySelector({FIELD!r}).value", "wait")
+    them.ask(f"document.querySelector({FIELD!r}).setSelectionRange(1, 3)")
+    them.view.set_definitions(editor_definitions(MORE))
+    them.wait_for("document.body.textContent.includes('Sonny')")
+    them.ask(f"document.querySelector({FIELD!r}).focus()")
+    assert them.ask(
+        f"(f => [f.value, f.selectionStart, f.selectionEnd])(document.querySelector({FIELD!r}))"
+    ) == ["wait", 1, 3]
+
+
+FOCUSED = "(it => [it.getAttribute('aria-label') ?? '', it.textContent])(document.activeElement)"
+
+
+def test_keys_stay_on_a_category_when_a_robot_arrives(opened):
+    them = opened("en")
+    them.open_category("Control")
+    before = them.ask(FOCUSED)
+    assert "Control" in before[1]
+    them.view.set_definitions(editor_definitions(MORE))
+    them.wait_for("document.body.textContent.includes('Sonny')")
+    assert them.ask(FOCUSED) == before
+
+
+def test_keys_stay_on_a_block_of_the_toolbox_when_a_robot_arrives(opened):
+    them = opened("en")
+    them.click(FIELD)
+    QTest.keyClicks(them.target, "say")
+    them.box(f"{FLYOUT} .robot_pepper_do_say")
+    them.press(Qt.Key_Down)
+    holder = "document.activeElement.closest('.blocklyDraggable')?.classList.contains('robot_pepper_do_say')"
+    them.wait_for(holder)
+    them.view.set_definitions(editor_definitions(MORE))
+    them.wait_for(SAYS, 2)
+    them.wait_for(holder)

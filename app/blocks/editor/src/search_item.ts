@@ -20,6 +20,14 @@ interface SearchedToolbox {
   enterFound(event: KeyboardEvent | null): void;
 }
 
+/** The words in a search field, which of them are selected, and whether their blocks are still to be shown. */
+interface Query {
+  words: string;
+  selection: [start: number, end: number];
+  hasFocus: boolean;
+  isPending: boolean;
+}
+
 export class SearchItem extends Blockly.ToolboxItem {
   private readonly div = document.createElement('div');
   private readonly field = document.createElement('input');
@@ -72,6 +80,31 @@ export class SearchItem extends Blockly.ToolboxItem {
     this.forgetWaiting();
     this.field.value = '';
     this.dress();
+  }
+
+  /** Its words and its focus, for the field that replaces it. */
+  get query(): Query {
+    const {value, selectionStart, selectionEnd} = this.field;
+    return {
+      words: value,
+      selection: [selectionStart ?? 0, selectionEnd ?? 0],
+      hasFocus: document.activeElement === this.field,
+      isPending: this.waiting !== 0,
+    };
+  }
+
+  /** Takes the place of a field that had these words and this focus. */
+  restore({words, selection, hasFocus, isPending}: Query): void {
+    this.field.value = words;
+    if (hasFocus) this.field.focus();
+    this.field.setSelectionRange(...selection);
+    this.dress();
+    if (isPending) this.showSoon();
+  }
+
+  /** Shows again which blocks the words find. */
+  refresh(): void {
+    if (this.field.value.trim()) this.show();
   }
 
   /** While somebody looks for a block, a toolbox of tiles is whole. */

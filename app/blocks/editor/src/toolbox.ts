@@ -1,6 +1,7 @@
 // The toolbox of the design: tiles with icons, headings, robots.
 import * as Blockly from 'blockly/core';
 import {Flyout} from './flyout';
+import {focusedBlock} from './help';
 import {iconElement, iconName} from './icons';
 import {SEARCH, SearchItem} from './search_item';
 import {t} from './words';
@@ -260,13 +261,23 @@ export class Toolbox extends Blockly.Toolbox {
     }
   }
 
-  /** Shows new contents; an open category stays open, and nothing happens when nothing changed. */
+  /** Shows new contents; an open category, typed words and the focus stay, and equal contents change nothing. */
   update(def: unknown, blocksChanged: boolean): void {
     const items = withIds(def as Items);
     const key = JSON.stringify(items);
     const sameItems = key === this.shown;
     if (sameItems && !blocksChanged) return;
     this.shown = key;
+    const restoreFocus = this.rememberFocus();
+    const query = sameItems ? undefined : this.searchItem?.query;
+    const {showsFound} = this;
+    this.showContents(items, sameItems, blocksChanged);
+    if (query) this.searchItem?.restore(query);
+    if (showsFound) this.searchItem?.refresh();
+    restoreFocus();
+  }
+
+  private showContents(items: Items, sameItems: boolean, blocksChanged: boolean): void {
     const flyout = this.getFlyout();
     const open = this.selectedItem_;
     const before = this.made;
@@ -294,6 +305,38 @@ export class Toolbox extends Blockly.Toolbox {
     flyout?.show(item.getContents());
     const workspace = flyout?.getWorkspace();
     workspace?.scrollbar?.setY(-scroll);
+  }
+
+  private get searchItem(): SearchItem | undefined {
+    return this.getToolboxItems().find((item) => item instanceof SearchItem);
+  }
+
+  /** Returns a function that focuses what is focused now, or what has replaced it in new contents. */
+  private rememberFocus(): () => void {
+    const manager = Blockly.getFocusManager();
+    const node = manager.getFocusedNode();
+    const blocks = this.getFlyout()?.getWorkspace();
+    if (!node || !blocks || !document.hasFocus()) return () => undefined;
+    if (node.getFocusableTree() === this) {
+      const id = node instanceof Blockly.ToolboxItem ? node.getId() : '';
+      return () => {
+        const item = this.getToolboxItemById(id);
+        if (item?.canBeFocused()) manager.focusNode(item);
+        else manager.focusTree(this);
+      };
+    }
+    if (node.getFocusableTree() !== blocks) return () => undefined;
+    const contentOf = (block: Blockly.Block): string =>
+      JSON.stringify(Blockly.serialization.blocks.save(block, {saveIds: false}));
+    const root = focusedBlock()?.getRootBlock();
+    const content = root && contentOf(root);
+    return () => {
+      const tops = blocks.getTopBlocks(true);
+      if (root && tops.includes(root)) return;
+      const block = tops.find((each) => contentOf(each) === content) ?? tops[0];
+      if (block) manager.focusNode(block);
+      else manager.focusTree(this);
+    };
   }
 }
 
