@@ -1,0 +1,104 @@
+"""Messages that robots publish: their answers, heartbeats and sensor values, taken into their links."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from app.core.network.mailbox import Batch
+from app.core.robots.own_messages import OwnMessages, mapping_of
+from app.core.robots.robot_link import FINAL_STATES, Payload, RobotLink
+from app.core.robots.stop.moved_robots import MovedRobots
+from app.core.robots.tries import Tries
+from app.robots import rize
+from app.robots.held_messages import HeldMessages
+from app.robots.identity import may_move, said, said_of_stop
+from nep.i18n import _
+from nep.messages.message import Message
+
+MAX_HELD = 64
+"""Answers held for each publisher that the graph does not list yet."""
+
+
+class RobotMessages:
+    """Update robots from messages of their own programs. Not thread-safe: use it from the window's thread.
+
+    Answers of publishers that the graph does not list yet are held until the next graph.
+    """
+
+    def __init__(
+        self, own: OwnMessages, tries: Tries, moved: MovedRobots, clock: Callable[[], float]
+    ) -> None:
+        self._own, self._tries, self._moved, self._clock = own, tries, moved, clock
+        self._held: dict[str, HeldMessages] = {}
+        self._settled: dict[str, None] = {}
+
+    def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
+        """Take a robot's answers, its newest sensor values and its drawing from ``batches`` by topic."""
+        answers = batches.get(link.robot.topics.answer)
+        for message in answers.messages if answers is not None else ():
+            is_own = self._own.is_from(link, message)
+            if is_own:
+                self._answer(link, message)
+            elif is_own is None:
+                self._held.setdefault(link.name, HeldMessages(per_publisher=MAX_HELD)).put(message)
+        for sensor in link.robot.sensors:
+            if sensor.is_image:
+                continue
+            value = self._own.newest(link, batches.get(sensor.topic), sensor.topic)
+            if value is not None:
+                link.values[sensor.name] = value.get("value", value)
+        topic = link.robot.topics.state or ""
+        link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
+
+    def release_held(self, links: Mapping[str, RobotLink]) -> None:
+        """Take the held answers whose publishers the new graph lists; drop all others."""
+        held, self._held = self._held, {}
+        for name, messages in held.items():
+            link = links.get(name)
+            for message in messages.take() if link is not None else ():
+                if link is not None and self._own.is_from(link, message):
+                    self._answer(link, message)
+
+    def forget(self, name: str) -> None:
+        """Drop the held answers of a robot."""
+        self._held.pop(name, None)
+
+    def take_settled(self) -> tuple[str, ...]:
+        """Return robots whose Stop was not proven and which now report that every action ended; each once."""
+        settled, self._settled = tuple(self._settled), {}
+        return settled
+
+    def _answer(self, link: RobotLink, message: Message) -> None:
+        answer = mapping_of(message)
+        if answer is not None and link.robot.dialect == "rize":
+            answer = rize.from_answer(answer)
+        if answer is not None:
+            self._tries.answer(link, answer)
+            if answer.get("op") == "alive":
+                self._take_heartbeat(link, answer)
+            else:
+                self._take_final(link, answer)
+
+    def _take_final(self, link: RobotLink, answer: Payload) -> None:
+        # A final answer ends the motion, unless its error reports that the robot may still move.
+        state = answer.get("state")
+        if not isinstance(state, str) or state not in FINAL_STATES:
+            return
+        if answer.get("op") not in (None, "invoke"):
+            return
+        id, error = answer.get("id"), answer.get("error")
+        if isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
+            self._moved.ended(link.name, id, link.identity)
+
+    def _take_heartbeat(self, link: RobotLink, answer: Payload) -> None:
+        # Drivers leave out counts that are zero.
+        now_s = self._clock()
+        link.rejected.take(answer.get("rejected", 0), now_s)
+        link.errors.take(answer.get("errors", 0), now_s)
+        if "not_ended" not in answer:
+            return
+        before, link.goes_on = link.goes_on, ""
+        if answer["not_ended"]:
+            link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action has not ended"))
+        elif before and link.not_stopped:
+            self._settled[link.name] = None
