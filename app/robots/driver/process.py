@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType, TracebackType
 
@@ -30,11 +30,11 @@ _OWNER_CHECK_S = 0.5
 
 
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
-    """Run a robot of this kind until it is asked to end (SIGTERM, Ctrl+C) or its owner is gone.
+    """Run a robot of this kind until SIGTERM, Ctrl+C or the end of its owner.
 
-    It says on its output what it is and where its master is; without a master it says so and waits for one.
-    0 on an orderly end, 1 when the robot can't be connected (its class raised Failed) or described, 2 for
-    wrong arguments.
+    Prints the robot's model, topics and master; waits for a master if none answers. Returns the exit code: 0
+    on an orderly end, 1 when the robot can't be connected (its class raised Failed) or described, 2 for
+    invalid arguments.
     """
     parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
     parser.add_argument("--name", default=kind.title, help=_("the robot's name; its topics begin with it"))
@@ -44,7 +44,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     ended = threading.Event()
     say_where_it_crashes()
     _on_signals(ended)
-    with Terminal(sys.stderr) as terminal:  # one that takes nothing must not stop the robot's threads
+    with Terminal(sys.stderr) as terminal:  # a blocked stderr must not block the robot's threads
         log_to(terminal, logging.INFO)
         try:
             run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
@@ -55,9 +55,9 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
 
 
 def tell_briefly() -> None:
-    """From now on a wrong description ends the program with one sentence, not with a traceback.
+    """Report an invalid description as one sentence instead of a traceback.
 
-    A class is described while Python reads it, before its driver's first line can catch anything.
+    Descriptions are built while Python reads the class, before the driver can catch an exception.
     """
     before = sys.excepthook
 
@@ -76,19 +76,18 @@ def run(
 ) -> None:
     """Drive a robot until `ended` is set or the owner is gone; then stop it and leave the network.
 
-    Who started it in a terminal is told how it goes; an owner hears that over the network, and takes what it
-    prints for why it ended.
+    Without an owner, progress is printed. An owner follows the robot over the network and takes printed
+    lines for the reason of its end.
     """
     owner = _process(owner_pid)
     if owner_pid is not None and owner is None:
         return
-    address = master_address(master)
-    with Terminal(sys.stdout) as said, nep.node(name, master=master) as node, _published(node):
+    with Terminal(sys.stdout) as output, nep.node(name, master=master) as node, _published(node):
         driver = Driver(kind, name, node)
 
         def say(sentence: str) -> None:
             if owner is None:
-                _say(sentence, said)
+                _say(sentence, output)
 
         words = (
             _("{robot}: a robot, model virtual {model}; its topics are {topics}")
@@ -96,38 +95,46 @@ def run(
             else _("{robot}: a robot, model {model}; its topics are {topics}")
         )
         say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
-        has_waited = False
         try:
-            while not _started(driver):
-                if not has_waited:
-                    words = _(
-                        "{robot}: no master answers at {address}; waiting for one, "
-                        "start Studio or `nep master`"
-                    )
-                    say(words.format(robot=name, address=address))
-                has_waited = True
-                if _over(ended, owner):
-                    return
-            words = (
-                _("{robot}: found the master at {address}; the robot is ready, Ctrl+C ends it")
-                if has_waited
-                else _("{robot}: the master is at {address}; the robot is ready, Ctrl+C ends it")
-            )
-            say(words.format(robot=name, address=address))
+            if not _wait_for_master(driver, name, master_address(master), say, lambda: _over(ended, owner)):
+                return
             while not _over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:
             driver.close()
 
 
+def _wait_for_master(
+    driver: Driver, name: str, address: str, say: Callable[[str], object], is_over: Callable[[], bool]
+) -> bool:
+    """Start the driver as soon as a master answers; return False if `is_over` before that."""
+    has_waited = False
+    while not _started(driver):
+        if not has_waited:
+            words = _(
+                "{robot}: no master answers at {address}; waiting for one, start Studio or `nep master`"
+            )
+            say(words.format(robot=name, address=address))
+        has_waited = True
+        if is_over():
+            return False
+    words = (
+        _("{robot}: found the master at {address}; the robot is ready, Ctrl+C ends it")
+        if has_waited
+        else _("{robot}: the master is at {address}; the robot is ready, Ctrl+C ends it")
+    )
+    say(words.format(robot=name, address=address))
+    return True
+
+
 def _say(words: str, terminal: Terminal) -> None:
-    """A line for the person who started it; an output that takes nothing is no reason to wait or to end."""
+    # Terminal drops lines instead of blocking: a full pipe must not stop the robot.
     terminal.write(escaped(words) + "\n")
 
 
 @contextmanager
 def _published(node: nep.Node) -> Iterator[None]:
-    """What this process logs is also published: Studio's Console and `nep log` show it."""
+    """Publish log records, so that Studio's Console and `nep log` show them."""
     root = logging.getLogger()
     root.addHandler(node.log_handler)
     try:

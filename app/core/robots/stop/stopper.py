@@ -190,13 +190,16 @@ class RobotStopper:
         on_late: Callable[[RobotStop], object] | None = None,
         is_for_all: bool = False,
     ) -> StopReport:
-        """Tell the robots (`names`, or all) to stop and wait until each has answered, `timeout_s` at most.
+        """Stop the robots (``names``, or all) and wait until each has answered.
 
-        By default it waits as long as their descriptions say that they need, and a second at least. The
-        report has a line for each of `names`, also for one that could not be told. `on_answer` is called in
-        this thread for each robot as it answers, and at the end for each that did not. `on_late` is called in
-        the node's thread, or in that of `see`, when one answers later than that, or says at last that it
-        stands still. `ends` as in `send_stop`. With `is_for_all`, those that nobody waits for are told, too.
+        Args:
+            names: Robots to stop; the report has a line for each, including those that can't be reached.
+            timeout_s: Longest wait; by default as long as the descriptions need, one second at least.
+            on_answer: Called in this thread with each answer, and at the end for each robot without one.
+            ends: As in `send_stop`.
+            on_late: Called in the node's thread or in that of `see` when a robot answers after the timeout,
+                or confirms only then that it stands still.
+            is_for_all: Also send the stop to robots whose answer is not waited for.
         """
         names = None if names is None else tuple(names)
         began = self._clock()
@@ -206,31 +209,37 @@ class RobotStopper:
             for line in self._unexpected():
                 self._tell(line, _id(), ends)
         self._make_missing(asked)
-        told: set[tuple[str, str]] = set()
-        until = began + (
-            timeout_s
-            if timeout_s is not None
-            else patience_s((line.target.robot for line in lines), self._longest_s)
-        )
+        if timeout_s is None:
+            timeout_s = patience_s((line.target.robot for line in lines), self._longest_s)
         if asked:
             self._add_newcomers(asked)
+        reported = self._wait_for_answers(asked, began + timeout_s, on_answer)
+        elapsed_ms = (self._clock() - began) * 1000
+        return self._report(asked, reported, elapsed_ms, on_answer).with_asked(names or ())
+
+    def _wait_for_answers(
+        self,
+        asked: Sequence[StopRequest],
+        deadline_s: float,
+        on_answer: Callable[[RobotStop], object] | None,
+    ) -> set[tuple[str, str]]:
+        """Wait until all requests are settled, or the deadline; return the reported (request, node) pairs."""
+        reported: set[tuple[str, str]] = set()
         while True:
             self._look_for(asked)
             undelivered = [each for each in asked if not self._deliver(each)]
             with self._changed:
-                now = self._clock()
-                pause_s = min(until - now, LOOK_S if any(each.unknown for each in asked) else until - now)
+                remaining_s = deadline_s - self._clock()
+                pause_s = min(remaining_s, LOOK_S) if any(each.unknown for each in asked) else remaining_s
                 pause_s = min(pause_s, POLL_S) if undelivered else pause_s
-                self._changed.wait_for(lambda: self._is_news(asked, told), max(0.0, pause_s))
-                news = [(each, node, said) for each in asked for node, said in each.news(told)]
-            for each, node, said in news:
-                told.add((each.id, node))
+                self._changed.wait_for(lambda: self._is_news(asked, reported), max(0.0, pause_s))
+                news = [(each, node, result) for each in asked for node, result in each.news(reported)]
+            for each, node, result in news:
+                reported.add((each.id, node))
                 if on_answer is not None:
-                    on_answer(said)
-            if all(each.is_settled for each in asked) or self._clock() >= until:
-                break
-        elapsed_ms = (self._clock() - began) * 1000
-        return self._report(asked, told, elapsed_ms, on_answer).with_asked(names or ())
+                    on_answer(result)
+            if all(each.is_settled for each in asked) or self._clock() >= deadline_s:
+                return reported
 
     def close(self) -> None:
         """Let go of all robots; they are not told."""
