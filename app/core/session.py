@@ -1,7 +1,7 @@
-"""What is open now: the network, its topics and robots, the behaviour, its run.
+"""State of one window: the network with its topics and robots, the behaviours, their run.
 
-The window reads it 30 times a second. Nothing here waits: threads post into the mailbox, `Session.tick` takes
-over what they posted.
+The window reads it 30 times a second. Nothing here blocks: threads post into the mailbox, and `Session.tick`
+applies the posted events and messages.
 """
 
 from __future__ import annotations
@@ -79,12 +79,12 @@ else:
 CHECK_S = 1.0
 NO_WATCH = lazy("can't watch over the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
-"""What the Console shows."""
+"""Topics of the Console."""
 
 
 @dataclass(slots=True)
 class LiveNetwork:
-    """What is known of the live network, whatever is shown: robots, Stop, alarms and health go by it."""
+    """State of the live network, also while a recording is shown; robots, Stop, alarms and health use it."""
 
     topics: Topics
     nodes: Nodes
@@ -95,15 +95,15 @@ class LiveNetwork:
 
 
 class Session:
-    """Everything that the panels show. One thread uses it (the window's); `close` ends its threads.
+    """State that the panels show. Not thread-safe: use it from the window's thread; `close` ends its threads.
 
-    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` are those of the source that is
-    shown: of the live network (`live`), which goes on all the time, or of a recording (``replay``).
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` belong to the source that is
+    shown: the live network (`live`), which stays connected, or a recording (``replay``).
     """
 
     replay: replay_module.Replay | None = None
     sources_shown = 0
-    """Grows when another source is shown."""
+    """Number of changes between sources."""
     _live: LiveNetwork | None = None  # while a recording is shown
     _closing_replays: list[replay_module.Replay]
 
@@ -118,42 +118,61 @@ class Session:
         clock_ns: Callable[[], int] = time.time_ns,
         start_processes: bool = True,
     ) -> None:
-        """Join the master at ``address`` (default: `nep.masters.master.master_address`).
+        """Prepare a session with the master at ``address`` (default: `nep.masters.master.master_address`).
 
-        ``source`` may make another source of messages than the network.
+        ``source`` creates a source of messages other than the network. `start` starts the threads.
         """
         self.address = address if address is not None else master_address()
         self._clock, self._clock_ns = clock, clock_ns
         self._start_processes = start_processes
         self.settings = settings if settings is not None else Settings()
-        self.alerts, self.console, self.topics = Alerts(), Console(), Topics()
+        self.alerts, self.console = Alerts(), Console()
         self._faults = FaultAlerts(self.alerts, clock)
-        self.traffic = Traffic(self.topics)
-        self.nodes = Nodes()
         self._mailbox, self._checks = Mailbox(), Checks()
         self._watches = Watches(self._begin_watch, self._end_watch, self._forget_watch)
-        self.images, self.series = (
-            Images(self.watch, clock),
-            SeriesFeed(self.watch, clock_ns, self._mailbox.set_room),
-        )
-        make_source = source if source is not None else partial(LiveSource, always=LOGS)
+        self._add_network(source if source is not None else partial(LiveSource, always=LOGS))
+        self._add_robots()
+        self._add_programs(journal_folder)
+        self._health = Health(self.topics, self.fleet, self.alerts, clock)
+        self.alarms = SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
+        self.acting = SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9)
+        recorder = self.settings, self.alerts, self.address, self._mailbox.post_event
+        self.recordings = SessionRecordings(*recorder, clock=clock, reads_apart=start_processes)
+        self._connect_parts()
+        self._program, self.tick_ms = OwnProgram(), 0.0
+        self._robots_seen = self._topics_seen = -1
+        self._reachable: tuple[StopTarget, ...] = ()
+        self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
+
+    def _add_network(self, make_source: MakeSource) -> None:
+        self.topics, self.nodes = Topics(), Nodes()
+        self.traffic = Traffic(self.topics)
+        self.images = Images(self.watch, self._clock)
+        self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_room)
+        post_event = self._mailbox.post_event
         sinks = [self._checks.look, self._mailbox.post, self._offer, self._warn]
-        self.source: Source = make_source(self.address, sinks, self._mailbox.post_event)
-        self.networks, self.parameters = (
-            Networks(self.settings, sinks[1:], self._mailbox.post_event, self.alerts),
-            ParameterSetter(self.source.submit),
-        )
-        modules = VIRTUAL_ROBOTS.values()
-        processes = VirtualProcesses(modules, lambda: self.launcher.process_ids)
-        self.fleet = Fleet(self._watches, self.source.submit, clock, self.settings, processes)
-        self.room = SessionRoom(self.settings, self._watches, self.source.submit, clock, clock_ns)
+        self.source: Source = make_source(self.address, sinks, post_event)
+        self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
+        self.parameters = ParameterSetter(self.source.submit)
+        self.graph: GraphView | None = None
+        self.master = MasterState("searching", self.address)
+        self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, post_event)
+        self.doctor = doctor_of(self.address, self.settings.path.parent)
+        self._learning = MasterChange()
+
+    def _add_robots(self) -> None:
+        submit, clock = self.source.submit, self._clock
+        processes = VirtualProcesses(VIRTUAL_ROBOTS.values(), lambda: self.launcher.process_ids)
+        self.fleet = Fleet(self._watches, submit, clock, self.settings, processes)
+        self.room = SessionRoom(self.settings, self._watches, submit, clock, self._clock_ns)
         self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, clock)
-        self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
-        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.stopper: RobotStopper | None = None
         self.launcher = Launcher(self.address, self._mailbox.post_event, self.fleet.is_there)
         self.last_robots = LastRobots(self.settings)
-        self.doctor = doctor_of(self.address, self.settings.path.parent)
+
+    def _add_programs(self, journal_folder: Path | None) -> None:
+        self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
+        self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         self.runs = Runs(
             self.documents,
             self.fleet,
@@ -161,27 +180,8 @@ class Session:
             alerts=self.alerts,
             console=self.console,
             post_event=self._mailbox.post_event,
-            clock=clock,
+            clock=self._clock,
         )
-        self._health = Health(self.topics, self.fleet, self.alerts, clock)
-        self.alarms, self.acting, self.recordings = (
-            SessionAlarms(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
-            SessionActing(self, clock=clock, clock_s=lambda: clock_ns() / 1e9),
-            self._new_recordings(),
-        )
-        self._connect_parts()
-        self.graph: GraphView | None = None
-        self.master = MasterState("searching", self.address)
-        self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, self._mailbox.post_event)
-        self._program, self.tick_ms = OwnProgram(), 0.0
-        self._robots_seen = self._topics_seen = -1
-        self._reachable: tuple[StopTarget, ...] = ()
-        self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
-        self._learning = MasterChange()
-
-    def _new_recordings(self) -> SessionRecordings:
-        given = self.settings, self.alerts, self.address, self._mailbox.post_event
-        return SessionRecordings(*given, clock=self._clock, reads_apart=self._start_processes)
 
     def _connect_parts(self) -> None:
         self.runs.coming, self.runs.also_stops = (lambda: self.coming), self.acting.disarm
@@ -196,32 +196,32 @@ class Session:
     def _warn(self, topic: str, messages: Sequence[Message]) -> None:
         self.alarms.take(topic, messages)
 
-    # -- what the window and its panels call -----------------------------------------------------------------
+    # -- public ----------------------------------------------------------------------------------------------
 
     @property
     def document(self) -> Document:
-        """The behaviour whose tab shows."""
+        """Behaviour of the current tab."""
         return self.documents.current
 
     @property
     def live(self) -> LiveNetwork:
-        """The live network, whether it is shown or not."""
+        """Live network, also while a recording is shown."""
         if self._live is not None:
             return self._live
         return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
 
     @property
     def is_replaying(self) -> bool:
-        """Whether a recording shows in place of the live network."""
+        """Whether a recording is shown instead of the live network."""
         return self.replay is not None
 
     @property
     def shown_console(self) -> Console:
-        """What the programs of the source that is shown have said."""
+        """Console of the source that is shown."""
         return self.replay.console if self.replay is not None else self.console
 
     def open_recording(self, path: Path) -> replay_module.Replay:
-        """Show a recording in place of the live network, which goes on; a process of its own reads it."""
+        """Show a recording instead of the live network, which stays connected; a child process reads it."""
         live = self.live
         self._end_replay()
         self._live = live
@@ -236,7 +236,7 @@ class Session:
         return opened
 
     def back_to_live(self) -> None:
-        """Show the live network again, and close the recording."""
+        """Close the recording and show the live network."""
         live = self._live
         if live is None:
             return
@@ -255,12 +255,12 @@ class Session:
 
     @property
     def coming(self) -> tuple[str, ...]:
-        """The virtual robots that are being started and are not there yet."""
+        """Names of virtual robots that are starting."""
         there = {link.name for link in self.fleet.connected}
         return tuple(name for name in self.launcher.coming if name not in there)
 
     def start(self) -> None:
-        """Start the threads; a master is started when none answers."""
+        """Start the threads, and a master if none answers."""
         self.source.start()
         self.networks.start()
         self.alarms.start()
@@ -270,32 +270,32 @@ class Session:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic of the live network until the watch is closed: its messages arrive in `Topics`.
+        """Subscribe to a topic of the live network until the watch is closed; messages arrive in `Topics`.
 
-        Here and in `topic` and `mark_seen` it is named as among the topics of all networks (`key_of`).
+        Here and in `topic` and `mark_seen`, ``topic`` is a key among the topics of all networks (`key_of`).
         """
         return self._watches.open([topic])
 
     def watch_shown(self, topic: str) -> Watch:
-        """The same of the source that is shown now; when another one is, it has to be asked for anew."""
+        """Subscribe to a topic of the source that is shown; call again after `sources_shown` changed."""
         return self.watch(topic) if self.replay is None else self.replay.watch(topic)
 
     def topic(self, key: str) -> Topic | None:
-        """The topic of that name, of whichever network; None when it is not known."""
+        """Return the topic of that key, or None."""
         return self.networks.topic(key) if split_key(key)[0] else self.topics.get(key)
 
     def mark_seen(self, key: str) -> None:
-        """A person looked at a topic: it is not new any more."""
+        """Clear the mark of a topic as new."""
         name, topic = split_key(key)
         network = self.networks.get(name)
         (network.topics if network is not None else self.topics).mark_seen(topic)
 
     def gives_up(self, document: Document) -> bool:
-        """Whether a person gives up unsaved work that can't be kept; the first time an alert asks them."""
+        """Return whether the user discards work that can't be saved; the first call asks by an alert."""
         return self._health.gives_up(document.name, document.journal_error or "")
 
     def tick(self) -> None:
-        """Take over everything that the threads posted since the last tick."""
+        """Apply the events and messages that threads posted since the last tick."""
         began = self._clock()
         now, now_ns = began, self._clock_ns()
         drained = self._mailbox.drain()
@@ -310,11 +310,7 @@ class Session:
             live.networks.age(now, now_ns)
         if self.replay is not None:
             with self.guarded(lazy("follow the recording")):
-                was_open = self.replay.opened is not None
-                self.replay.tick(now)
-                self.graph = self.replay.graph
-                if not was_open and self.replay.opened is not None:
-                    self.sources_shown += 1  # now it is known what is there, and from when on
+                self._tick_replay(self.replay, now)
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
         with self.guarded(lazy("watch over the alarms")):
@@ -338,15 +334,22 @@ class Session:
             self._check(now)
         self.tick_ms = (self._clock() - began) * 1000
 
-    def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
-        """One thing of a tick: when it raises, the log and an alert say so, and the next has its turn.
+    def _tick_replay(self, replay: replay_module.Replay, now: float) -> None:
+        was_open = replay.opened is not None
+        replay.tick(now)
+        self.graph = replay.graph
+        if not was_open and replay.opened is not None:
+            self.sources_shown += 1  # its topics and start time are known now
 
-        ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled later.
+    def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
+        """Return a context that logs and alerts exceptions of one step of a tick instead of raising them.
+
+        ``what`` completes the sentence "can't ..."; mark it with `lazy`. Its ``holes`` are filled later.
         """
         return self._faults.guarded(what, **holes)
 
     def _check(self, now: float) -> None:
-        """What is looked at once a second."""
+        # Called once per CHECK_S.
         self._faults.check()
         with self.guarded(lazy("keep the alarms")):
             self.alarms.check()
@@ -379,7 +382,7 @@ class Session:
         self._closing_replays.clear()
 
     def close(self) -> None:
-        """End the program, the threads and the processes that were started here, whatever one does."""
+        """Stop the running program and end every thread and child process; errors are logged, not raised."""
         live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
             ("end the program", self.runs.close),
@@ -391,7 +394,7 @@ class Session:
             ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
-            ("end the stopper", self.stopper.close if self.stopper is not None else _nothing),
+            *([("end the stopper", self.stopper.close)] if self.stopper is not None else []),
             ("end the pictures", live.images.close),
             ("end the doctor", self.doctor.close),
             ("end the recorder", self.recordings.close),  # before the master goes that it may need
@@ -406,7 +409,7 @@ class Session:
             with log_errors(what):
                 end()
 
-    # -- inside ----------------------------------------------------------------------------------------------
+    # -- private ---------------------------------------------------------------------------------------------
 
     def _begin_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
@@ -577,13 +580,13 @@ class Session:
             self.documents.set_topics(sorted(topic.name for topic in topics.live()))
 
     def _look_for_problems_of_stop(self) -> None:
-        """Once a second: whom a stop can't reach is told, and tried again."""
+        # Alerts about robots that a stop can't reach; the next tick tries to connect to them again.
         problems = self.stopper.problems if self.stopper is not None else {}
         self._health.unreachable(problems)
         self._tries_to_reach = bool(problems)
 
     def _keep_within_reach(self) -> None:
-        """Whom a stop reaches: who is there, and who went away while a program used it or without a stop."""
+        # Covers connected robots and those that disconnected while a program used them or without a stop.
         if self.stopper is not None:
             self.stopper.deliver()
             for link in self.fleet.connected:
@@ -594,7 +597,3 @@ class Session:
             self._reachable, self._tries_to_reach = targets, False
             stopper.expect(targets)
             self.source.submit(NO_WATCH, lambda _node: stopper.set_robots(targets))
-
-
-def _nothing() -> None:
-    """Nothing is to be ended."""

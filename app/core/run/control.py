@@ -16,18 +16,18 @@ from app.blocks.runtime.variables import VariableValue
 from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
-from app.core.faults import log_errors
 from app.core.robots.fleet import Fleet
 from app.core.robots.motion.permission import wanted_by
-from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone, StopReport
+from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, StopDone, StopReport
 from app.core.robots.stop.stopper import STOP_TIMEOUT_S as STOP_TIMEOUT_S
-from app.core.robots.stop.stopper import RobotStopper, report_of
+from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.asking import Asking
 from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
+from app.core.run.stop_job import stop_program, stop_robot
 from app.core.run.stop_news import StopNews
 from app.core.run.trial import Trial, TriedValue
 from app.core.run.view import (
@@ -49,14 +49,19 @@ _log = logging.getLogger("studio")
 
 
 class RunNetwork(Protocol):
-    """What a run needs of the network."""
+    """Parts of the session that a run uses."""
 
     address: str
     stopper: RobotStopper | None
 
 
 class Runs:
-    """The behaviour's runs. One thread uses it (the window's); the stop itself happens beside it."""
+    """Runs of behaviours. Not thread-safe: use it from the window's thread. Stops wait in other threads."""
+
+    pace_s = 0.0
+    """Delay before each block, in seconds."""
+    blocks_revision = 0
+    values_revision = 0
 
     def __init__(
         self,
@@ -70,23 +75,22 @@ class Runs:
         clock: Callable[[], float] = time.monotonic,
         make_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
     ) -> None:
-        """Nothing runs yet. ``make_runner`` makes what runs one program and tells what it does."""
+        """Start idle. ``make_runner`` creates the runner of one program, which posts its events."""
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._make_runner = make_runner
-        self.coming: Callable[[], Sequence[str]] = tuple  # tells which robots are being started
-        self.also_stops: Callable[[], object] = tuple  # what else Stop ends, before it stops robots
-        self.document: Document | None = None  # which the run belongs to: its blocks glow, fail and stop
-        self.pace_s = 0.0
+        self.coming: Callable[[], Sequence[str]] = tuple  # names of robots that are starting
+        self.also_stops: Callable[[], object] = tuple  # called by Stop before it stops robots
+        self.document: Document | None = None  # the run's behaviour
         self._runner: Runner | None = None
-        self._now: Wanted | None = None  # what runs, or ran last
+        self._now: Wanted | None = None  # the current run, else the last
         self._trial = Trial()
         self.asking = Asking()
-        self._next: Wanted | None = None  # once what runs has been stopped, proven
+        self._next: Wanted | None = None  # begins once the current run is proven to be stopped
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
-        self._breakpoints: tuple[str, ...] = ()  # as the program that runs knows them
-        self._program_key: str | None = None  # the last one's: robots refuse what still comes from it
+        self._breakpoints: tuple[str, ...] = ()  # of the running program
+        self._program_key: str | None = None  # robots reject later commands of the last program by its key
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
         fleet.used = lambda: self.used
@@ -98,52 +102,50 @@ class Runs:
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
-        self.ran_blocks: frozenset[str] = frozenset()  # so far, also those between two looks of a slow window
+        self.ran_blocks: frozenset[str] = frozenset()  # since the start, also between two ticks
         self._errors = BlockErrors()
         self._warnings = RunWarnings(lambda words: self._console.add("warn", self._run.name, words))
-        self.blocks_revision = 0
         self.values: Mapping[str, VariableValue] = {}
-        """What the run's variables hold, by their ids; after its end what they held then."""
-        self.values_revision = 0
+        """Values of the run's variables by id; kept after its end."""
         self._variables: Mapping[str, Variable] = {}
 
-    # -- what a person does ------------------------------------------------------------------------------
+    # -- commands of the user ----------------------------------------------------------------------------
 
     @property
     def active(self) -> bool:
-        """Whether a program runs or is paused."""
+        """Whether a program is running or paused."""
         return self._run.state in {"running", "paused"}
 
     @property
     def state(self) -> RunState:
-        """How the run is now."""
+        """Current state of the run."""
         return self._run
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The robots that the program uses while it runs or is paused."""
+        """Names of robots that the running or paused program uses."""
         return self._used if self.active else ()
 
     @property
     def tried_value(self) -> TriedValue | None:
-        """The block that was tried last, and the value that it had."""
+        """Last tried block with its value."""
         return self._trial.value
 
     @property
     def block_errors(self) -> Mapping[str, str]:
-        """What is wrong with blocks, until they are repaired or the next Run."""
+        """Error messages by block id, until the block is repaired or the next run."""
         return self._errors.by_block
 
     @property
     def block_warnings(self) -> Mapping[str, str]:
-        """The blocks at which a person is warned, each with its sentence; also after the run."""
+        """Warnings by block id, kept after the run."""
         return self._warnings.by_block
 
     def tick(self) -> None:
-        """Time has gone on, robots may have come or gone, another behaviour may show: `view` is made anew."""
+        """Follow edits, robots and breakpoints, and invalidate `view`."""
         self._view = None
         if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
-            self._run = replace(self._run, nothing_in=None)  # another behaviour shows, or this one was edited
+            self._run = replace(self._run, nothing_in=None)  # another tab, or an edit
         self._settle()
         edits = 0 if self.document is None else self.document.edits
         if self._warnings.clear_if_edited(edits) | self._errors.forget_repaired():
@@ -155,7 +157,7 @@ class Runs:
             self._run = replace(self._run, edited=edited)
 
     def _follow_breakpoints(self) -> None:
-        """“Pause here” counts at once, without another Run: the program is told where it pauses now."""
+        """Send changed breakpoints to the running program."""
         newest = self.document.newest() if self.document is not None else None
         if newest is None or self._runner is None or newest.breakpoints == self._breakpoints:
             return
@@ -163,7 +165,7 @@ class Runs:
         self._runner.set_breakpoints(newest.breakpoints)
 
     def view(self) -> RunView:
-        """What the run bar says: made once a tick, and again when something was done since then."""
+        """Return the contents of the run bar, cached until the next tick or change."""
         run, current = self._run, self._documents.current
         if self._view is None or self._view[0] is not run or self._view[1] is not current:
             names = [link.name for link in self._fleet.connected]
@@ -175,9 +177,9 @@ class Runs:
         return self._view[2]
 
     def run(self) -> None:
-        """Run the behaviour that shows as it is now; while paused, go on; while one runs, restart.
+        """Run the current behaviour; resume it while paused, restart it while running.
 
-        Problems are told on their blocks.
+        Problems are shown at their blocks.
         """
         run = self._run
         if run.state == "paused":
@@ -186,12 +188,12 @@ class Runs:
             self._want(Wanted(self._documents.current))
 
     def restart(self) -> None:
-        """Run anew, as its blocks are now, the behaviour that runs or is paused."""
+        """Restart the running or paused behaviour with its current blocks."""
         if self.active and self._now is not None:
             self._want(replace(self._now, paused=False))
 
     def try_stack(self, stack: Stack) -> None:
-        """Run one stack of the behaviour that shows, at once; what runs is stopped first."""
+        """Run one stack of the current behaviour; a running program is stopped first."""
         variable = stack.variable_in(self._documents.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
@@ -202,19 +204,19 @@ class Runs:
             self._want(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
-        """A variable is what the run gave it, now or at its end: a new program would know nothing of it."""
+        """Show the value of a variable in the current or last run; a new program would lack it."""
         document = self._documents.current
         value = self.values.get(id) if self.document is document else None
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
 
     def concerns(self, document: Document) -> bool:
-        """Whether this behaviour runs, or is to run once what runs has been stopped."""
+        """Return whether this behaviour runs, or will once the running program has stopped."""
         return (self.active and self.document is document) or (
             self._next is not None and self._next.document is document
         )
 
     def _want(self, wanted: Wanted) -> None:
-        """Run this; what runs is stopped first, and its robots must have proven that they stand still."""
+        """Run a behaviour once the running program has stopped and its robots are proven to stand still."""
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
             return
@@ -225,7 +227,7 @@ class Runs:
             self._run = replace(self._run, restarts=True)
 
     def step(self) -> None:
-        """Run one block: of a paused program the next, of none the first; a running one is paused."""
+        """Run the next block of a paused program or the first of a new one; pause a running program."""
         if self._run.state in {"ready", "proven"}:
             self._begin(Wanted(self._documents.current, paused=True))
         elif self._run.state == "running":
@@ -234,13 +236,13 @@ class Runs:
             self._runner.step()
 
     def set_pace(self, seconds: float) -> None:
-        """Slow motion, also of the program that runs: each block waits so long before it is done."""
+        """Set the delay before each block in seconds, also of the running program."""
         self.pace_s, self._view = seconds, None
         if self._runner is not None:
             self._runner.set_pace(seconds)
 
     def put_variable(self, id: str, value: str | float | bool) -> bool:
-        """Give a variable of the program that runs another value; whether it has such a variable."""
+        """Set a variable of the running program; return False if it has no such variable."""
         variable = self._variables.get(id)
         if self._runner is None or not self.active or variable is None or not variable.python:
             return False
@@ -248,12 +250,12 @@ class Runs:
         return True
 
     def pause(self) -> None:
-        """Hold the program; its robots stand still (docs/adr/0006), its clock stands."""
+        """Pause the program, its clock and its robots (docs/adr/0006)."""
         if self._run.state == "running" and self._runner is not None:
             self._runner.pause()
 
     def go_on(self) -> None:
-        """Let a paused program go on."""
+        """Resume a paused program."""
         run = self._run
         if run.state == "paused" and self._runner is not None:
             self._runner.go_on()
@@ -262,7 +264,7 @@ class Runs:
             self._mark(stopped=())
 
     def stop(self) -> None:
-        """End the program and stop every robot; what they answer is the run bar's result."""
+        """End the program and stop every robot; the run bar shows their answers."""
         self.also_stops()
         self._asked_again.clear()
         self._next = None
@@ -270,7 +272,7 @@ class Runs:
         self._fleet.permission.withdraw()
 
     def stop_robot(self, name: str) -> None:
-        """Stop one robot; while a program runs this is `stop`, because it would move the robot again."""
+        """Stop one robot. Same as `stop` while a program runs, which would move the robot again."""
         if self.active:
             self.stop()
             return
@@ -279,21 +281,15 @@ class Runs:
         self._stop_one(name)
 
     def _stop_one(self, name: str) -> None:
-        stopper, post, mark = self._network.stopper, self._post_event, self._fleet.moved.mark
         self._fleet.told_to_stop([name])
-
-        def late(robot: RobotStop) -> None:
-            post(LateAnswer(None, robot, mark))
-
-        def stop_it() -> None:
-            post(OneStopped(report_of(stopper, (name,), on_late=late), mark))
-
-        threading.Thread(target=stop_it, name="studio-stop-one", daemon=True).start()
+        mark = self._fleet.moved.mark
+        work = partial(stop_robot, self._post_event, self._network.stopper, name, mark)
+        threading.Thread(target=work, name="studio-stop-one", daemon=True).start()
 
     def stop_again(self, name: str) -> None:
-        """A robot that was not stopped says that it could end what went on: it is asked to prove it.
+        """Stop a robot again that reports the end of an action which its Stop could not end.
 
-        Once after a person's Stop: one whose stop takes longer each time than it may is not stopped for ever.
+        At most once per Stop of the user, so that a robot whose stops always time out is not stopped forever.
         """
         report, state = self._run.report, self._run.state
         if name in self._asked_again:
@@ -306,12 +302,12 @@ class Runs:
             self._stop_one(name)
 
     def follow_robots(self) -> None:
-        """Robots came, or were started anew: the program is told, of what moves after the question."""
+        """Inform the running program about new and restarted robots, as far as they may move."""
         if self.active:
             self._robots.follow()
 
     def confirm_still(self) -> None:
-        """A person says that the robot that did not answer stands still."""
+        """Take the user's confirmation that the robots without an answer stand still."""
         if self._run.state == "unanswered" and self._run.report is not None:
             silent = self._run.report.silent
             self._fleet.stands_still(silent)
@@ -320,23 +316,23 @@ class Runs:
             self._settle()
 
     def _settle(self) -> None:
-        """Unlock Run when no robot of the last stop may move any more: it proved that since, or a person."""
+        """Unlock Run once every robot of the last stop is proven or confirmed to stand still."""
         report = self._run.report if self._run.state == "unanswered" else None
         if report is not None and not any(name in self._fleet.moved for name in report.silent):
             self._run = replace(self._run, state="ready", report=None)
             self._alerts.resolve("stop")
 
     def close(self) -> None:
-        """The window closes: end the program; its robots are told by its end."""
+        """End the program, whose end stops its robots."""
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
             self._stop_thread.join(timeout=CLOSE_WAIT_S)
 
-    # -- what the session tells --------------------------------------------------------------------------
+    # -- input from the session --------------------------------------------------------------------------
 
     def on_runner(self, event: RunnerEvent) -> None:
-        """Take over what the program's process said; what an earlier run still says is ignored."""
+        """Apply an event of the program's process; events of earlier runs are ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._begun(event)
@@ -356,7 +352,7 @@ class Runs:
                     warning=event.text,
                 )
                 self._mark(stopped=event.blocks)
-            case "error" if self.active:  # a block that Stop interrupts fails, and that is no problem
+            case "error" if self.active:  # blocks interrupted by Stop fail; that is expected
                 self._on_error(event)
             case "warning" if self.active and self.document is not None:
                 self._warnings.add(event.blocks[0], event.text, event.count, self.document.edits)
@@ -369,13 +365,13 @@ class Runs:
                 self._on_end(event)
 
     def _begun(self, event: RunnerEvent) -> RunState:
-        """The state of the run, whose clock begins with the first that is heard of its scripts."""
+        # The run's clock starts with the first event of its scripts.
         if event.kind in {"running", "paused"} and self.active and not self._run.begun:
             self._run = replace(self._run, begun=True, started_s=self._clock())
         return self._run
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
-        """Take over what robots answered to the newest stop."""
+        """Apply the answers of robots to the newest stop."""
         if isinstance(event, OneStopped):
             self._news.tell_fleet(event.report, event.mark)
             self._news.tell_person(event.report, "stop")
@@ -393,7 +389,7 @@ class Runs:
                 self._take_report(event.report)
 
     def _take_report(self, report: StopReport) -> None:
-        """How it stands is taken over before any words are made: no fault in them leaves it "stopping"."""
+        # State first, words later: an error in the words must not leave it "stopping".
         state = "unanswered" if report.unproven else "proven" if report.proven else "ready"
         self._run = replace(self._run, state=state, report=report, last_status=report.status)
         self._news.tell_fleet(report, self._stop_mark)
@@ -406,18 +402,18 @@ class Runs:
             self._begin(wanted)
 
     def _on_late(self, event: LateAnswer) -> None:
-        """A robot answered too late: what it says now counts, if nothing else has happened since."""
+        # A late answer counts unless the state has changed since.
         run = self._run
         if event.number is None:
             self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
         elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
             self._take_report(run.report.with_late(event.robot))
 
-    # -- inside ------------------------------------------------------------------------------------------
+    # -- private -----------------------------------------------------------------------------------------
 
     def _begin(self, wanted: Wanted) -> None:
         document, self._now = wanted.document, wanted
-        same, self.document = self.document is document, document
+        is_same, self.document = self.document is document, document
         self._trial.begin(wanted)
         self._alerts.resolve("program")
         self._warnings.begin()
@@ -431,20 +427,10 @@ class Runs:
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
             asked = wanted_by(program, used)
             if not self._fleet.permission.permits(asked, partial(self._begin_now, wanted)):
-                return  # a person is asked first; the question stands in the window
+                return  # the window asks the user first
             self._fleet.to_start(program.robots if wanted.stack is None else ())
-            runner = self._make_runner(self._post_event)
-            robots = [link.robot.source for link in self._fleet.connected]
             owners = owners_of(self._fleet)
-            runner.start(
-                program,
-                robots,
-                self._network.address,
-                name=document.name,
-                paused=wanted.paused,
-                pace_s=self.pace_s,
-                owners=owners,
-            )
+            runner = self._start_runner(program, document.name, wanted, owners)
         except AppError as error:
             self._alerts.put("program", "error", _("The behaviour can't be started."), str(error))
             return
@@ -454,13 +440,27 @@ class Runs:
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
         self._fleet.moved.note((robot.name for robot in used), "behaviour")
         self._variables = {variable.id: variable for variable in program.variables}
-        if wanted.stack is None or not same:
-            self._show_values({})  # what is tried leaves the other variables as they are
+        if wanted.stack is None or not is_same:
+            self._show_values({})  # trying a block keeps the values of other variables
         self._console.leave_out(runner.pid)
         self._edits.ran(document if wanted.stack is None else None, program)
-        trying = self._trial.start(program, used)
-        run = RunState("running", self._documents.title(document), begun=False, trying=trying)
-        before = self._run
+        self._show_start(self._documents.title(document), self._trial.start(program, used))
+
+    def _start_runner(self, program: Program, name: str, wanted: Wanted, owners: Mapping[str, str]) -> Runner:
+        runner = self._make_runner(self._post_event)
+        runner.start(
+            program,
+            [link.robot.source for link in self._fleet.connected],
+            self._network.address,
+            name=name,
+            paused=wanted.paused,
+            pace_s=self.pace_s,
+            owners=owners,
+        )
+        return runner
+
+    def _show_start(self, title: str, trying: str) -> None:
+        run, before = RunState("running", title, begun=False, trying=trying), self._run
         self._run = replace(
             run, started_s=self._clock(), last_words=before.last_words, last_status=before.last_status
         )
@@ -468,12 +468,12 @@ class Runs:
         self._console.add("info", self._run.name, said)
 
     def _what_runs(self, wanted: Wanted) -> Program | None:
-        """The program, when there is something to run and nothing to mend; else the bar says why not."""
+        """Return the program if it has blocks to run and no problems; else show the reason in the run bar."""
         program = wanted.program()
         wrong = {} if program is None else wanted.problems(program)
         if program is None or (program.starts and not wrong):
             return program
-        if wanted.stack is None or not wrong:  # what is wrong with a block that is tried stands at the block
+        if wanted.stack is None or not wrong:  # problems of a tried block are shown at the block
             before = self._run
             self._run = RunState(
                 nothing_in=program, last_words=before.last_words, last_status=before.last_status
@@ -482,12 +482,12 @@ class Runs:
         return None
 
     def _begin_now(self, wanted: Wanted) -> None:
-        """A person has answered that the robots may move; nothing else was begun meanwhile."""
+        """Begin after the user's permission, unless another run has begun meanwhile."""
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
 
     def _on_print(self, event: RunnerEvent) -> None:
-        """A line of the program; of a value that is tried it is what a person wants to know."""
+        """Show a printed line: in the Console, or as the value of a tried block."""
         words = self._trial.take(event.text)
         if words is None:
             self._console.add("info", self._run.name, event.text)
@@ -509,14 +509,14 @@ class Runs:
         finished = event.ok and not self._run.errors
         if finished:
             self._mark()
-        # the end of a program is a stop like any other: every robot that it used is told and must answer
+        # the end of a program is a stop like any other: every robot that it used must answer
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
         if not event.ok and not self._run.errors:
             self._alerts.put("program", "error", _("The behaviour ended by itself."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
-        """Stop these robots, or all."""
+        """Stop the robots ``names``, or all."""
         self.asking.clear()
         run = self._run
         now, elapsed_s = self._clock(), run.elapsed_s
@@ -525,7 +525,7 @@ class Runs:
             self._warnings.end()
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
-        # those that an earlier stop has told and that have not answered: its own report is not waited for
+        # includes robots that have not answered an earlier stop, whose report is discarded
         wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unheard)
         asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping)))
         self._run = replace(
@@ -546,7 +546,8 @@ class Runs:
         self._mark(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
-            self._stop_all,
+            stop_program,
+            self._post_event,
             self._stop_number,
             self._runner,
             self._network.stopper,
@@ -556,31 +557,6 @@ class Runs:
         )
         self._stop_thread = threading.Thread(target=work, name="studio-stop", daemon=True)
         self._stop_thread.start()
-
-    def _stop_all(
-        self,
-        number: int,
-        runner: Runner | None,
-        stopper: RobotStopper | None,
-        names: tuple[str, ...],
-        ends: str | None,
-        *,
-        is_for_all: bool = False,
-    ) -> None:
-        def answered(robot: RobotStop) -> None:
-            self._post_event(RobotAnswered(number, robot))
-
-        def late(robot: RobotStop) -> None:
-            self._post_event(LateAnswer(number, robot))
-
-        if runner is not None:
-            if stopper is not None:
-                with log_errors("tell the robots at once"):  # told again below, also those without `ends`
-                    stopper.send_stop(ends=ends)
-            with log_errors("end the program"):
-                runner.stop()
-        report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
-        self._post_event(StopDone(number, report))
 
     def _set_errors(self, errors: Mapping[str, str], *, not_started: bool = False) -> None:
         self._errors.put(errors, not_started=not_started)

@@ -1,9 +1,8 @@
-"""Run says when there is nothing to run; a stop reaches the robots at once, and again after the end."""
+"""Order and errors of a stop, and runs of empty behaviours."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import cast
 
 import pytest
@@ -11,13 +10,14 @@ import pytest
 from app.core.robots.stop.report import OneStopped, StopDone, StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
+from app.core.run.stop_job import stop_program, stop_robot
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from tests.blocks.fakes import until
 
 
 class Steps:
-    """Writes down in which order it is called; stands for a runner and for a stopper."""
+    """Runner and stopper that record the order of their calls."""
 
     program_key = "p1"
 
@@ -25,13 +25,13 @@ class Steps:
         self.done: list[tuple[str, str | None]] = []
 
     def send_stop(self, *_names: object, ends: str | None = None) -> None:
-        self.done.append(("told", ends))
+        self.done.append(("stop sent", ends))
 
     def stop(self) -> None:
         self.done.append(("program ended", None))
 
     def stop_all(self, *_names: object, ends: str | None = None, **_more: object) -> StopReport:
-        self.done.append(("asked", ends))
+        self.done.append(("robots awaited", ends))
         return StopReport((), 1.0)
 
 
@@ -47,41 +47,38 @@ def session(tmp_path) -> Iterator[Session]:
     made.close()
 
 
-def test_robots_are_told_before_the_program_has_ended_and_asked_after(session: Session) -> None:
+def stop(steps: Steps, post: Callable[[object], object], number: int, *names: str) -> None:
+    runner, stopper = cast("Runner", steps), cast("RobotStopper", steps)
+    stop_program(post, number, runner, stopper, names, "p1", is_for_all=False)
+
+
+def test_robots_are_stopped_before_the_program_ends_and_awaited_afterwards() -> None:
     steps = Steps()
-    session.runs._stop_all(1, cast("Runner", steps), cast("RobotStopper", steps), (), "p1")
-    assert steps.done == [("told", "p1"), ("program ended", None), ("asked", "p1")]
+    stop(steps, list[object]().append, 1)
+    assert steps.done == [("stop sent", "p1"), ("program ended", None), ("robots awaited", "p1")]
 
 
-def test_a_fault_of_the_stopper_or_the_runner_is_a_stop_that_is_not_proven(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    steps, told = Steps(), list[object]()
-    monkeypatch.setattr(session.runs, "_post_event", told.append)
+def test_stop_is_unproven_when_stopper_and_runner_raise(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps, posted = Steps(), list[object]()
     monkeypatch.setattr(Steps, "stop", failing)
     monkeypatch.setattr(Steps, "send_stop", failing)
-    session.runs._stop_all(1, cast("Runner", steps), cast("RobotStopper", steps), (), "p1")
-    assert steps.done == [("asked", "p1")], "the robots are asked all the same"
+    stop(steps, posted.append, 1)
+    assert steps.done == [("robots awaited", "p1")]
     monkeypatch.setattr(Steps, "stop_all", failing)
-    session.runs._stop_all(2, cast("Runner", steps), cast("RobotStopper", steps), ("Arm",), "p1")
-    (_, done) = told
+    stop(steps, posted.append, 2, "Arm")
+    (_, done) = posted
     assert isinstance(done, StopDone)
     assert (done.number, done.report.silent) == (2, ("Arm",))
     assert done.report.robots[0].wrong == "Arm was not told to stop: OSError: out of order"
 
 
-def test_a_fault_of_the_stopper_of_one_robot_is_told(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told, came = list[object](), threading.Event()
-    monkeypatch.setattr(session.runs, "_post_event", lambda event: (told.append(event), came.set()))
+def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Steps, "stop_all", failing)
-    session.stopper = cast("RobotStopper", Steps())
-    session.runs.stop_robot("Arm")
-    session.stopper = None  # which has nothing to close
-    assert came.wait(20)
-    assert isinstance(told[0], OneStopped)
-    assert told[0].report.silent == ("Arm",)
+    posted = list[object]()
+    stop_robot(posted.append, cast("RobotStopper", Steps()), "Arm", 3)
+    (stopped,) = posted
+    assert isinstance(stopped, OneStopped)
+    assert (stopped.report.silent, stopped.mark) == (("Arm",), 3)
 
 
 @pytest.mark.parametrize(

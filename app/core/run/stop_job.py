@@ -1,0 +1,53 @@
+"""Work of the threads that stop a program and its robots; results are posted to the mailbox."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.core.faults import log_errors
+from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone
+from app.core.robots.stop.stopper import RobotStopper, report_of
+from app.core.run.runner import Runner
+
+PostEvent = Callable[[object], None]
+
+
+def stop_program(
+    post_event: PostEvent,
+    number: int,
+    runner: Runner | None,
+    stopper: RobotStopper | None,
+    names: tuple[str, ...],
+    ends: str | None,
+    *,
+    is_for_all: bool,
+) -> None:
+    """End the program of ``runner`` and stop the robots ``names``; blocks until they answered or timed out.
+
+    ``number`` identifies the stop in the posted events. ``ends`` and ``is_for_all`` as in
+    `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+    """
+
+    def answered(robot: RobotStop) -> None:
+        post_event(RobotAnswered(number, robot))
+
+    def late(robot: RobotStop) -> None:
+        post_event(LateAnswer(number, robot))
+
+    if runner is not None:
+        if stopper is not None:
+            with log_errors("tell the robots at once"):  # sent again below, also to robots without `ends`
+                stopper.send_stop(ends=ends)
+        with log_errors("end the program"):
+            runner.stop()
+    report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
+    post_event(StopDone(number, report))
+
+
+def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, mark: int) -> None:
+    """Stop one robot; blocks until it answered or timed out. ``mark`` is of `MovedRobots`."""
+
+    def late(robot: RobotStop) -> None:
+        post_event(LateAnswer(None, robot, mark))
+
+    post_event(OneStopped(report_of(stopper, (name,), on_late=late), mark))
