@@ -1,4 +1,4 @@
-"""`nep wire`: whether a client in any language speaks the native wire."""
+"""`nep wire`: conformance tests of clients of the native wire."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def check(
     command: Annotated[
         list[str] | None,
         typer.Argument(
-            help=_("The command that starts the adapter, after '--'."),
+            help=_("Command that starts the adapter, after '--'."),
             metavar=_("COMMAND"),
             show_default=False,
         ),
@@ -43,31 +43,30 @@ def check(
     rule: Annotated[
         list[str] | None,
         typer.Option(
-            "--rule", metavar=_("ID"), help=_("Judge by this rule only; can be repeated."), show_default=False
+            "--rule", metavar=_("ID"), help=_("Check only this rule. Can be repeated."), show_default=False
         ),
     ] = None,
-    list_rules: Annotated[bool, typer.Option("--list", help=_("List the rules, and exit."))] = False,
+    list_rules: Annotated[bool, typer.Option("--list", help=_("List the rules and exit."))] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Judge a client of the native wire, rule by rule.
+    """Check a client library against the rules of the native wire.
 
-    COMMAND starts an adapter: a small program that does with the client's library what it reads from its
-    standard input. NEP_MASTER tells it the address of the tester's own master. docs/wire-check.md says how to
-    write one.
+    COMMAND starts an adapter: a small program that carries out requests from its standard input with the
+    client library. NEP_MASTER has the address of the tester's master. See docs/wire-check.md.
 
-    Exits with 0 when no rule failed, 1 when one did, and 2 when the adapter can't be started.
+    Exits with 0 if no rule failed, 1 if a rule failed, and 2 if the adapter can't be started.
     """
     try:
         rules = conformance.chosen_rules(rule or ())
     except KeyError as error:
         raise typer.BadParameter(
-            _("no rule '{id}'; '--list' shows all").format(id=error.args[0]), param_hint="--rule"
+            _("unknown rule '{id}'; '--list' shows all rules").format(id=error.args[0]), param_hint="--rule"
         ) from error
     if list_rules:
         _list(rules, as_json=as_json)
         return
     if not command:
-        raise typer.BadParameter(_("say how to start the adapter, after '--'"), param_hint="COMMAND")
+        raise typer.BadParameter(_("missing the command of the adapter after '--'"), param_hint="COMMAND")
     outcomes = []
     try:
         for outcome in conformance.check(lambda master: conformance.AdapterProcess(command, master), rules):

@@ -1,7 +1,7 @@
-"""The conformance tester: judges a client of the native wire, rule by rule. See docs/wire-check.md.
+"""Conformance tester for client libraries of the native wire. See docs/wire-check.md.
 
-`check` starts an adapter, a small program that does with the client's library what it is told, and plays
-master and peers for it.
+`check` starts an adapter, a small program that carries out requests with the client library, and simulates
+the master and peers of that program.
 """
 
 from nep.programs.conformance import rules as _rules  # noqa: F401 - importing them registers them

@@ -1,6 +1,6 @@
-"""The adapter under test: a program that does with a library what it is told.
+"""Adapter under test: a program that carries out requests with a client library.
 
-Requests go to its standard input, replies and events come from its standard output: one JSON object a line.
+Requests go to its standard input; replies and events come from its standard output, one JSON object per line.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ _MAX_LINE_BYTES = 64 * 2**20
 
 
 class AdapterError(NepError):
-    """The adapter does not do what the protocol of adapters asks for."""
+    """The adapter can't be started or violates the protocol of adapters."""
 
 
 class AdapterStreams(Protocol):
-    """Two streams, and what is behind them."""
+    """Output and input stream of an adapter, and its end."""
 
     reads: IO[bytes]
     writes: IO[bytes]
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code when it has ended within this time, else None."""
+        """Return the exit code, or None if the adapter still runs after ``timeout_s``."""
 
     def end(self) -> None:
-        """End it, whatever it does."""
+        """End the adapter, by force if necessary."""
 
 
 class AdapterProcess:
-    """An adapter that is started as a command, with the master's address in NEP_MASTER."""
+    """Adapter process, started by a command with the master's address in NEP_MASTER."""
 
     def __init__(self, command: Sequence[str], master: str) -> None:
         try:
@@ -55,23 +55,25 @@ class AdapterProcess:
             )
         except OSError as error:
             raise AdapterError(
-                _("'{command}' cannot be started: {error}").format(command=" ".join(command), error=error)
+                _("can't start '{command}': {error}").format(command=" ".join(command), error=error)
             ) from error
         reads, writes = self._process.stdout, self._process.stdin
         if reads is None or writes is None:
-            raise AdapterError(_("'{command}' has no streams").format(command=" ".join(command)))
+            raise AdapterError(
+                _("'{command}' has no standard input and output").format(command=" ".join(command))
+            )
         self.reads: IO[bytes] = reads
         self.writes: IO[bytes] = writes
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code when it has ended within this time, else None."""
+        """Return the exit code, or None if the adapter still runs after ``timeout_s``."""
         try:
             return self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             return None
 
     def end(self) -> None:
-        """Close its stdin, and kill it when it does not end by itself."""
+        """Close its standard input, and kill the process if it does not exit within 3 s."""
         with suppress(OSError):
             self.writes.close()
         if self.wait(3.0) is None:
@@ -81,12 +83,12 @@ class AdapterProcess:
 
 
 class Adapter:
-    """Requests to the adapter, and what it says. Only the thread that reads its lines is another one."""
+    """Requests to an adapter, its replies and events. A thread of its own reads the lines."""
 
     def __init__(self, lines: AdapterStreams) -> None:
         self.lines = lines
         self.events: list[Mapping[str, Any]] = []
-        """Messages that its subscribers have received, in the order in which it told of them."""
+        """Messages received by its subscribers, in the order of the events."""
         self._replies: dict[int, Mapping[str, Any]] = {}
         self._incoming: deque[bytes | None] = deque()
         self._count = 0
@@ -95,51 +97,55 @@ class Adapter:
         self._reader.start()
 
     def _read(self) -> None:
-        with suppress(OSError, ValueError):  # it was closed
+        with suppress(OSError, ValueError):  # closed by `end`
             while line := self.lines.reads.readline(_MAX_LINE_BYTES):
                 self._incoming.append(line)
         self._incoming.append(None)
 
     def begin(self, do: str, **members: object) -> int:
-        """Tell the adapter to do something; its number, for `reply`."""
+        """Send a request and return its number for `reply`."""
         self._count += 1
         line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
         try:
             self.lines.writes.write(line)
             self.lines.writes.flush()
         except (OSError, ValueError) as error:
-            raise AdapterError(_("the adapter takes no requests: {error}").format(error=error)) from error
+            raise AdapterError(_("can't write to the adapter: {error}").format(error=error)) from error
         return self._count
 
     def reply(self, number: int) -> Mapping[str, Any] | None:
-        """Return the reply to a request when it has come. Raises `AdapterError` when it says an error."""
+        """Return the reply to a request, or None if pending. Raises `AdapterError` if it reports an error."""
         self.pump()
         reply = self._replies.get(number)
         if reply is None:
             return None
         if "error" in reply:
-            raise AdapterError(_("the adapter says: {error}").format(error=shown(reply["error"])))
+            raise AdapterError(
+                _("the adapter reported an error: {error}").format(error=shown(reply["error"]))
+            )
         return reply
 
     def pump(self) -> None:
-        """Take what has come."""
+        """Process the lines received so far."""
         while self._incoming:
             line = self._incoming.popleft()
             if line is None:
                 self.has_ended = True
                 continue
             try:
-                said = json.loads(line)
+                message = json.loads(line)
             except ValueError:
-                said = None
-            if not isinstance(said, dict):
-                raise AdapterError(_("the adapter says {line}, which is no JSON").format(line=shown(line)))
-            if isinstance(said.get("re"), int):
-                self._replies[said["re"]] = said
-            elif said.get("event") == "message":
-                self.events.append(said)
+                message = None
+            if not isinstance(message, dict):
+                raise AdapterError(
+                    _("the adapter wrote {line}, which is not a JSON object").format(line=shown(line))
+                )
+            if isinstance(message.get("re"), int):
+                self._replies[message["re"]] = message
+            elif message.get("event") == "message":
+                self.events.append(message)
 
     def end(self) -> None:
-        """End the adapter, and its thread."""
+        """End the adapter and the reading thread."""
         self.lines.end()
         self._reader.join(5.0)

@@ -1,4 +1,4 @@
-"""The bench: one adapter, the master and the peers that it meets, all pumped in one thread."""
+"""Test bench: one adapter with a simulated master and peers, polled in one thread."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from nep.i18n import _
 from nep.masters.graph import Outgoing
 from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStreams
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
-from nep.programs.conformance.scripted_master import HeardRequest, ScriptedMaster
+from nep.programs.conformance.scripted_master import ReceivedRequest, ScriptedMaster
 from nep.programs.conformance.verdict import broken
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
 
 __all__ = ["Bench", "Start"]
 
 Start = Callable[[str], AdapterStreams]
-"""Starts an adapter that finds the master at this address."""
+"""Starts an adapter with this address of the master."""
 _POLL_MS = 2
 _ANSWER_S = 15.0
 
 
 class Bench:
-    """See the module. `scale` shortens all times of the wire, for a client that shortens them as well."""
+    """Test bench for rules. ``scale`` multiplies the times of the wire; the adapter must use the same."""
 
     def __init__(self, start: Start, scale: float = 1.0) -> None:
         self.scale = scale
@@ -36,9 +36,9 @@ class Bench:
         self.publishers: list[ScriptedPublisher] = []
         self.subscribers: list[ScriptedSubscriber] = []
         self.connect_delay_s: float | None = 0.0
-        """How long the tester's subscribers take to connect; None: they never do."""
+        """Delay before the tester's subscribers connect to a listed publisher; None: they don't connect."""
         self._connecting: list[tuple[float, ScriptedSubscriber, str]] = []
-        self._made: list[tuple[str, Mapping[str, Any]]] = []
+        self._opened: list[tuple[str, Mapping[str, Any]]] = []
         self._numbers = itertools.count(1)
         try:
             self.adapter = Adapter(start(self.master.address))
@@ -56,7 +56,7 @@ class Bench:
     # ---- time
 
     def pump(self) -> None:
-        """Let everybody do what there is to do."""
+        """Process all pending input of master, peers and adapter."""
         self.master.pump()
         for peer in self._peers():
             peer.pump()
@@ -67,7 +67,7 @@ class Bench:
         self.adapter.pump()
 
     def until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
-        """Pump until something is so; False when it is not within `timeout_s`, which is not scaled."""
+        """Pump until the condition is met; return False after ``timeout_s``, which is not scaled."""
         deadline = time.monotonic() + timeout_s
         while True:
             self.pump()
@@ -86,49 +86,49 @@ class Bench:
         poller.poll(_POLL_MS)
 
     def wait(self, seconds: float) -> None:
-        """Pump for some time, which is scaled."""
+        """Pump for ``seconds`` times `scale`."""
         self.until(lambda: False, seconds * self.scale)
 
     def need(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
-        """Pump until something is so. Raises `BrokenRuleError`; `what` is a name on the wire."""
+        """Pump until the condition is met; raise `BrokenRuleError` with ``what`` after the scaled timeout."""
         if not self.until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
-            raise broken(_("'{what}' did not come within {seconds:g} s").format(what=what, seconds=timeout_s))
+            raise broken(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
 
     # ---- the adapter
 
     def ask(self, do: str, **members: object) -> Mapping[str, Any]:
-        """Let the adapter do something, and return its reply. Raises `AdapterError`."""
+        """Send a request to the adapter and return its reply. Raises `AdapterError`."""
         return self.finish(self.adapter.begin(do, **members), do)
 
     def finish(self, number: int, do: str) -> Mapping[str, Any]:
-        """Wait for the reply to a request that was begun."""
+        """Wait for the reply to the request ``number``. Raises `AdapterError`."""
         found: list[Mapping[str, Any]] = []
 
-        def has_come() -> bool:
+        def has_finished() -> bool:
             reply = self.adapter.reply(number)
             if reply is not None:
                 found.append(reply)
             return reply is not None or self.adapter.has_ended
 
-        if not self.until(has_come, _ANSWER_S):
+        if not self.until(has_finished, _ANSWER_S):
             raise AdapterError(
-                _("the adapter did not answer '{do}' within {seconds:g} s").format(do=do, seconds=_ANSWER_S)
+                _("the adapter did not reply to '{do}' within {seconds:g} s").format(do=do, seconds=_ANSWER_S)
             )
         if not found:
-            raise AdapterError(_("the adapter ended while it was asked for '{do}'").format(do=do))
+            raise AdapterError(_("the adapter exited before it replied to '{do}'").format(do=do))
         return found[0]
 
     def new_topic(self) -> str:
-        """Return a topic that nobody has had."""
+        """Return an unused topic."""
         return f"/check/{next(self._numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Let the adapter make a publisher; its number there."""
+        """Open a publisher in the adapter and return its number."""
         reply = self.ask("publisher", topic=topic, type=msg_type, **members)
         return self._keep("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Let the adapter make a subscriber; its number there."""
+        """Open a subscriber in the adapter and return its number."""
         reply = self.ask("subscriber", topic=topic, type=msg_type, **members)
         return self._keep("close_subscriber", "sub", reply)
 
@@ -136,38 +136,38 @@ class Bench:
         number = reply.get(name)
         if not isinstance(number, int):
             raise AdapterError(_("the adapter's reply has no '{name}'").format(name=name))
-        self._made.append((closes, {name: number}))
+        self._opened.append((closes, {name: number}))
         return number
 
     def close_pub(self, number: int) -> None:
-        """Let the adapter close a publisher."""
+        """Close a publisher of the adapter."""
         self._close("close_publisher", {"pub": number})
 
     def close_sub(self, number: int) -> None:
-        """Let the adapter close a subscriber."""
+        """Close a subscriber of the adapter."""
         self._close("close_subscriber", {"sub": number})
 
     def _close(self, do: str, members: Mapping[str, Any]) -> None:
-        self._made = [each for each in self._made if each != (do, members)]
+        self._opened = [each for each in self._opened if each != (do, members)]
         self.ask(do, **members)
 
     def events(self, sub: int) -> list[Mapping[str, Any]]:
-        """Return the messages that this subscriber of the adapter has received."""
+        """Return the messages received by a subscriber of the adapter."""
         return [each for each in self.adapter.events if each.get("sub") == sub]
 
     def counts(self, sub: int) -> tuple[int, int]:
-        """Return what a subscriber of the adapter has received and lost."""
+        """Return the received and lost counts of a subscriber of the adapter."""
         reply = self.ask("counts", sub=sub)
         return int(reply.get("received", -1)), int(reply.get("lost", -1))
 
-    # ---- what the master hears
+    # ---- requests to the master
 
-    def requests(self, do: str) -> list[HeardRequest]:
-        """Return the requests of this name so far."""
-        return [each for each in self.master.heard if each.do == do]
+    def requests(self, do: str) -> list[ReceivedRequest]:
+        """Return all requests of this name."""
+        return [each for each in self.master.received if each.do == do]
 
-    def request(self, do: str, field: str, id: object) -> HeardRequest:
-        """Wait for the request of this name with this id in a field, and return it."""
+    def request(self, do: str, field: str, id: object) -> ReceivedRequest:
+        """Wait for the request of this name whose ``field`` is ``id``, and return it."""
         self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.what.get(field) == id)
 
@@ -177,26 +177,28 @@ class Bench:
             record = each.what.get(kind)
             if isinstance(record, dict) and record.get("topic") == topic:
                 return record
-        raise broken(_("'{what}' did not come").format(what=f"{kind}+ {topic}"))
+        raise broken(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
 
     @property
     def node_id(self) -> str:
-        """The id of the adapter's node."""
-        for each in reversed(self.master.heard):
+        """Id of the adapter's node."""
+        for each in reversed(self.master.received):
             node = each.what.get("node")
             if isinstance(node, dict):
                 return str(node.get("id"))
-        raise broken(_("'{what}' did not come").format(what="node"))
+        raise broken(_("no '{what}' was received").format(what="node"))
 
-    def renewal(self, after: int, timeout_s: float = 5.0) -> HeardRequest:
-        """Wait for a renewal after so many requests, and return it."""
-        self.need(lambda: any(each.do == "renew" for each in self.master.heard[after:]), "renew", timeout_s)
-        return next(each for each in self.master.heard[after:] if each.do == "renew")
+    def renewal(self, after: int, timeout_s: float = 5.0) -> ReceivedRequest:
+        """Wait for a renewal after the first ``after`` requests, and return it."""
+        self.need(
+            lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s
+        )
+        return next(each for each in self.master.received[after:] if each.do == "renew")
 
     # ---- peers
 
     def new_socket(self, kind: int) -> zmq.Socket[bytes]:
-        """Return a socket, which the rule closes."""
+        """Return a socket, to be closed by the rule."""
         socket: zmq.Socket[bytes] = self._context.socket(kind)
         socket.linger = 0
         return socket
@@ -204,31 +206,31 @@ class Bench:
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:
-        """Return a publisher of the tester, which the master names to the adapter."""
-        made = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
-        self.publishers.append(made)
+        """Return a publisher of the tester, registered at the master if ``is_listed``."""
+        created = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
+        self.publishers.append(created)
         if is_listed:
-            self.list_publisher(made)
-        return made
+            self.list_publisher(created)
+        return created
 
-    def list_publisher(self, made: ScriptedPublisher) -> None:
-        """Register a publisher of the tester."""
-        self.master.submit(AddPublisher(made.node, made.record))
+    def list_publisher(self, created: ScriptedPublisher) -> None:
+        """Register a publisher of the tester at the master."""
+        self.master.submit(AddPublisher(created.node, created.record))
 
     def subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None
     ) -> ScriptedSubscriber:
-        """Return a subscriber of the tester: the master names it, or it connects to `endpoint` at once."""
-        made = ScriptedSubscriber(self._context, topic, msg_type, level)
-        self.subscribers.append(made)
+        """Return a subscriber of the tester, connected to ``endpoint`` or else registered at the master."""
+        created = ScriptedSubscriber(self._context, topic, msg_type, level)
+        self.subscribers.append(created)
         if endpoint is None:
-            self.master.submit(AddSubscriber(made.node, made.record))
+            self.master.submit(AddSubscriber(created.node, created.record))
         else:
-            made.connect(endpoint)
-        return made
+            created.connect(endpoint)
+        return created
 
-    def heard_publisher(self, topic: str, msg_type: str = "json") -> tuple[ScriptedPublisher, int]:
-        """Return a publisher of the tester, and the adapter's subscriber that hears it."""
+    def subscribed_publisher(self, topic: str, msg_type: str = "json") -> tuple[ScriptedPublisher, int]:
+        """Return a publisher of the tester and the number of the adapter's subscriber connected to it."""
         publisher = self.publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)
         self.need(lambda: bool(publisher.hellos), "hello")
@@ -245,12 +247,12 @@ class Bench:
     # ---- between rules and at the end
 
     def forget(self) -> None:
-        """Leave to the rule what it has made; it closes it itself."""
-        self._made.clear()
+        """Leave closing of the opened publishers and subscribers to the rule."""
+        self._opened.clear()
 
     def clear(self) -> None:
-        """Close what a rule has made; the adapter goes on."""
-        self.master.change = lambda _heard, reply: reply
+        """Close all publishers and subscribers of a rule; the adapter keeps running."""
+        self.master.change = lambda _request, reply: reply
         self.connect_delay_s = 0.0
         self._connecting.clear()
         for peer in self._peers():
@@ -262,8 +264,8 @@ class Bench:
         for subscriber in self.subscribers:
             subscriber.socket.close(0)
         self.subscribers.clear()
-        while self._made:
-            do, members = self._made.pop()
+        while self._opened:
+            do, members = self._opened.pop()
             self.ask(do, **members)
         for publisher in self.publishers:
             publisher.socket.close(0)
@@ -275,7 +277,7 @@ class Bench:
         yield from self.subscribers
 
     def close(self) -> None:
-        """End the adapter and close everything."""
+        """End the adapter and close all sockets."""
         try:
             self.adapter.end()
         finally:

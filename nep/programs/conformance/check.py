@@ -1,4 +1,4 @@
-"""Judging: every rule against one adapter, which is started again after a rule that it broke."""
+"""Check of rules against one adapter, which is restarted after each broken rule."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ _MODULES = (
     "limits",
     "services",
 )
-"""The order in which rules are judged: what a later one is about needs what the earlier ones ask for."""
+"""Modules of rules in the order of their checks; later rules depend on earlier ones."""
 Status = Literal["passed", "failed", "skipped"]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a rule has shown. `seen`: what was seen when it failed, or why it was skipped; else empty."""
+    """Result of a rule. ``seen`` describes the failure or the reason for skipping, and is empty otherwise."""
 
     rule: Rule
     status: Status
     seen: str = ""
 
     def to_plain(self) -> dict[str, object]:
-        """Return it for `--json`."""
+        """Return the JSON object of ``--json``."""
         return {
             "id": self.rule.id,
             "status": self.status,
@@ -50,7 +50,7 @@ class Outcome:
 
 
 def chosen_rules(ids: Iterable[str]) -> list[Rule]:
-    """Return the rules with these ids, all without any. Raises `KeyError` with an id that no rule has."""
+    """Return the rules with these ids, or all rules if empty. Raises `KeyError` with an unknown id."""
     wanted = list(ids)
     for each in wanted:
         if each not in RULES:
@@ -60,14 +60,15 @@ def chosen_rules(ids: Iterable[str]) -> list[Rule]:
 
 
 def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
-    """Judge an adapter by these rules, and yield each outcome.
+    """Check an adapter against these rules, and yield each outcome.
 
     Args:
-        start: starts an adapter that finds the master at the given address.
-        scale: shortens the times of the wire, for an adapter that shortens them as well.
+        start: Starts an adapter with the given address of the master.
+        rules: Rules in the order of their checks.
+        scale: Factor for the times of the wire; the adapter must scale them equally.
 
     Raises:
-        AdapterError: it can't be started, or does not know `features` and `node`.
+        AdapterError: The adapter can't be started, or does not support `features` and `node`.
     """
     bench: Bench | None = None
     try:
@@ -94,9 +95,9 @@ def _judge(rule: Rule, bench: Bench) -> Outcome:
         rule.judge(bench)
     except NepError as error:
         return Outcome(rule, "failed", str(error))
-    except (KeyError, IndexError, TypeError, ValueError) as error:  # a field that a judge looks for
+    except (KeyError, IndexError, TypeError, ValueError) as error:  # missing or invalid field
         reason = f"{type(error).__name__}: {error}"
-        return Outcome(rule, "failed", _("what it said can't be read: {reason}").format(reason=reason))
+        return Outcome(rule, "failed", _("invalid reply: {reason}").format(reason=reason))
     return Outcome(rule, "passed")
 
 

@@ -1,4 +1,4 @@
-"""Malformed messages of a topic, one for each way in which parts can be none. All begin as the topic does."""
+"""Malformed messages of a topic, one for each error code and form."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from nep.protocol.wire import BATCH, EXTENSION, LATCHED, Header, topic_part
 
 __all__ = ["malformed_parts"]
 
-_PUBLISHER = 7
-"""Nobody that the master lists: what is read all the same can be told from good messages."""
+_PUBLISHER = 7  # not listed by the master, which distinguishes delivered malformed messages from valid ones
 
 
 def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
@@ -20,7 +19,7 @@ def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
 
 
 def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
-    """Yield the code and the parts of each."""
+    """Yield error code and parts of each message; all parts start with the topic."""
     first, head, extension = topic_part(topic), _header(), msgpack.packb({"a": 1})
     yield "part-count", [first]
     yield "part-count", [first, head]

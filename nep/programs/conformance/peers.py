@@ -1,4 +1,4 @@
-"""Publishers and subscribers of the tester: plain sockets that send and see every part."""
+"""Publishers and subscribers of the tester: plain sockets that record and send raw parts."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ __all__ = ["Notice", "ScriptedPublisher", "ScriptedSubscriber", "new_node"]
 
 
 def new_node(name: str) -> NodeRecord:
-    """Return the record of a node of the tester."""
+    """Return the record of a new node of the tester."""
     return NodeRecord(secrets.token_hex(8), name, "tester", None, "tester")
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A subscription or its end, as an XPUB socket tells of it."""
+    """Subscription or unsubscription received by an XPUB socket."""
 
     at: float
     is_added: bool
@@ -47,7 +47,7 @@ class Filter:
 
 @dataclass(frozen=True)
 class Notice:
-    """An echo or bye, or a message under a hello (with its payload)."""
+    """Echo or bye, or a message sent under a hello (with a payload)."""
 
     at: float
     hello: bytes
@@ -56,7 +56,7 @@ class Notice:
 
 
 class ScriptedPublisher:
-    """An XPUB socket that notes every filter, greets when it is told to, and sends any parts."""
+    """XPUB socket that records all filters and sends any parts; ``echoes`` makes it answer hellos."""
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
         self.topic, self.echoes = topic, echoes
@@ -71,12 +71,12 @@ class ScriptedPublisher:
         self.seq = 0
         self.filters: list[Filter] = []
         self.hellos: dict[bytes, Hello] = {}
-        """Hellos for its topic that are there now, by their filter."""
+        """Current hellos for its topic, by filter."""
         self.echoed_at: float | None = None
 
     @property
     def id(self) -> int:
-        """Its id."""
+        """Id of the publisher."""
         return self.record.id
 
     def _new_socket(self) -> zmq.Socket[bytes]:
@@ -86,13 +86,13 @@ class ScriptedPublisher:
         return socket
 
     def bind_again(self) -> None:
-        """End all connections, and wait for them on the same port."""
+        """Close all connections and bind to the same port again."""
         endpoint = self.record.endpoints[0]
         self._replace_socket()
         bind_again(self.socket, endpoint)
 
     def bind_elsewhere(self) -> None:
-        """End all connections, and wait for others on another port."""
+        """Close all connections and bind to another port."""
         self._replace_socket()
         port = self.socket.bind_to_random_port("tcp://127.0.0.1")
         self.record = replace(self.record, endpoints=(f"tcp://127.0.0.1:{port}",))
@@ -103,7 +103,7 @@ class ScriptedPublisher:
         self.socket = self._new_socket()
 
     def pump(self) -> None:
-        """Read filters, and echo hellos."""
+        """Process received filters; answer hellos if `echoes`."""
         while not self.socket.closed and self.socket.poll(0):
             event = self.socket.recv()
             now = time.monotonic()
@@ -120,7 +120,7 @@ class ScriptedPublisher:
                 self.hellos.pop(noted.what, None)
 
     def echo(self, hello: bytes) -> None:
-        """Say that a subscriber is seen, and how many messages there were."""
+        """Answer a hello with the seq of the last message."""
         self.notice(hello)
         self.echoed_at = time.monotonic()
 
@@ -129,12 +129,12 @@ class ScriptedPublisher:
         self.socket.send_multipart([hello, self._header(flags, b"", seq)])
 
     def bye(self) -> None:
-        """Say to everybody that nothing comes any more."""
+        """Send a bye to each subscriber."""
         for hello in self.hellos:
             self.notice(hello, BYE)
 
     def send(self, payload: bytes, form: str = "parts", *, seq: int | None = None, flags: int = 0) -> None:
-        """Send the next message: in `parts`, as `one` part, or `alone` to everybody who said hello."""
+        """Send the next message: in ``parts``, as ``one`` part, or ``alone`` under each hello."""
         self.seq = self.seq + 1 if seq is None else seq
         header, topic = self._header(flags, payload), topic_part(self.topic)
         if form == "one":
@@ -159,7 +159,7 @@ class ScriptedPublisher:
 
 
 class ScriptedSubscriber:
-    """A SUB socket that keeps all parts. `level` is that of its hello; None: it says none."""
+    """SUB socket that keeps all received parts. ``level`` is its hello level, None for no hello."""
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, level: int | None) -> None:
         self.topic, self.level = topic, level
@@ -178,26 +178,26 @@ class ScriptedSubscriber:
         self.endpoint = ""
 
     def connect(self, endpoint: str) -> None:
-        """Connect, once."""
+        """Connect to a publisher, unless connected."""
         if not self.endpoint:
             self.endpoint = endpoint
             self.socket.connect(endpoint)
 
     def disconnect(self) -> None:
-        """Leave the publisher."""
+        """Disconnect from the publisher."""
         if self.endpoint and not self.socket.closed:
             self.socket.disconnect(self.endpoint)
             self.endpoint = ""
 
     def pump(self) -> None:
-        """Take what has come."""
+        """Receive all pending messages."""
         while not self.socket.closed and self.socket.poll(0):
             self.received.append(self.socket.recv_multipart())
             self.times.append(time.monotonic())
 
     @property
     def notices(self) -> list[Notice]:
-        """Echoes, byes and messages sent to it alone, so far; without what can't be one of them."""
+        """Received echoes, byes and messages under its hello; malformed ones are left out."""
         found = []
         for at, parts in zip(self.times, self.received, strict=True):
             if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
@@ -210,24 +210,20 @@ class ScriptedSubscriber:
 
     @property
     def echoes(self) -> list[Notice]:
-        """Echoes so far."""
+        """Received echoes."""
         return [each for each in self.notices if each.payload is None and not each.header.flags]
 
     @property
     def byes(self) -> list[Notice]:
-        """Byes so far."""
+        """Received byes."""
         return [each for each in self.notices if each.payload is None and each.header.flags == BYE]
 
     @property
     def raw(self) -> list[list[bytes]]:
-        """The parts of all messages that do not begin with the hello."""
+        """Parts of all received messages that do not start with the hello."""
         return [parts for parts in self.received if parts[0] != self.hello]
 
     @property
     def messages(self) -> list[Parts]:
-        """All messages of its topic, those of batches one by one. Raises `WireError`."""
+        """All received messages of its topic, batches split. Raises `WireError` for malformed parts."""
         return [each for parts in self.raw for each in read_parts(parts)]
-
-    def note_alone(self) -> list[Notice]:
-        """Messages that came under the hello."""
-        return [each for each in self.notices if each.payload is not None]

@@ -1,4 +1,4 @@
-"""Binding a port again that this process has just let go of."""
+"""Binding to a port that this process has just released."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WAIT_S = 5.0
 
 
 def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
-    """Bind to an endpoint whose last socket may still be closing: libzmq does that in its own thread."""
+    """Bind, and retry while libzmq's thread is still closing the previous socket of the endpoint."""
     deadline = time.monotonic() + _WAIT_S
     while True:
         try:

@@ -1,4 +1,4 @@
-"""Rules of the native wire that a client can be judged by: `rule` registers one, `RULES` has all."""
+"""Registry of the rules of the native wire: `rule` registers a check, `RULES` has all."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ Judge = Callable[[Bench], None]
 
 @dataclass(frozen=True)
 class Rule:
-    """One rule. `requirement` is English: give it to `_` when it is shown.
+    """Rule of the native wire.
 
-    `section` is a heading of docs/wire.md, or another page with one. `features` are those that an adapter
-    must announce to be judged. `is_last`: the adapter has ended after it.
+    Attributes:
+        requirement: English sentence; translate it with `_` to show it.
+        section: Anchor of a heading in docs/wire.md, or ``PAGE.md#anchor``.
+        judge: Raises `BrokenRuleError` if the adapter on the bench breaks the rule.
+        features: Features that an adapter must announce for the rule to apply.
+        is_last: The adapter has exited after the check.
     """
 
     id: str
@@ -29,19 +33,19 @@ class Rule:
 
     @property
     def place(self) -> str:
-        """The page and section that says what it requires."""
+        """Page and section of the requirement."""
         section = self.section.replace(" ", "-")
         return section if ".md#" in section else f"wire.md#{section}"
 
 
 RULES: dict[str, Rule] = {}
-"""By id, in the order in which a client is judged."""
+"""Rules by id."""
 
 
 def rule(
     id: str, requirement: str, section: str, *features: str, is_last: bool = False
 ) -> Callable[[Judge], Judge]:
-    """Register the decorated function as the judge of a rule. It raises `BrokenRuleError`."""
+    """Register the decorated function as the check of a rule; see `Rule`."""
 
     def register(judge: Judge) -> Judge:
         RULES[id] = Rule(id, requirement, section, judge, features, is_last)

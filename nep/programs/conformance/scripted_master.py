@@ -1,7 +1,7 @@
-"""A master at the level of the wire: it hears every request, and can answer what no real master would.
+"""Simulated master that records all requests and can change any reply.
 
-What it knows and answers is the real master's (`nep.masters.graph.Graph`), without its clock: nobody is
-unlisted because it is silent, so that a rule decides when that happens. `pump` does its work.
+Its state is that of the real master (`nep.masters.graph.Graph`) without a clock: leases don't expire until a
+rule unlists a node by `ScriptedMaster.drop`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from nep.protocol.requests import (
     Request,
 )
 
-__all__ = ["HeardRequest", "ScriptedMaster"]
+__all__ = ["ReceivedRequest", "ScriptedMaster"]
 
 PEER = "peer"
-"""The connection of all that the tester itself registers."""
+"""Route of the nodes that the tester registers."""
 
 
 @dataclass(frozen=True)
-class HeardRequest:
-    """A request as it came. `problem` says what is wrong with its form, in words of the wire."""
+class ReceivedRequest:
+    """Received request. ``problem`` describes a malformed one, in terms of the wire."""
 
     at: float
     sender: str
@@ -47,35 +47,35 @@ class HeardRequest:
     problem: str = ""
 
 
-Change = Callable[[HeardRequest, dict[str, Any]], "dict[str, Any] | None"]
-"""Changes a reply, as a map, before it is sent; None: it is not sent at all."""
+Change = Callable[[ReceivedRequest, dict[str, Any]], "dict[str, Any] | None"]
+"""Returns the reply to send in place of the given one, or None to send nothing."""
 
 
 class ScriptedMaster:
-    """Serve 127.0.0.1 on a free port."""
+    """Master on a free port of 127.0.0.1. Call `pump` to process requests."""
 
     def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
         self._context = context
         self._on_push = on_push
         self._encoder = AnswerEncoder()
-        self.heard: list[HeardRequest] = []
-        self.change: Change = lambda _heard, reply: reply
+        self.received: list[ReceivedRequest] = []
+        self.change: Change = lambda _request, reply: reply
         self.port = 0
         self._socket: zmq.Socket[bytes] | None = None
         self.start()
 
     @property
     def address(self) -> str:
-        """Where it is."""
+        """Address of the master."""
         return f"127.0.0.1:{self.port}"
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
-        """What it waits for."""
+        """Open sockets, to poll."""
         return [] if self._socket is None else [self._socket]
 
     def start(self) -> None:
-        """Bind, with a new epoch and nobody registered; on the port that it had before."""
+        """Bind with a new epoch and an empty graph, to the same port as before."""
         self.graph = Graph(secrets.randbits(62) | 1, 0.0, learn_s=0.0)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.linger = 0
@@ -86,19 +86,19 @@ class ScriptedMaster:
             self.port = self._socket.bind_to_random_port("tcp://127.0.0.1")
 
     def stop(self) -> None:
-        """Close its socket: there is no master."""
+        """Close the socket: no master is running."""
         if self._socket is not None:
             self._socket.close(0)
             self._socket = None
 
     def pump(self) -> None:
-        """Answer what has come."""
+        """Answer all pending requests."""
         while self._socket is not None and self._socket.poll(0):
             sender, *parts = self._socket.recv_multipart()
             self._serve(sender.decode("utf-8", "surrogateescape"), parts)
 
     def submit(self, request: Request) -> None:
-        """Carry out a request of the tester itself. Raises `WireError` when it is refused."""
+        """Apply a request of the tester. Raises `WireError` if it is refused."""
         for each in self.graph.apply(request, 1, 0.0, PEER):
             if isinstance(each.answer, Refused):
                 raise WireError(each.answer.reason)
@@ -106,12 +106,12 @@ class ScriptedMaster:
                 self._push(each)
 
     def drop(self, node_id: str) -> None:
-        """Unlist a node, as when its lease has lapsed."""
+        """Unlist a node, as after the end of its lease."""
         for each in self.graph.drop([node_id]):
             self._push(each)
 
     def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
-        """Name a publisher to the adapter's node twice more."""
+        """Push a publisher to the adapter's node twice more."""
         came = PublisherCame(
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )
@@ -119,32 +119,32 @@ class ScriptedMaster:
             self.push(node_id, self._encoder.encode(came))
 
     def push(self, node_id: str, body: bytes) -> None:
-        """Send any body to the adapter's node."""
+        """Send a raw body to the adapter's node."""
         member = self.graph.members.get(node_id)
         if member is not None and member.route != PEER:
             self._send(member.route, body)
 
     def _serve(self, sender: str, parts: list[bytes]) -> None:
         body = parts[-1]
-        heard = _read(sender, parts)
-        self.heard.append(heard)
+        request = _read(sender, parts)
+        self.received.append(request)
         received = decode_request(body)
         if isinstance(received.request, WireError):
             epoch, revision = self.graph.epoch, self.graph.revision
             error = received.request
             self._reply(
-                heard, Outgoing(sender, Refused(epoch, revision, error.reason, error.code), heard.call)
+                request, Outgoing(sender, Refused(epoch, revision, error.reason, error.code), request.call)
             )
             return
         for each in self.graph.apply(received.request, received.call, 0.0, sender, is_foreign=True):
             if each.call is None:
                 self._push(each)
             else:
-                self._reply(heard, each)
+                self._reply(request, each)
 
-    def _reply(self, heard: HeardRequest, each: Outgoing) -> None:
+    def _reply(self, request: ReceivedRequest, each: Outgoing) -> None:
         encoded = self._encoder.encode(each.answer, each.call or 0)
-        reply = self.change(heard, msgpack.unpackb(encoded, strict_map_key=False))
+        reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
             self._send(each.to, msgpack.packb(reply))
 
@@ -160,23 +160,23 @@ class ScriptedMaster:
     def _send(self, route: str, body: bytes) -> None:
         if self._socket is None:
             return
-        with suppress(zmq.ZMQError):  # its connection has ended
+        with suppress(zmq.ZMQError):  # connection closed
             self._socket.send_multipart([route.encode("utf-8", "surrogateescape"), body])
 
 
-def _read(sender: str, parts: list[bytes]) -> HeardRequest:
+def _read(sender: str, parts: list[bytes]) -> ReceivedRequest:
     now = time.monotonic()
     if len(parts) != 1:
-        return HeardRequest(now, sender, problem=f"{len(parts)} parts")
+        return ReceivedRequest(now, sender, problem=f"{len(parts)} parts")
     try:
         body = msgpack.unpackb(parts[0], strict_map_key=False)
     except ValueError:
-        return HeardRequest(now, sender, problem="no msgpack")
+        return ReceivedRequest(now, sender, problem="not msgpack")
     if not isinstance(body, dict):
-        return HeardRequest(now, sender, problem="no map")
+        return ReceivedRequest(now, sender, problem="not a map")
     do, call, what = body.get("do"), body.get("call"), body.get("what", {})
     if not isinstance(do, str) or not isinstance(what, dict):
-        return HeardRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
+        return ReceivedRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
     if type(call) is not int or call < 1:
-        return HeardRequest(now, sender, do, 0, what, f"call: {call!r}")
-    return HeardRequest(now, sender, do, call, what)
+        return ReceivedRequest(now, sender, do, 0, what, f"call: {call!r}")
+    return ReceivedRequest(now, sender, do, call, what)

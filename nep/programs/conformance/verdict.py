@@ -1,35 +1,47 @@
-"""What a judge says when a client breaks a rule."""
+"""Expectations of rules, and the error of a client that breaks one."""
 
 from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from nep.errors import NepError
 from nep.i18n import _
 
-__all__ = ["BrokenRuleError", "broken", "expect", "shown"]
+__all__ = ["BrokenRuleError", "at_most", "broken", "expect", "shown"]
 
 _MAX_SHOWN = 200
 
 
 class BrokenRuleError(NepError):
-    """The client broke a rule; the sentence says what was seen."""
+    """The client broke a rule; the message describes the observed behaviour."""
 
 
 def broken(sentence: str) -> BrokenRuleError:
-    """Return the error for something that is said in a whole sentence."""
+    """Return the error with this message."""
     return BrokenRuleError(sentence)
 
 
 def expect(what: str, seen: object, wanted: object) -> None:
-    """Raise `BrokenRuleError` unless what was seen is what is wanted. `what` is a name on the wire."""
+    """Raise `BrokenRuleError` unless ``seen`` equals ``wanted`` in type and value. ``what`` names a field."""
     if seen != wanted or type(seen) is not type(wanted):
         raise BrokenRuleError(
-            _("{what} is {seen}; {wanted} is expected").format(
-                what=what, seen=shown(seen), wanted=shown(wanted)
-            )
+            _("{what} is {seen}, expected {wanted}").format(what=what, seen=shown(seen), wanted=shown(wanted))
         )
 
 
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """Raise `BrokenRuleError` if the block takes longer."""
+    began = time.monotonic()
+    yield
+    took_s = time.monotonic() - began
+    if took_s > seconds:
+        raise broken(_("it took {seconds:.1f} s").format(seconds=took_s))
+
+
 def shown(value: object) -> str:
-    """Return a value as a sentence may have it."""
+    """Return a printable form of a value, of limited length."""
     text = ascii(value)
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…"

@@ -1,4 +1,4 @@
-"""The rules: each module registers some."""
+"""Rules of the native wire, by subject."""
 
 from nep.programs.conformance.rules import (  # noqa: F401 - importing them registers the rules
     closing,

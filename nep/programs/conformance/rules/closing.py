@@ -1,4 +1,4 @@
-"""Rules about how publishers, subscribers and nodes end."""
+"""Rules about closing publishers, subscribers and nodes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import heard
+from nep.programs.conformance.rules.messages import connected_subscriber
 from nep.programs.conformance.verdict import broken, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
@@ -18,16 +18,23 @@ def _is_connected(publisher: ScriptedPublisher) -> bool:
     return bool(publisher.hellos)
 
 
+def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int, wait_s: float) -> None:
+    """Report a publisher as closed to the master; the adapter must still be connected after ``wait_s``."""
+    bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
+    bench.wait(wait_s)
+    if not _is_connected(publisher):
+        raise broken(_("it disconnected before the bye"))
+
+
 @rule(
     "bye",
-    lazy("A publisher that closes says bye to each subscriber, with the seq of its last message."),
+    lazy("A closing publisher sends each subscriber a bye with the seq of its last message."),
     _SECTION,
 )
-def bye(bench: Bench) -> None:
-    """See the rule."""
+def _bye(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=5)
     number = bench.adapter.begin("close_publisher", pub=pub)
     bench.forget()
@@ -42,22 +49,20 @@ def bye(bench: Bench) -> None:
     bench.finish(number, "close_publisher")
 
 
-@rule("bye-again", lazy("A publisher repeats its bye while a hello is there, and then closes."), _SECTION)
-def bye_again(bench: Bench) -> None:
-    """See the rule."""
+@rule("bye-again", lazy("A publisher repeats its bye until no hello remains, and then closes."), _SECTION)
+def _bye_again(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 3)
     number = bench.adapter.begin("close_publisher", pub=pub)
     bench.forget()
     bench.need(lambda: len(subscriber.byes) >= 3, "bye again")
     bench.finish(number, "close_publisher")
 
 
-@rule("bye-disconnects", lazy("A subscriber disconnects when it has read the bye."), _SECTION)
-def bye_disconnects(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+@rule("bye-disconnects", lazy("A subscriber disconnects after reading the bye."), _SECTION)
+def _bye_disconnects(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     publisher.bye()
     bench.need(lambda: not _is_connected(publisher), "disconnect")
@@ -66,16 +71,12 @@ def bye_disconnects(bench: Bench) -> None:
 
 @rule(
     "closed-is-heard",
-    lazy("After 'publisher-' with 'is_closed' a subscriber reads on until the bye."),
+    lazy("After 'publisher-' with 'is_closed', a subscriber keeps reading until the bye."),
     _SECTION,
 )
-def closed_is_heard(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
-    bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, 3))
-    bench.wait(0.3)
-    if not _is_connected(publisher):
-        raise broken(_("it disconnected before the bye"))
+def _closed_is_heard(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
+    _close_without_bye(bench, publisher, 3, 0.3)
     for _number in range(3):
         publisher.send(b'{"a":1}')
     bench.need(lambda: len(bench.events(sub)) == 3, "message")
@@ -85,27 +86,22 @@ def closed_is_heard(bench: Bench) -> None:
 
 @rule(
     "closed-is-left",
-    lazy("A subscriber leaves a publisher that has closed and says no bye, after 3 s."),
+    lazy("A subscriber disconnects after 3 s from a closed publisher that sends no bye."),
     _SECTION,
 )
-def closed_is_left(bench: Bench) -> None:
-    """See the rule."""
-    publisher, _sub = bench.heard_publisher(bench.new_topic())
-    bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, 0))
-    bench.wait(1.5)
-    if not _is_connected(publisher):
-        raise broken(_("it disconnected before the bye"))
+def _closed_is_left(bench: Bench) -> None:
+    publisher, _sub = bench.subscribed_publisher(bench.new_topic())
+    _close_without_bye(bench, publisher, 0, 1.5)
     bench.need(lambda: not _is_connected(publisher), "disconnect", 10.0)
 
 
 @rule(
     "lapsed-is-heard",
-    lazy("After 'publisher-' without 'is_closed' the connection stays: the program may only be suspended."),
+    lazy("After 'publisher-' without 'is_closed', the connection stays open: the program may be suspended."),
     _SECTION,
 )
-def lapsed_is_heard(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _lapsed_is_heard(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     bench.master.drop(publisher.node.id)
     bench.wait(0.5)
     publisher.send(b'{"a":1}')
@@ -113,11 +109,14 @@ def lapsed_is_heard(bench: Bench) -> None:
     expect("connected", _is_connected(publisher), True)
 
 
-@rule("subscriber-closes", lazy("A subscriber that closes tells the master and disconnects."), "the-master")
-def subscriber_closes(bench: Bench) -> None:
-    """See the rule."""
+@rule(
+    "subscriber-closes",
+    lazy("A closing subscriber sends 'subscriber-' to the master and disconnects."),
+    "the-master",
+)
+def _subscriber_closes(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.heard_publisher(topic)
+    publisher, sub = bench.subscribed_publisher(topic)
     bench.close_sub(sub)
     bench.request("subscriber-", "id", bench.record("subscriber", topic)["id"])
     bench.need(lambda: not _is_connected(publisher), "disconnect")
@@ -125,27 +124,26 @@ def subscriber_closes(bench: Bench) -> None:
 
 @rule(
     "leave",
-    lazy("A node that closes renews once more, sends 'leave', says bye, and ends with exit code 0."),
+    lazy("A closing node renews once more, sends 'leave' and its byes, and exits with code 0."),
     _SECTION,
     is_last=True,
 )
-def leave(bench: Bench) -> None:
-    """See the rule."""
+def _leave(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=4)
-    count = len(bench.master.heard)
+    count = len(bench.master.received)
     number = bench.adapter.begin("close")
     bench.need(lambda: bool(subscriber.byes), "bye")
     expect("bye.flags", subscriber.byes[0].header.flags, BYE)
     subscriber.disconnect()
     bench.need(lambda: bool(bench.requests("leave")), "leave")
     expect("leave.node_id", bench.requests("leave")[-1].what.get("node_id"), bench.node_id)
-    said = [each for each in bench.master.heard[count:] if each.do in {"renew", "leave", "publisher-"}]
-    first = said[0]
+    requests = bench.master.received[count:]
+    first = next(each for each in requests if each.do in {"renew", "leave", "publisher-"})
     if first.do == "leave":
-        raise broken(_("'leave' came without a renewal before it"))
+        raise broken(_("'leave' was sent without a preceding renewal"))
     if first.do == "renew":
         seqs = [each.get("last_seq") for each in first.what.get("publishers", ())]
         expect("renew.publishers.last_seq", 4 in seqs, True)

@@ -1,4 +1,4 @@
-"""Rules about leases, statistics, and a master that starts again."""
+"""Rules about leases, statistics and a restarted master."""
 
 from __future__ import annotations
 
@@ -9,27 +9,32 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import heard, messages_of
-from nep.programs.conformance.scripted_master import HeardRequest
+from nep.programs.conformance.rules.messages import connected_subscriber, messages_of
+from nep.programs.conformance.scripted_master import ReceivedRequest
 from nep.programs.conformance.verdict import broken, expect
 
 _SECTION = "leases-and-a-master-that-starts-again"
 
 
-def _ids(heard: HeardRequest, kind: str) -> set[Any]:
-    return {each.get("id") for each in heard.what.get(kind, ()) if isinstance(each, dict)}
+def _ids(request: ReceivedRequest, kind: str) -> set[Any]:
+    return {each.get("id") for each in request.what.get(kind, ()) if isinstance(each, dict)}
 
 
-@rule("renew", lazy("A node renews every second, with the epoch and just what it has registered."), _SECTION)
-def renew(bench: Bench) -> None:
-    """See the rule."""
+@rule(
+    "renew",
+    lazy("A node renews every second with the epoch and exactly its publishers and subscribers."),
+    _SECTION,
+)
+def _renew(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     bench.new_sub(topic)
-    first = bench.renewal(len(bench.master.heard))
-    second = bench.renewal(bench.master.heard.index(first) + 1)
+    first = bench.renewal(len(bench.master.received))
+    second = bench.renewal(bench.master.received.index(first) + 1)
     if second.at - first.at > 2.5 * max(bench.scale, 0.4):
-        raise broken(_("two renewals came {seconds:.1f} s apart").format(seconds=second.at - first.at))
+        raise broken(
+            _("the interval between two renewals was {seconds:.1f} s").format(seconds=second.at - first.at)
+        )
     expect("renew.epoch", second.what.get("epoch"), bench.master.graph.epoch)
     expect("renew.node_id", second.what.get("node_id"), bench.node_id)
     for kind in ("publisher", "subscriber"):
@@ -41,86 +46,89 @@ def renew(bench: Bench) -> None:
 
 @rule(
     "statistics",
-    lazy("Renewals tell counts, bytes and the last seq of each publisher and what each subscriber received."),
+    lazy("Renewals have count, bytes and last seq of each publisher and received count of each subscriber."),
     "publisher statistics",
     "statistics",
 )
-def statistics(bench: Bench) -> None:
-    """See the rule."""
+def _statistics(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=6)
     bench.need(lambda: len(messages_of(subscriber)) == 6, "message")
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
     bench.need(lambda: bool(bench.events(sub)), "message")
-    bench.renewal(len(bench.master.heard))
-    found = bench.renewal(len(bench.master.heard)).what
-    id, heard_id = bench.record("publisher", topic)["id"], bench.record("subscriber", publisher.topic)["id"]
+    bench.renewal(len(bench.master.received))
+    found = bench.renewal(len(bench.master.received)).what
+    id, subscriber_id = (
+        bench.record("publisher", topic)["id"],
+        bench.record("subscriber", publisher.topic)["id"],
+    )
     (sent,) = (each for each in found["publishers"] if each.get("id") == id)
     expect("count", sent.get("count"), 6)
     expect("last_seq", sent.get("last_seq"), 6)
     expect("bytes", sent.get("bytes"), sum(len(each.payload) for each in messages_of(subscriber)))
-    (received,) = (each for each in found["subscribers"] if each.get("id") == heard_id)
+    (received,) = (each for each in found["subscribers"] if each.get("id") == subscriber_id)
     expect("received", received.get("received"), 1)
 
 
-@rule("next-s", lazy("A node obeys 'next_s': it does not renew sooner than the master says."), _SECTION)
-def next_s(bench: Bench) -> None:
-    """See the rule."""
+@rule("next-s", lazy("A node obeys 'next_s' and does not renew earlier."), _SECTION)
+def _next_s(bench: Bench) -> None:
     bench.new_sub(bench.new_topic())
     wanted_s = 2.5 * bench.scale
-    bench.master.change = lambda _heard, reply: (
+    bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "next_s": wanted_s}} if reply["is"] == "renewed" else reply
     )
-    first = bench.renewal(len(bench.master.heard))
-    second = bench.renewal(bench.master.heard.index(first) + 1, 10.0)
+    first = bench.renewal(len(bench.master.received))
+    second = bench.renewal(bench.master.received.index(first) + 1, 10.0)
     if second.at - first.at < 0.8 * wanted_s:
         raise broken(
-            _("'next_s' was {wanted:g}; the next renewal came after {seconds:.1f} s").format(
+            _("it renewed after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
                 wanted=wanted_s, seconds=second.at - first.at
             )
         )
-    bench.master.change = lambda _heard, reply: reply
-    bench.renewal(len(bench.master.heard), 10.0)
+    bench.master.change = lambda _request, reply: reply
+    bench.renewal(len(bench.master.received), 10.0)
 
 
-@rule("again", lazy("A node whose renewal is answered 'again' joins with all that it has."), _SECTION)
-def again(bench: Bench) -> None:
-    """See the rule."""
+@rule(
+    "again",
+    lazy("A node answers 'again' with a 'join' that has all its publishers and subscribers."),
+    _SECTION,
+)
+def _again(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     bench.new_sub(topic)
     ids = bench.record("publisher", topic)["id"], bench.record("subscriber", topic)["id"]
-    count = len(bench.master.heard)
+    count = len(bench.master.received)
     bench.master.drop(bench.node_id)
-    bench.need(lambda: any(each.do == "join" for each in bench.master.heard[count:]), "join")
-    join = next(each for each in bench.master.heard[count:] if each.do == "join")
+    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join")
+    join = next(each for each in bench.master.received[count:] if each.do == "join")
     expect("join.publishers", ids[0] in _ids(join, "publishers"), True)
     expect("join.subscribers", ids[1] in _ids(join, "subscribers"), True)
-    renewal = bench.renewal(bench.master.heard.index(join) + 1)
+    renewal = bench.renewal(bench.master.received.index(join) + 1)
     expect("renew.epoch", renewal.what.get("epoch"), bench.master.graph.epoch)
 
 
 @rule(
     "restart",
-    lazy("When the master was started again the node joins, and no message is lost meanwhile."),
+    lazy("A node joins a restarted master; no message is lost while the master is down."),
     _SECTION,
 )
-def restart(bench: Bench) -> None:
-    """See the rule."""
+def _restart(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+    subscriber = connected_subscriber(bench, topic, 3)
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     bench.master.stop()
     bench.ask("publish", pub=pub, value={"a": 1}, count=10)
     publisher.send(b'{"a":1}')
     bench.wait(0.3)
-    count = len(bench.master.heard)
+    count = len(bench.master.received)
     bench.master.start()
-    bench.need(lambda: any(each.do == "join" for each in bench.master.heard[count:]), "join", 10.0)
+    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
     bench.list_publisher(publisher)
     bench.ask("publish", pub=pub, value={"a": 1}, count=10)
     publisher.send(b'{"a":1}')
@@ -131,17 +139,16 @@ def restart(bench: Bench) -> None:
         sum(each.is_added and each.what in publisher.hellos for each in publisher.filters),
         1,
     )
-    renewal = bench.renewal(len(bench.master.heard))
+    renewal = bench.renewal(len(bench.master.received))
     expect("renew.epoch", renewal.what.get("epoch"), bench.master.graph.epoch)
 
 
 @rule(
     "renewed-topics",
-    lazy("Publishers that only a renewal's answer names are connected to as well."),
+    lazy("A subscriber also connects to publishers that only the reply to a renewal lists."),
     _SECTION,
 )
-def renewed_topics(bench: Bench) -> None:
-    """See the rule."""
+def _renewed_topics(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     publisher = bench.publisher(topic, is_listed=False)
@@ -156,7 +163,7 @@ def renewed_topics(bench: Bench) -> None:
         "node_id": publisher.node.id,
         "node_name": publisher.node.name,
     }
-    bench.master.change = lambda _heard, reply: (
+    bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "topics": [{"topic": topic, "publishers": [entry]}]}}
         if reply["is"] == "renewed"
         else reply
@@ -171,8 +178,7 @@ def renewed_topics(bench: Bench) -> None:
     lazy("Probes, unknown pushes, unknown fields and malformed answers are ignored."),
     "the-master",
 )
-def unknown_answers(bench: Bench) -> None:
-    """See the rule."""
+def _unknown_answers(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     epoch = bench.master.graph.epoch
@@ -186,7 +192,7 @@ def unknown_answers(bench: Bench) -> None:
         b"",
     ):
         bench.master.push(bench.node_id, body)
-    bench.renewal(len(bench.master.heard))
+    bench.renewal(len(bench.master.received))
     publisher = bench.publisher(topic)
     bench.need(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"a":1}')

@@ -1,4 +1,4 @@
-"""Rules about what a subscriber counts as lost."""
+"""Rules about counting lost messages."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from nep.programs.conformance.verdict import expect
 _SECTION = "notices"
 
 
-def _counts(bench: Bench, sub: int, received: int, lost: int) -> None:
-    """Wait until the adapter counts so; what it counts in the end breaks the rule."""
+def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
+    """Wait for these counts of the adapter's subscriber; others break the rule."""
     bench.need(lambda: len(bench.events(sub)) >= received, "message")
     for _turn in range(40):
         if bench.counts(sub) == (received, lost):
@@ -21,10 +21,12 @@ def _counts(bench: Bench, sub: int, received: int, lost: int) -> None:
 
 
 @rule(
-    "lost-gap", lazy("Gaps in seq are lost, but not what came before the first message."), _SECTION, "losses"
+    "lost-gap",
+    lazy("Gaps in seq count as lost; messages before the first received one do not."),
+    _SECTION,
+    "losses",
 )
-def lost_gap(bench: Bench) -> None:
-    """See the rule."""
+def _lost_gap(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher = bench.publisher(topic, echoes=False)
     publisher.seq = 100
@@ -32,77 +34,82 @@ def lost_gap(bench: Bench) -> None:
     publisher.send(b"1")
     publisher.send(b"1", seq=105)
     publisher.send(b"1", seq=106)
-    _counts(bench, sub, 3, 3)
+    _expect_counts(bench, sub, 3, 3)
 
 
-@rule("lost-echo", lazy("What is missing between the last message and an echo is lost."), _SECTION, "losses")
-def lost_echo(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+@rule(
+    "lost-echo",
+    lazy("Messages missing between the last received one and an echo count as lost."),
+    _SECTION,
+    "losses",
+)
+def _lost_echo(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 5
     publisher.echo(next(iter(publisher.hellos)))
     publisher.send(b"1")
-    _counts(bench, sub, 2, 4)
+    _expect_counts(bench, sub, 2, 4)
 
 
-@rule("lost-bye", lazy("What is missing between the last message and a bye is lost."), _SECTION, "losses")
-def lost_bye(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+@rule(
+    "lost-bye",
+    lazy("Messages missing between the last received one and a bye count as lost."),
+    _SECTION,
+    "losses",
+)
+def _lost_bye(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 4
     publisher.bye()
-    _counts(bench, sub, 1, 3)
+    _expect_counts(bench, sub, 1, 3)
 
 
 @rule(
     "lost-last-seq",
-    lazy("What the master says was sent one renewal ago, and has not come, is lost."),
+    lazy("Messages missing up to the 'last_seqs' of the previous renewal count as lost."),
     _SECTION,
     "losses",
 )
-def lost_last_seq(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _lost_last_seq(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     bench.need(lambda: bool(bench.events(sub)), "message")
-    bench.master.change = lambda _heard, reply: (
+    bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "last_seqs": {publisher.id: 3}}}
         if reply["is"] == "renewed"
         else reply
     )
     for _turn in range(3):
-        bench.renewal(len(bench.master.heard))
-    _counts(bench, sub, 1, 2)
+        bench.renewal(len(bench.master.received))
+    _expect_counts(bench, sub, 1, 2)
 
 
 @rule(
     "lost-late",
-    lazy("What was counted as lost by the master's word is found again when it comes after all."),
+    lazy("Messages counted as lost because of 'last_seqs' no longer count once they are received."),
     _SECTION,
     "losses",
 )
-def lost_late(bench: Bench) -> None:
-    """See the rule."""
-    lost_last_seq(bench)
+def _lost_late(bench: Bench) -> None:
+    _lost_last_seq(bench)
     (publisher,) = bench.publishers
     publisher.send(b"1", seq=2)
     publisher.send(b"1", seq=3)
     (sub,) = {int(each["sub"]) for each in bench.adapter.events}
-    _counts(bench, sub, 3, 0)
+    _expect_counts(bench, sub, 3, 0)
 
 
 @rule(
     "lost-leap",
-    lazy("A message whose seq leaps by more than 2^32 is rejected, and nothing counts as lost."),
+    lazy("A message whose seq jumps by more than 2^32 is rejected without counting losses."),
     _SECTION,
     "losses",
 )
-def lost_leap(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _lost_leap(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.send(b"1", seq=2**40)
     publisher.send(b"1", seq=2)
-    _counts(bench, sub, 2, 0)
+    _expect_counts(bench, sub, 2, 0)

@@ -29,8 +29,10 @@ _SENT: Mapping[str, tuple[dict[str, object], bytes]] = {
 }
 
 
-def heard(bench: Bench, topic: str, level: int | None, msg_type: str = "json") -> ScriptedSubscriber:
-    """Return a subscriber of the tester that the adapter's publisher is connected to."""
+def connected_subscriber(
+    bench: Bench, topic: str, level: int | None, msg_type: str = "json"
+) -> ScriptedSubscriber:
+    """Return a subscriber of the tester, connected to the adapter's publisher; waits for the echo."""
     endpoint = bench.record("publisher", topic)["endpoints"][0]
     subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
     if level is not None:
@@ -39,23 +41,23 @@ def heard(bench: Bench, topic: str, level: int | None, msg_type: str = "json") -
 
 
 def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
-    """Return all messages that have come. What is none breaks the rule."""
+    """Return all received messages. A malformed one breaks the rule."""
     try:
         return subscriber.messages
     except WireError as error:
         raise broken(
-            _("a message can't be read ({code}): {reason}").format(code=error.code, reason=error.reason)
+            _("a message can't be parsed ({code}): {reason}").format(code=error.code, reason=error.reason)
         ) from error
 
 
-def settle(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
-    """Return a subscriber without a hello that hears the adapter's publisher by now."""
-    subscriber = heard(bench, topic, None)
+def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
+    """Return a subscriber without a hello once it receives from the adapter's publisher."""
+    subscriber = connected_subscriber(bench, topic, None)
     for _turn in range(200):
         bench.ask("publish", pub=pub, value={"warm": True})
         if bench.until(lambda: bool(subscriber.received), 0.05):
             return subscriber
-    raise broken(_("'{what}' did not come within {seconds:g} s").format(what="message", seconds=10.0))
+    raise broken(_("no '{what}' within {seconds:g} s").format(what="message", seconds=10.0))
 
 
 @rule(
@@ -63,12 +65,11 @@ def settle(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
     lazy("A subscriber without a hello gets messages of three parts: topic, header of 32 bytes, payload."),
     "messages",
 )
-def three_parts(bench: Bench) -> None:
-    """See the rule."""
+def _three_parts(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    other = heard(bench, topic, 3)
-    subscriber = settle(bench, topic, pub)
+    other = connected_subscriber(bench, topic, 3)
+    subscriber = _plain_subscriber(bench, topic, pub)
     count = len(subscriber.received)
     bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
     bench.need(lambda: len(subscriber.received) >= count + _BURST, "message")
@@ -81,20 +82,19 @@ def three_parts(bench: Bench) -> None:
 
 @rule(
     "batches-to-readers",
-    lazy("Batches go only to subscribers whose hello says that they read them."),
+    lazy("Batches are sent only to subscribers whose hello has level 3."),
     "batches",
 )
-def batches_to_readers(bench: Bench) -> None:
-    """See the rule."""
+def _batches_to_readers(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 1)
-    heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 1)
+    connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
     bench.need(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
     for parts in subscriber.raw:
         if len(parts) == 1 and unpack_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
-            raise broken(_("a batch came to a subscriber that said 'hello1/'"))
+            raise broken(_("it sent a batch to a subscriber whose hello has level 1"))
 
 
 def _last_seq(subscriber: ScriptedSubscriber) -> int:
@@ -103,17 +103,16 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
 
 @rule(
     "forms",
-    lazy("Whatever form messages come in, each can be read and none is lost."),
+    lazy("Messages can be sent in any form that the subscriber reads; none is lost or out of order."),
     "one-part",
 )
-def forms(bench: Bench) -> None:
-    """See the rule."""
+def _forms(bench: Bench) -> None:
     for level in (0, 1, 2, 3):
         topic = bench.new_topic()
         pub = bench.new_pub(topic)
-        subscriber = heard(bench, topic, level)
+        subscriber = connected_subscriber(bench, topic, level)
         bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
-        bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called at once
+        bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
         if seqs != list(range(1, _BURST + 1)):
             raise broken(_("the seqs are {seen}").format(seen=shown(seqs)))
@@ -127,14 +126,13 @@ def forms(bench: Bench) -> None:
     lazy("A header has version 1, the codec's number, no unknown flags, the size and the publisher's id."),
     "messages",
 )
-def header(bench: Bench) -> None:
-    """See the rule."""
+def _header(bench: Bench) -> None:
     for msg_type, (members, _payload) in _SENT.items():
         topic = bench.new_topic()
         pub = bench.new_pub(topic, msg_type)
-        subscriber = heard(bench, topic, 0, msg_type)
+        subscriber = connected_subscriber(bench, topic, 0, msg_type)
         bench.ask("publish", pub=pub, **members)
-        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called at once
+        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         found = messages_of(subscriber)[0].header
         expect("header.codec", found.codec, codec_for(msg_type).number)
         expect("header.flags", found.flags, 0)
@@ -144,17 +142,16 @@ def header(bench: Bench) -> None:
 
 @rule(
     "payload",
-    lazy("A payload is what the codec says: JSON and text in UTF-8, bytes as they are, msgpack."),
+    lazy("Payloads are encoded by the codec: JSON and text as UTF-8, bytes unchanged, msgpack."),
     "messages",
 )
-def payload(bench: Bench) -> None:
-    """See the rule."""
+def _payload(bench: Bench) -> None:
     for msg_type, (members, wanted) in _SENT.items():
         topic = bench.new_topic()
         pub = bench.new_pub(topic, msg_type)
-        subscriber = heard(bench, topic, 0, msg_type)
+        subscriber = connected_subscriber(bench, topic, 0, msg_type)
         bench.ask("publish", pub=pub, **members)
-        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called at once
+        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         data = bytes(read_parts(subscriber.raw[0])[0].payload)
         try:
             if msg_type == "json":
@@ -165,7 +162,7 @@ def payload(bench: Bench) -> None:
                 expect("payload", data, wanted)
         except ValueError as error:
             raise broken(
-                _("the payload {seen} is no {msg_type}").format(seen=shown(data), msg_type=msg_type)
+                _("the payload {seen} is not valid {msg_type}").format(seen=shown(data), msg_type=msg_type)
             ) from error
 
 
@@ -174,12 +171,11 @@ def payload(bench: Bench) -> None:
     lazy("Seqs also count messages that were published without subscribers."),
     "messages",
 )
-def seq_unheard(bench: Bench) -> None:
-    """See the rule."""
+def _seq_unheard(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
     bench.ask("publish", pub=pub, value={"a": 1}, count=7)
-    subscriber = heard(bench, topic, 0)
+    subscriber = connected_subscriber(bench, topic, 0)
     bench.ask("publish", pub=pub, value={"a": 1})
     bench.need(lambda: bool(subscriber.raw), "message")
     expect("header.seq", messages_of(subscriber)[0].header.seq, 8)
@@ -187,19 +183,18 @@ def seq_unheard(bench: Bench) -> None:
 
 @rule(
     "stamp",
-    lazy("Stamps are nanoseconds since 1970, and do not go back."),
+    lazy("Stamps are nanoseconds since 1970 and never decrease."),
     "messages",
 )
-def stamp(bench: Bench) -> None:
-    """See the rule."""
+def _stamp(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    subscriber = heard(bench, topic, 3)
+    subscriber = connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=20)
     bench.need(lambda: len(messages_of(subscriber)) >= 20, "message")
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
     now = time.time_ns()
     if any(abs(now - each) > _STAMP_NS for each in stamps):
-        raise broken(_("the stamp is {seen}; it is {now} now").format(seen=stamps[0], now=now))
+        raise broken(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
     if stamps != sorted(stamps):
         raise broken(_("the stamps are {seen}").format(seen=shown(stamps)))

@@ -21,8 +21,8 @@ _SENT: Mapping[str, tuple[bytes, object]] = {
 }
 
 
-def _told(bench: Bench, sub: int, count: int, first: int = 1) -> None:
-    """Wait for so many messages, and compare their seqs."""
+def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
+    """Wait for ``count`` messages with consecutive seqs from ``first``."""
     bench.need(lambda: len(bench.events(sub)) >= count, "message")
     bench.wait(0.05)
     seqs = [each.get("seq") for each in bench.events(sub)]
@@ -30,12 +30,11 @@ def _told(bench: Bench, sub: int, count: int, first: int = 1) -> None:
 
 
 @rule("reads-parts", lazy("A subscriber reads messages of three parts, of every codec."), "messages")
-def reads_parts(bench: Bench) -> None:
-    """See the rule."""
+def _reads_parts(bench: Bench) -> None:
     for msg_type, (payload, value) in _SENT.items():
-        publisher, sub = bench.heard_publisher(bench.new_topic(), msg_type)
+        publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
-        _told(bench, sub, 1)
+        _expect_seqs(bench, sub, 1)
         event = bench.events(sub)[0]
         expect("payload", base64.b64decode(str(event.get("payload"))), payload)
         expect("codec", event.get("codec"), msg_type)
@@ -45,81 +44,73 @@ def reads_parts(bench: Bench) -> None:
 
 
 @rule("reads-one-part", lazy("A subscriber reads messages of one part."), "one-part", "hello1")
-def reads_one_part(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _reads_one_part(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("one", "parts", "one", "one"):
         publisher.send(b'{"a":1}', form)
-    _told(bench, sub, 4)
+    _expect_seqs(bench, sub, 4)
 
 
 @rule("reads-batches", lazy("A subscriber reads batches, of 1 to 256 messages."), "batches", "hello3")
-def reads_batches(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _reads_batches(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send_batch([b'{"a":1}', b'{"b":22}', b"[]"])
     publisher.send(b'{"a":1}', "one")
     publisher.send_batch([b"1"])
     publisher.send_batch([b'{"n":%d}' % number for number in range(256)])
-    _told(bench, sub, 261)
+    _expect_seqs(bench, sub, 261)
     payloads = [base64.b64decode(str(each.get("payload"))) for each in bench.events(sub)]
     expect("payload", payloads[:5], [b'{"a":1}', b'{"b":22}', b"[]", b'{"a":1}', b"1"])
     expect("payload", payloads[260], b'{"n":255}')
 
 
 @rule("reads-alone", lazy("A subscriber reads messages that are sent under its hello."), "notices")
-def reads_alone(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _reads_alone(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("alone", "parts", "alone"):
         publisher.send(b'{"a":1}', form)
-    _told(bench, sub, 3)
+    _expect_seqs(bench, sub, 3)
 
 
 @rule(
     "latched-once",
-    lazy("A latched message is delivered, but not again when its seq was heard."),
+    lazy("A latched message is delivered unless a message with its seq was received before."),
     "notices",
     "latched",
 )
-def latched_once(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _latched_once(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}', "alone", flags=LATCHED)
     publisher.send(b'{"a":1}', "alone", seq=1, flags=LATCHED)
     publisher.send(b'{"a":2}', flags=LATCHED)
     publisher.send(b'{"a":2}', "alone", seq=2, flags=LATCHED)
-    _told(bench, sub, 2)
+    _expect_seqs(bench, sub, 2)
 
 
 @rule(
     "other-topics",
-    lazy("A subscriber compares the whole topic: what only begins like it is not for it."),
+    lazy("A subscriber compares the whole topic and ignores topics that only share its prefix."),
     "messages",
 )
-def other_topics(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _other_topics(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     name = publisher.topic
     publisher.topic = f"{name}2"
     publisher.send(b'{"a":1}', seq=1)
     publisher.topic = name
     publisher.send(b'{"a":1}', seq=1)
-    _told(bench, sub, 1)
+    _expect_seqs(bench, sub, 1)
 
 
 @rule(
     "read",
-    lazy(
-        "A subscriber answers each echo but the first with what it has read, by a filter that it takes back."
-    ),
+    lazy("A subscriber answers each echo but the first by subscribing to a read filter and removing it."),
     "what-is-under-way",
     "hello2",
 )
-def read(bench: Bench) -> None:
-    """See the rule."""
+def _read(bench: Bench) -> None:
     topic = bench.new_topic()
-    publisher, sub = bench.heard_publisher(topic)
+    publisher, sub = bench.subscribed_publisher(topic)
     before = [parse_read(each.what) for each in publisher.filters]
     if any(each is not None for each in before):
         raise broken(_("it answered the first echo"))
@@ -127,7 +118,7 @@ def read(bench: Bench) -> None:
     publisher.send(b'{"a":1}')
     publisher.echo(next(iter(publisher.hellos)))
     bench.need(lambda: any(parse_read(each.what) for each in publisher.filters), "read")
-    _told(bench, sub, 2)
+    _expect_seqs(bench, sub, 2)
     answers = [each for each in publisher.filters if parse_read(each.what) is not None]
     found = parse_read(answers[0].what)
     expect("read.subscriber", found and found.subscriber, bench.record("subscriber", topic)["id"])
@@ -141,12 +132,11 @@ def read(bench: Bench) -> None:
 
 @rule(
     "receives-in-order",
-    lazy("A subscriber gets the messages of a publisher in their order, each once."),
+    lazy("A subscriber delivers the messages of a publisher in order, each once."),
     "messages",
 )
-def receives_in_order(bench: Bench) -> None:
-    """See the rule."""
-    publisher, sub = bench.heard_publisher(bench.new_topic())
+def _receives_in_order(bench: Bench) -> None:
+    publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for number in range(500):
         publisher.send(b'{"n":%d}' % number)
     bench.need(lambda: len(bench.events(sub)) >= 500, "message")

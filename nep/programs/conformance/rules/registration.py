@@ -1,4 +1,4 @@
-"""Rules about what a client tells the master of itself."""
+"""Rules about records and requests sent to the master."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _text(what: str, record: Mapping[str, Any], name: str) -> str:
     value = record.get(name)
     if not isinstance(value, str):
         raise broken(
-            _("{what} is {seen}; {wanted} is expected").format(
+            _("{what} is {seen}, expected {wanted}").format(
                 what=f"{what}.{name}", seen=shown(value), wanted="text"
             )
         )
@@ -32,7 +32,7 @@ def _text(what: str, record: Mapping[str, Any], name: str) -> str:
 def _integer(what: str, value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
         raise broken(
-            _("{what} is {seen}; an integer from {least} to {most} is expected").format(
+            _("{what} is {seen}, expected an integer from {least} to {most}").format(
                 what=what, seen=shown(value), least=least, most=most
             )
         )
@@ -44,8 +44,7 @@ def _integer(what: str, value: object, least: int, most: int) -> int:
     lazy("The record of a node has its id, name, host, process, language and generation."),
     "node",
 )
-def node_record(bench: Bench) -> None:
-    """See the rule."""
+def _node_record(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic)
     bench.record("subscriber", topic)
@@ -55,7 +54,7 @@ def node_record(bench: Bench) -> None:
         return
     if not _NODE_ID.fullmatch(_text("node", node, "id")):
         raise broken(
-            _("node.id is {seen}; 16 small hexadecimal digits are expected").format(seen=shown(node["id"]))
+            _("node.id is {seen}, expected 16 lowercase hexadecimal digits").format(seen=shown(node["id"]))
         )
     expect("node.name", node.get("name"), bench.node_name)
     _text("node", node, "host")
@@ -67,12 +66,11 @@ def node_record(bench: Bench) -> None:
 
 @rule(
     "node-key",
-    lazy("Ids come from the node's key and numbers, by SHA-256."),
+    lazy("Ids are SHA-256 hashes of the node's key and a number."),
     "who-speaks-for-a-node",
     "keys",
 )
-def node_key(bench: Bench) -> None:
-    """See the rule."""
+def _node_key(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     record = bench.record("publisher", topic)
@@ -94,8 +92,7 @@ def node_key(bench: Bench) -> None:
     lazy("The record of a publisher has its id, topic, type, the codec's name and an endpoint."),
     "publisher",
 )
-def publisher_record(bench: Bench) -> None:
-    """See the rule."""
+def _publisher_record(bench: Bench) -> None:
     for msg_type in ("json", "string", "bytes", "msgpack"):
         topic = bench.new_topic()
         bench.new_pub(topic, msg_type)
@@ -111,11 +108,10 @@ def publisher_record(bench: Bench) -> None:
 
 @rule(
     "publisher-port",
-    lazy("A publisher's port is none of those that belong to the original NEP."),
+    lazy("A publisher does not use the ports of the original NEP."),
     "who-connects",
 )
-def publisher_port(bench: Bench) -> None:
-    """See the rule."""
+def _publisher_port(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     for endpoint in bench.record("publisher", topic).get("endpoints", ()):
@@ -129,8 +125,7 @@ def publisher_port(bench: Bench) -> None:
     lazy("The record of a subscriber has its id, topic and type."),
     "subscriber",
 )
-def subscriber_record(bench: Bench) -> None:
-    """See the rule."""
+def _subscriber_record(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic, "string")
     record = bench.record("subscriber", topic)
@@ -141,17 +136,16 @@ def subscriber_record(bench: Bench) -> None:
 
 @rule(
     "request-form",
-    lazy("A request is one part: a map with 'do', 'call' and 'what'; each has another call number."),
+    lazy("A request is one part, a map with 'do', 'call' and 'what'; call numbers are unique."),
     "the-master",
 )
-def request_form(bench: Bench) -> None:
-    """See the rule."""
+def _request_form(bench: Bench) -> None:
     bench.new_pub(bench.new_topic())
     bench.new_sub(bench.new_topic())
     bench.close_sub(bench.new_sub(bench.new_topic()))
     calls: dict[tuple[str, int], object] = {}
-    for each in bench.master.heard:
+    for each in bench.master.received:
         if each.problem:
-            raise broken(_("a request came with {problem}").format(problem=each.problem))
+            raise broken(_("a request is malformed: {problem}").format(problem=each.problem))
         if calls.setdefault((each.sender, each.call), (each.do, each.what)) != (each.do, each.what):
             raise broken(_("two requests have the call number {call}").format(call=each.call))

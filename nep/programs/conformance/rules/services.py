@@ -34,16 +34,16 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
 
 
 def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
-    """Wait for the answers to these calls; whatever has come by then."""
+    """Wait for the answers to these calls, and return all answers received."""
     found: dict[int | None, Reply] = {}
 
-    def have_come() -> bool:
+    def has_all() -> bool:
         while socket.poll(0):
             read = NATIVE.read_answer(socket.recv_multipart())
             found[read.number] = read.reply
         return wanted <= found.keys()
 
-    bench.need(have_come, "answer")
+    bench.need(has_all, "answer")
     return found
 
 
@@ -53,8 +53,7 @@ def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[
     "services.md#who-meets",
     "services",
 )
-def service_record(bench: Bench) -> None:
-    """See the rule."""
+def _service_record(bench: Bench) -> None:
     name = bench.new_topic()
     bench.ask("serve", service=name)
     record = bench.record("publisher", topic_of(name))
@@ -64,12 +63,11 @@ def service_record(bench: Bench) -> None:
 
 @rule(
     "service-answer",
-    lazy("A server answers each call with its number, in the codec of the call."),
+    lazy("A server answers each call with the call's number and codec."),
     _SECTION,
     "services",
 )
-def service_answer(bench: Bench) -> None:
-    """See the rule."""
+def _service_answer(bench: Bench) -> None:
     name = bench.new_topic()
     bench.ask("serve", service=name)
     with _socket(bench, zmq.DEALER) as socket:
@@ -84,12 +82,11 @@ def service_answer(bench: Bench) -> None:
 
 @rule(
     "service-malformed",
-    lazy("A server does not answer malformed calls, refuses those it can't decode, and goes on."),
+    lazy("A server ignores malformed calls, refuses calls that it can't decode, and keeps serving."),
     _SECTION,
     "services",
 )
-def service_malformed(bench: Bench) -> None:
-    """See the rule."""
+def _service_malformed(bench: Bench) -> None:
     name = bench.new_topic()
     bench.ask("serve", service=name)
     (head, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
@@ -124,7 +121,7 @@ def _server(bench: Bench, name: str) -> Iterator[zmq.Socket[bytes]]:
 
 
 def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
-    """Answer the call that the adapter has begun, and return what it says of the answer."""
+    """Answer the pending call of the adapter, and return the value that its client got."""
     bench.need(lambda: bool(socket.poll(0)), "call")
     sender, *parts = socket.recv_multipart()
     call = NATIVE.read_call(parts)
@@ -139,12 +136,11 @@ def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) 
 
 @rule(
     "service-call",
-    lazy("A client calls the server that the master names, and gives back its answer."),
+    lazy("A client calls the server that the master lists and returns its answer."),
     _SECTION,
     "services",
 )
-def service_call(bench: Bench) -> None:
-    """See the rule."""
+def _service_call(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
         number = bench.adapter.begin("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
@@ -154,39 +150,37 @@ def service_call(bench: Bench) -> None:
 
 @rule(
     "service-error",
-    lazy("A client tells an error, and a call that was refused, from an answer."),
+    lazy("A client reports errors and refused calls as such, not as answers."),
     _SECTION,
     "services",
 )
-def service_error(bench: Bench) -> None:
-    """See the rule."""
+def _service_error(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
         for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REFUSED, "")):
             number = bench.adapter.begin("call", service=name, value={}, timeout_s=_CALL_S)
             try:
-                value = _called(bench, socket, number, failure(kind, error, "the tester says no"))
+                value = _called(bench, socket, number, failure(kind, error, "rejected by the tester"))
             except AdapterError:
                 continue
-            raise broken(_("it took it for the answer {seen}").format(seen=shown(value)))
+            raise broken(_("it returned {seen} as the answer").format(seen=shown(value)))
 
 
 @rule(
     "pattern",
-    lazy("A subscriber with wildcards hears the topics that match, with a hello for each of them."),
+    lazy("A subscriber with wildcards receives all matching topics and sends a hello for each."),
     "the-master",
     "patterns",
 )
-def pattern(bench: Bench) -> None:
-    """See the rule."""
+def _pattern(bench: Bench) -> None:
     place = bench.new_topic()
     sub = bench.new_sub(f"{place}/*", pattern=True)
     expect("subscriber.pattern", bench.record("subscriber", f"{place}/*").get("pattern"), True)
     publishers = [bench.publisher(f"{place}/{name}") for name in ("one", "two")]
     for publisher in publishers:
-        bench.need(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called at once
+        bench.need(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
         if topic_part(publisher.topic) not in [each.what for each in publisher.filters]:
-            raise broken(_("the filter of {topic} did not come").format(topic=publisher.topic))
+            raise broken(_("it did not subscribe to {topic}").format(topic=publisher.topic))
         publisher.send(b'{"a":1}')
     bench.need(lambda: len(bench.events(sub)) >= 2, "message")
     topics = {each.get("topic") for each in bench.events(sub)}
