@@ -1,8 +1,8 @@
-"""The adapter of nep itself for the conformance tester: see docs/wire-check.md.
+"""Adapter of the nep library for the conformance tester: see docs/wire-check.md.
 
     nep wire check -- python examples/conformance_adapter.py
 
-It reads requests from stdin and writes replies and events to stdout: one JSON object a line.
+Reads requests from stdin and writes replies and events to stdout, one JSON object per line.
 """
 
 import base64
@@ -20,21 +20,21 @@ FEATURES = [
 
 
 class Adapter:
-    """Do with nep what the tester says. Messages are told by the node's thread, replies by the main one."""
+    """Carries out requests. Events are written by the node's thread, replies by the main thread."""
 
     def __init__(self):
         self.node = None
         self.publishers, self.subscribers, self.clients = {}, {}, {}
         self.writing = threading.Lock()
 
-    def say(self, said):
-        """Write a line."""
+    def write(self, line):
+        """Write an object as one line."""
         with self.writing:
-            sys.stdout.write(json.dumps(said) + "\n")
+            sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
 
     def do(self, request):
-        """Carry out a request; its result."""
+        """Carry out a request and return its result."""
         return getattr(self, f"_do_{request.pop('do')}")(**request)
 
     def _do_features(self):
@@ -58,19 +58,19 @@ class Adapter:
 
     def _do_subscriber(self, topic, type, latest=False, pattern=False):  # noqa: A002 - the name in the protocol
         number = len(self.subscribers) + 1
-        self.subscribers[number] = None  # its messages may come before it is made
+        self.subscribers[number] = None  # messages may arrive before new_sub returns
         self.subscribers[number] = self.node.new_sub(
             topic,
             type,
             keep="latest" if latest else "all",
-            sink=lambda messages: [self.tell(number, each) for each in messages],
+            sink=lambda messages: [self.report(number, each) for each in messages],
             wildcards=pattern,
         )
         return {"sub": number}
 
-    def tell(self, number, message):
-        """Say that a subscriber has received a message."""
-        said = {
+    def report(self, number, message):
+        """Write the event of a received message."""
+        event = {
             "event": "message",
             "sub": number,
             "topic": message.topic,
@@ -83,10 +83,10 @@ class Adapter:
         try:
             if message.codec in {"json", "string", "msgpack"}:
                 json.dumps(message.payload)
-                said["value"] = message.payload
+                event["value"] = message.payload
         except (DecodeError, TypeError, ValueError):
-            pass  # it can't be decoded, or has no form in JSON
-        self.say(said)
+            pass  # not decodable, or not representable in JSON
+        self.write(event)
 
     def _do_counts(self, sub=None, pub=None):
         if pub is not None:
@@ -103,7 +103,7 @@ class Adapter:
         return {}
 
     def _do_serve(self, service):
-        self.node.new_server(service, lambda asked: asked, threads=1)
+        self.node.new_server(service, lambda payload: payload, threads=1)
         return {}
 
     def _do_call(self, service, value, timeout_s):
@@ -117,17 +117,17 @@ class Adapter:
         return {}
 
     def run(self):
-        """Serve requests until the node is closed, or there are no more."""
+        """Serve requests until the node is closed or stdin ends."""
         for line in sys.stdin:
             request = json.loads(line)
             number = request.pop("id")
             has_node = self.node is not None
             try:
                 result = self.do(request)
-            except Exception as error:  # noqa: BLE001 - the tester is told
-                self.say({"re": number, "error": f"{type(error).__name__}: {error}"})
+            except Exception as error:  # noqa: BLE001 - reported to the tester
+                self.write({"re": number, "error": f"{type(error).__name__}: {error}"})
                 continue
-            self.say({"re": number, **result})
+            self.write({"re": number, **result})
             if has_node and self.node is None:
                 return
         if self.node is not None:

@@ -1,7 +1,7 @@
 """The smallest client of the native wire, on pyzmq and msgpack alone: see docs/smallest-client.md.
 
 python smallest_client.py talk      publish on the topic "example"
-python smallest_client.py listen    print what is published there
+python smallest_client.py listen    print its messages
 """
 
 import json
@@ -21,7 +21,7 @@ JSON = 1
 
 
 class Node:
-    """A program's connection to the master, with its publishers and subscribers. Not thread-safe."""
+    """Connection to the master, with publishers and subscribers. Not thread-safe."""
 
     def __init__(self, name, master=None):
         self.key = secrets.token_hex(16)
@@ -45,27 +45,27 @@ class Node:
         return self.sockets[-1]
 
     def register(self, do, kind, record, counts):
-        """Register a publisher or subscriber, whose id comes from the node's key."""
+        """Register a publisher or subscriber; its id is derived from the node's key."""
         number = len(self.records["publishers"]) + len(self.records["subscribers"]) + 1
         digest = sha256(f"{self.key}/{number}".encode()).digest()
         record |= {"id": int.from_bytes(digest[:8], "little") >> 1 or 1, "number": number}
         counts |= {"id": record["id"]}
         self.records[kind].append(record)
         self.counts[kind].append(counts)
-        call = self.tell(do, node=self.record, **{kind[:-1]: record})
+        call = self.request(do, node=self.record, **{kind[:-1]: record})
         while self.master.poll(2000):
-            if self.follow() == call:
+            if self.process() == call:
                 return
         raise TimeoutError("no master answers")
 
-    def tell(self, do, **what):
+    def request(self, do, **what):
         """Send a request, and return its number."""
         self.calls += 1
         self.master.send(msgpack.packb({"do": do, "call": self.calls, "what": what}))
         return self.calls
 
-    def follow(self):
-        """Do what one answer or push asks for; return the number of the request that it answers."""
+    def process(self):
+        """Process one reply or push; return the number of the request that it answers."""
         answer = msgpack.unpackb(self.master.recv(), strict_map_key=False)  # last_seqs has integer keys
         name, call, what = answer["is"], answer["re"], answer["what"]
         if name == "refused":
@@ -75,25 +75,27 @@ class Node:
         if name in {"added", "found"}:
             self.epoch = what["epoch"]
         elif what.get("again") or self.epoch not in {0, what["epoch"]}:
-            self.tell("join", node=self.record, epoch=self.epoch, **self.records)
+            self.request("join", node=self.record, epoch=self.epoch, **self.records)
         found = [*what.get("publishers", ()), *([what["publisher"]] if name == "publisher+" else ())]
         for each in found + [one for topic in what.get("topics", ()) for one in topic["publishers"]]:
             for subscriber in self.subscribers:
                 if subscriber.topic == each["publisher"]["topic"] and each["publisher"]["endpoints"]:
-                    subscriber.socket.connect(each["publisher"]["endpoints"][0])  # twice is once
+                    subscriber.socket.connect(
+                        each["publisher"]["endpoints"][0]
+                    )  # no effect when already connected
         return call
 
     def serve(self):
-        """Renew the lease when it is time, and follow the master. Call it at least once a second."""
+        """Renew the lease when due, and process replies and pushes. Call at least once a second."""
         if time.monotonic() >= self.renew_at and self.epoch:
             self.renew_at = time.monotonic() + 1
-            self.tell("renew", node_id=self.id, epoch=self.epoch, revision=self.revision, **self.counts)
+            self.request("renew", node_id=self.id, epoch=self.epoch, revision=self.revision, **self.counts)
         while self.master.poll(0):
-            self.follow()
+            self.process()
 
     def close(self):
-        """Leave, and close all sockets."""
-        self.tell("leave", node_id=self.id)
+        """Leave the network and close all sockets."""
+        self.request("leave", node_id=self.id)
         self.master.poll(1000)
         self.context.destroy()
 
@@ -104,8 +106,10 @@ class Publisher:
     def __init__(self, node, topic):
         self.topic, self.seq = topic, 0
         self.socket = node.socket(zmq.XPUB)
-        self.socket.linger = 1000  # what is queued goes out at the end; nobody says whether all was taken
-        self.socket.sndhwm = 50_000  # libzmq drops the newest beyond that; bound the bytes of large messages
+        self.socket.linger = 1000  # send queued messages before closing; their delivery is not confirmed
+        self.socket.sndhwm = (
+            50_000  # libzmq drops the newest beyond this; limit the bytes of large messages, too
+        )
         port = self.socket.bind_to_random_port("tcp://127.0.0.1", 20000, 30000)
         self.counts = {"count": 0, "bytes": 0, "last_seq": 0}
         record = {
@@ -117,7 +121,7 @@ class Publisher:
         node.register("publisher+", "publishers", record, self.counts)
 
     def publish(self, value):
-        """Send a value to all subscribers that are connected."""
+        """Send a value to all connected subscribers."""
         payload = json.dumps(value, allow_nan=False).encode()
         self.seq += 1
         self.counts |= {"count": self.seq, "last_seq": self.seq, "bytes": self.counts["bytes"] + len(payload)}
@@ -132,12 +136,12 @@ class Subscriber:
         self.topic, self.node = topic, node
         self.socket = node.socket(zmq.SUB)
         self.socket.subscribe(topic.encode() + b"\0")
-        self.counts = {"received": 0, "lost": None}  # nil: it doesn't count losses
+        self.counts = {"received": 0, "lost": None}  # nil: losses are not counted
         node.subscribers.append(self)
         node.register("subscriber+", "subscribers", {"topic": topic, "msg_type": "json"}, self.counts)
 
     def receive(self, timeout_s):
-        """Return the next value, or None."""
+        """Return the next value, or None after the timeout."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             self.node.serve()
@@ -164,7 +168,7 @@ def main():
         subscriber = Subscriber(node, "example")
         while True:
             value = subscriber.receive(1.0)
-            print("nothing for a second" if value is None else value)
+            print("no message within 1 s" if value is None else value)
     finally:
         node.close()
 
