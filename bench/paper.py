@@ -1,4 +1,4 @@
-"""The paper's two scenarios: ping-pong between two programs, by nep and by what there is beside it.
+"""The paper's two scenarios: round trips between two programs, by nep and by other libraries.
 
     python3 dev.py bench paper                  both: four minutes, and most of an hour for 200 trips a size
     python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures
@@ -42,6 +42,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import paper_clients
 from link import HOSTS, LinkError, Wifi, joined, why_no_networks
 from paper_ends import KINDS
 from paper_figures import AGAIN, PLAIN, ROWS, does_count, goals, report, write
@@ -214,7 +215,7 @@ def versions() -> dict[str, str]:
     if not asked.returncode:
         found["nep-studio"] += f" ({asked.stdout.strip()})"
     rospy = next(iter(metadata.distributions(name="rospy", path=list(PLACES))), None)
-    return found | ({"rospy": rospy.version} if rospy else {})
+    return found | ({"rospy": rospy.version} if rospy else {}) | paper_clients.versions()
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:

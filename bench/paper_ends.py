@@ -28,7 +28,12 @@ from contextlib import ExitStack
 from typing import Any
 from urllib.parse import urlsplit
 
+from paper_clients import ROWS as CLIENTS
+
 KINDS = ("string", "json", "bytes")
+NUMBERS = "numbers"
+TYPES = {**{kind: kind for kind in KINDS}, NUMBERS: "json"}
+"""Message type of each kind of nep's own ends."""
 WAIT_S = 20.0
 """A message that has not come back after this time is lost."""
 LOOK_S = 0.01
@@ -36,9 +41,11 @@ LEAVE_S = 5.0
 
 
 def payload(kind: str, size: int) -> object:
-    """A new payload of `size` characters or bytes; a map with one text for `json`."""
+    """Return a new payload of about ``size`` encoded bytes; a map with one text for `json`."""
     if kind == "bytes":
         return os.urandom(size)
+    if kind == NUMBERS:
+        return {"values": [round(0.5 * number, 1) for number in range(size // 8)]}
     mark = "".join(random.choices("abcdefghijklmnop", k=min(size, 16)))
     text = mark + "x" * (size - len(mark))
     return {"data": text} if kind == "json" else text
@@ -230,8 +237,8 @@ class NepEnd(Listening):
         node = self.closes.enter_context(
             self._nep.node(self.role, self.transport, master=master, wait_s=WAIT_S)
         )
-        self._in = {kind: node.new_sub(f"{self.back}_{kind}", kind) for kind in KINDS}
-        self._out = {kind: node.new_pub(f"{self.there}_{kind}", kind) for kind in KINDS}
+        self._in = {kind: node.new_sub(f"{self.back}_{kind}", each) for kind, each in TYPES.items()}
+        self._out = {kind: node.new_pub(f"{self.there}_{kind}", each) for kind, each in TYPES.items()}
         wait_until(lambda: all(each.subscribers for each in self._out.values()))
 
     def send(self, kind: str, value: object) -> None:
@@ -402,8 +409,9 @@ ENDS: dict[str, tuple[type[End], type[End]]] = {
     "zenoh": (ZenohEnd, ZenohEnd),
     "rospy": (RospyEnd, RospyEnd),
     "rosbridge": (BridgedRospyEnd, RoslibpyEnd),
+    **dict.fromkeys(CLIENTS, (NepEnd, NepEnd)),
 }
-"""Each row's ping and pong."""
+"""Ping and pong of each row; pong of `paper_clients.ROWS` is a program in another language."""
 
 
 def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:

@@ -29,7 +29,7 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 JUDGED, LARGEST = 16 * 1024, 8192 * 1024
 TOKENS = ROOT / "resources" / "theme" / "tokens.json"
 FONTS = ROOT / "resources" / "fonts"
-MARKS = "osD^vPX*"
+MARKS = "osD^vPX<>*"
 
 Found = Mapping[str, Any]
 
@@ -276,7 +276,9 @@ def draw(found: Found, folder: Path) -> list[Path]:
 def plot(figure: Figure, scenario: Scenario, colours: Mapping[str, Any]) -> None:
     """A panel for each kind, and what the lines are below them."""
     others = [row for row in ROWS if row != PLAIN]
-    palette = dict(zip(others, (*colours["series"], colours["stop"]), strict=True))
+    palette = dict(
+        zip(others, (*colours["series"], colours["run"], colours["warn"], colours["stop"]), strict=True)
+    )
     palette[PLAIN] = colours["textTertiary"]
     panels = figure.subplots(1, len(scenario.kinds), sharey=True, squeeze=False)[0]
     for axes, kind in zip(panels, scenario.kinds, strict=True):

@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from paper_ends import KINDS
+import paper_clients
+from paper_ends import KINDS, TYPES
 from paper_original import END as ORIGINAL_END
 from paper_original import KINDS as ORIGINAL_KINDS
 from paper_original import ROW as ORIGINAL
@@ -87,13 +88,15 @@ class Places:
             files.append(str(path))
         return files[0], files[1]
 
-    def program(self, row: str) -> tuple[str, ...]:
-        """The command of an end, before its arguments."""
+    def program(self, row: str, role: str) -> tuple[str, ...]:
+        """Return the command of an end, with its arguments except host and place."""
+        if role == "pong" and row in paper_clients.ROWS:
+            return paper_clients.pong(row, self.folder, TYPES)
         if row != ORIGINAL:
-            return (sys.executable, str(HERE / "paper_ends.py"))
+            return (sys.executable, str(HERE / "paper_ends.py"), role, row)
         path = self.folder / "paper_original_end.py"
         path.write_text(ORIGINAL_END, encoding="utf-8")
-        return (self.python2, "-E", str(path))  # without PYTHONPATH, which leads to our nep
+        return (self.python2, "-E", str(path), role, row)  # without PYTHONPATH, which leads to our nep
 
 
 class Process:
@@ -146,11 +149,10 @@ class Pair:
 
     def __init__(self, row: str, places: Places) -> None:
         own, others = places.of(row)
-        program = places.program(row)
         self.kinds = ORIGINAL_KINDS if row == ORIGINAL else KINDS
         commands = (
-            (*program, "ping", row, places.hosts[0], own),
-            (*places.elsewhere, *program, "pong", row, places.hosts[1], others),
+            (*places.program(row, "ping"), places.hosts[0], own),
+            (*places.elsewhere, *places.program(row, "pong"), places.hosts[1], others),
         )
         with ExitStack() as stack:
             self._ends = [Process(command, places.environment) for command in commands]
@@ -274,6 +276,10 @@ def around(
             places = replace(places, ros_master=master)
         except NotRunError as error:
             missing["rospy"] = str(error)
+        for row in paper_clients.ROWS:
+            why = "it is measured in L-local only" if elsewhere else paper_clients.why_missing(row)
+            if why:
+                missing[row] = why
         if elsewhere:
             missing["nep over nanomsg"] = "nep's back end nanomsg joins the nodes of one computer only"
         try:

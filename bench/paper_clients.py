@@ -1,0 +1,48 @@
+"""Rows of `paper.py` in which a Python program pings a program with nep.js or with NEP for C#."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+HERE = Path(__file__).parent
+CLIENTS = HERE.parent / "clients"
+JAVASCRIPT, CSHARP = "nep with nep.js", "nep with C#"
+ROWS = (JAVASCRIPT, CSHARP)
+PACKAGE = CLIENTS / "javascript" / "dist" / "index.js"
+JSON_LIBRARY = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")
+
+
+def why_missing(row: str) -> str:
+    """Return why a row can't be run on this computer, or an empty string."""
+    if row == JAVASCRIPT:
+        has_node = shutil.which("node") and PACKAGE.is_file()
+        return "" if has_node else "needs node, and `npm ci && npm run build` in clients/javascript"
+    has_mono = shutil.which("mcs") and shutil.which("mono") and JSON_LIBRARY.is_file()
+    return "" if has_mono else "needs mono-mcs, mono-runtime and libnewtonsoft-json5.0-cil"
+
+
+def pong(row: str, folder: Path, types: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the command of pong; ``types`` has the message type of each kind. C# is built in ``folder``."""
+    if row == JAVASCRIPT:
+        return ("node", str(HERE / "pong.cjs"), str(PACKAGE), json.dumps(types))
+    program = folder / "Pong.exe"
+    if not program.exists():
+        sources = [*sorted((CLIENTS / "csharp" / "src").rglob("*.cs")), HERE / "Pong.cs"]
+        options = ("-langversion:7", "-optimize+", "-nowarn:0649,0169", f"-r:{JSON_LIBRARY}")
+        subprocess.run(["mcs", *options, f"-out:{program}", *map(str, sources)], check=True)
+    return ("mono", str(program), json.dumps(types))
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Node.js and Mono, as far as they are installed."""
+    found = {}
+    for name, command in (("Node.js", "node"), ("Mono", "mono")):
+        if shutil.which(command):
+            done = subprocess.run([command, "--version"], capture_output=True, text=True, check=False)
+            words = done.stdout.split("\n", 1)[0].removeprefix("Mono JIT compiler version ").split()
+            found[name] = words[0].removeprefix("v") if words else "?"
+    return found
