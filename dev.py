@@ -13,7 +13,7 @@ Ubuntu), the virtual environment ``.venv``, the pinned packages in it, and a vir
     guide-pictures the pictures of the guide, in each language
     reference      the pages of docs/api, from the docstrings
     package        the installers of this system and the client libraries, into dist/; -- --system clients
-                   makes only those, -- --system windows Windows' installers (by Wine)
+                   builds only the libraries, -- --system windows the Windows installers (by Wine)
     setup          only make the environment
 
 What stands behind the command goes to the program that it starts. Standard library only.
@@ -199,7 +199,7 @@ def script(
     python = make_environment(computer, ROOT, extra)
     if name == "test" and not (computer.which("node") and computer.which("npm")):
         print(
-            "· no node and npm here: tests of nep-js and of original programs in JavaScript are skipped",
+            "· node and npm are missing: tests of nep-js and of original JavaScript programs are skipped",
             flush=True,
         )
     with screen(computer) as environ:

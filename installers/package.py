@@ -1,6 +1,4 @@
-"""`python3 dev.py package`: NEP Studio's packages for Windows, macOS and Linux, and those of the clients.
-
-They go into `dist/`.
+"""`python3 dev.py package`: packages of NEP Studio and of the client libraries, written to `dist/`.
 
     python3 dev.py package                       the packages of this system and the client libraries
     python3 dev.py package -- --system clients   only nep for JavaScript, C# (NuGet) and Unity
@@ -35,7 +33,7 @@ class Packer(Protocol):
 
 
 def packer_for(system: str) -> Packer:
-    """The packer of one of `SYSTEMS`, or of the client libraries."""
+    """Return the packer of one of `SYSTEMS` or of the client libraries."""
     return cast("Packer", importlib.import_module(f"installers.{system}.packer"))
 
 

@@ -414,9 +414,9 @@ class DecodeError(NepError, ValueError):
 
 
 class WireError(DecodeError):
-    """Parts or a request that break the native wire, for `reason`.
+    """Parts or a request that violate the native wire's specification.
 
-    `code` is the same in every language and version: the table of codes is in docs/wire.md.
+    `code` is independent of language and version: see the table of codes in docs/wire.md.
     """
 
     def __init__(self, reason: str, size_bytes: int = 0, *, code: str = "malformed") -> None:

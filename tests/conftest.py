@@ -150,7 +150,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--long", action="store_true", help="let faults last, one after the other; also what is marked long"
     )
     parser.addoption("--driver", action="append", default=[], metavar="FILE", help=told)
-    told = "the same for a driver in any language that this command starts (docs/write-a-driver.md)"
+    told = "the same for a driver program in any language, by its command (docs/write-a-driver.md)"
     parser.addoption("--driver-command", action="append", default=[], metavar="COMMAND", help=told)
     if importlib.util.find_spec("pytestqt") is None:
         # The library's tests run without Qt too (dev.py versions): its options are known, and mean nothing.
@@ -203,7 +203,7 @@ def _nothing_is_left() -> Iterator[None]:
 
 
 def _end_if_stuck(item: pytest.Item) -> None:
-    """Dump all stacks and end this process if `item` goes on long after its timeout.
+    """Dump all stacks and end this process if `item` runs long beyond its timeout.
 
     pytest-timeout raises an exception in the main thread, which does not reach a test that waits in C++, and
     which Qt discards when it is raised in a slot. pytest-xdist then names the test and goes on without it.
@@ -216,18 +216,18 @@ def _end_if_stuck(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Watch over the test."""
+    """Start the watchdog of the test."""
     _end_if_stuck(item)
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_teardown(item: pytest.Item) -> None:
-    """Watch over the end of the test: pytest stops a watch when a test has failed."""
+    """Restart the watchdog for the teardown: pytest cancels it when a test has failed."""
     _end_if_stuck(item)
 
 
 def pytest_runtest_logfinish() -> None:
-    """End the watch."""
+    """Cancel the watchdog."""
     faulthandler.cancel_dump_traceback_later()
 
 

@@ -36,7 +36,7 @@ NAMES = (
     "studio_tabs",
 )
 ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
-"""These run only when asked for: they take long, need ROS 1, Node.js or a package, or time nothing."""
+"""Run only by name: they take long, need ROS 1, Node.js or a package, or measure no time."""
 
 
 def main() -> int:

@@ -42,7 +42,7 @@ QT_LIBRARIES = (
 
 
 MONO = ("mono-mcs", "mono-runtime", "libnewtonsoft-json5.0-cil")
-"""What compiles and runs the C# client in tests. Without it those tests are skipped."""
+"""Packages that compile and run the C# client in tests; without them these tests are skipped."""
 
 
 def wanted_packages(computer: Computer) -> list[str]:
@@ -98,7 +98,7 @@ def bring_system_packages(computer: Computer) -> None:
 
 
 def bring_mono(computer: Computer) -> None:
-    """Install mono for the tests of the C# client (root), or print one line that they are skipped."""
+    """Install mono for the tests of the C# client, as root; otherwise print that they are skipped."""
     if not computer.has_apt:
         return
     lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *MONO]).splitlines()

@@ -1,8 +1,7 @@
 """Build the Unity package of the C# client: ``python -m tools.unity_package FOLDER``.
 
-The package has the library's sources, not a copy that is kept in the repository. Unity ignores files of an
-installed package that have no ``.meta`` file, so one is made for each, with an id that depends on the file's
-place alone.
+The package contains the library's sources. Unity ignores files of an installed package without a ``.meta``
+file, so one is generated for each, with an id derived from the file's path.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ def build(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Build into the folder that the command line names."""
+    """Build into the folder given on the command line."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2

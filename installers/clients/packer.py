@@ -1,6 +1,6 @@
-"""Pack the client libraries: `nep-js` for npm, `Nep` for NuGet, and the package of Unity.
+"""Packages of the client libraries: `nep-js` for npm, `Nep` for NuGet, and the Unity package.
 
-Only the .NET SDK builds the package for NuGet: what `mcs` compiles refers to `mscorlib`, not to
+Only the .NET SDK builds the NuGet package: assemblies compiled by `mcs` refer to `mscorlib` instead of
 `netstandard`.
 """
 
@@ -18,8 +18,8 @@ __all__ = ["build", "pack_built_javascript", "pack_javascript", "pack_nuget"]
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """Return the packages; what this computer has no tools for is left out, and a line says so."""
-    del keep_frozen  # nothing of them is frozen
+    """Return the packages; those that need missing tools are skipped with a printed line."""
+    del keep_frozen  # the clients are not frozen
     return [
         *pack_javascript(context.root / "clients" / "javascript", context.dist),
         *pack_nuget(context.root / "clients" / "csharp", context.dist),
@@ -31,17 +31,17 @@ def pack_javascript(source: Path, target: Path) -> list[Path]:
     """Return `nep-js-VERSION.tgz`, or nothing without npm."""
     npm = shutil.which("npm")
     if npm is None:
-        print("· nep-js is left out: it needs npm, which comes with Node.js", flush=True)
+        print("· nep-js is skipped: it needs npm, which is part of Node.js", flush=True)
         return []
     if not (source / "node_modules" / "typescript").is_dir():
         _run([npm, "ci", "--no-audit", "--no-fund", "--silent"], source)
-    shutil.rmtree(source / "dist", ignore_errors=True)  # a module that was renamed leaves its old file
+    shutil.rmtree(source / "dist", ignore_errors=True)  # stale files of renamed modules
     _run([npm, "run", "--silent", "build"], source)
     return [pack_built_javascript(npm, source, target)]
 
 
 def pack_built_javascript(npm: str, source: Path, target: Path) -> Path:
-    """Return the package of what `npm run build` has built."""
+    """Pack the output of `npm run build`; return the package."""
     pack = [npm, "pack", "--silent", "--ignore-scripts", "--pack-destination", str(target)]
     return target / _run(pack, source).split()[-1]
 
@@ -50,7 +50,7 @@ def pack_nuget(source: Path, target: Path) -> list[Path]:
     """Return `Nep.VERSION.nupkg`, or nothing without the .NET SDK."""
     dotnet = shutil.which("dotnet")
     if dotnet is None:
-        print("· Nep for NuGet is left out: it needs the .NET SDK", flush=True)
+        print("· Nep for NuGet is skipped: it needs the .NET SDK", flush=True)
         return []
     for old in target.glob("Nep.*.nupkg"):
         old.unlink()

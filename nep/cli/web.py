@@ -1,4 +1,4 @@
-"""`nep web`: serve web pages and programs that speak rosbridge."""
+"""`nep web`: rosbridge server for web pages and programs."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ ListenOption = Annotated[
         "--listen",
         metavar=_("ADDRESS"),
         help=_(
-            "Let other computers connect at this address of this computer; 0.0.0.0 means all of its "
-            "addresses. They need the token."
+            "Accept connections of other computers on this address of this computer, or on all with 0.0.0.0. "
+            "They need the token."
         ),
         show_default=False,
     ),
@@ -48,8 +48,8 @@ OriginOption = Annotated[
         "--origin",
         metavar="ORIGIN",
         help=_(
-            "Let pages of this origin connect, such as http://192.168.1.5:8000; can be repeated. Pages of "
-            "this computer may always connect. 'null' allows pages that were opened as files."
+            "Allow pages of this origin, such as http://192.168.1.5:8000. Can be repeated. Pages of this "
+            "computer are always allowed. 'null' allows pages that were opened as files."
         ),
         show_default=False,
     ),
@@ -60,8 +60,8 @@ TokenOption = Annotated[
         "--token",
         metavar=_("FILE"),
         help=_(
-            "Require the token in this file from everybody. If there is no such file, it is written with a "
-            "new token. Without this option a new token is made whenever other computers can connect."
+            "Require the token in this file from all clients. A missing file is created with a new token. "
+            "Without this option, --listen generates a new token at each start."
         ),
         show_default=False,
     ),
@@ -76,11 +76,11 @@ def web(
     allow_moving: AllowMovingOption = None,
     master: MasterOption = None,
 ) -> None:
-    """Let web pages and programs connect with roslib, roslibpy or Foxglove. Ctrl+C ends it.
+    """Serve web pages and programs with roslib, roslibpy or Foxglove. Ctrl+C ends it.
 
-    It is a WebSocket server that speaks the rosbridge v2 protocol. Each page is a node while it is connected.
-    Only this computer can connect unless you add --listen. Messages that move a robot are refused unless you
-    add --allow-moving. docs/web.md has examples.
+    This is a WebSocket server for the rosbridge v2 protocol. Each connected page is a node. Only this
+    computer can connect unless you add --listen. Messages that move a robot are refused unless you add
+    --allow-moving. See docs/web.md for examples.
     """
     hosts = [checked_host(each) for each in listen or ()]
     origins = frozenset(map(checked_origin, origin or ()))
@@ -102,7 +102,7 @@ def web(
             interrupts.leave_when_told()
             _say_running(server, terminal, token_file=None if token is None or is_file_new else token)
             while not server.wait(_SLICE_S):
-                pass  # in slices: Windows does not interrupt a wait for Ctrl+C
+                pass  # short waits: on Windows Ctrl+C does not interrupt a wait
             if server.problem is not None:
                 raise NepError(
                     _("the web server ended because of an error: {reason}").format(reason=server.problem)
@@ -118,14 +118,14 @@ def _start(server: WebServer) -> None:
     except AddressInUseError as error:
         raise NepError(
             _(
-                "another program uses port {port}, perhaps rosbridge or another 'nep web'; end it, or choose "
-                "another port with --port"
+                "port {port} is in use, perhaps by rosbridge or another 'nep web'; end that program or "
+                "choose another port with --port"
             ).format(port=server.settings.port)
         ) from error
 
 
 def _token(file: Path | None, *, is_needed: bool) -> str:
-    """The token that everybody must give, "" for none. Raises `NepError`."""
+    """Return the required token, or an empty string. Raises `NepError`."""
     if file is None:
         return new_token() if is_needed else ""
     try:
@@ -139,24 +139,25 @@ def _token(file: Path | None, *, is_needed: bool) -> str:
         ) from error
     if len(found) < _MIN_TOKEN_LENGTH or not found.isascii() or not found.isprintable():
         raise NepError(
-            _("the token in '{file}' needs {least} letters or more; delete the file to get a new one").format(
-                file=file, least=_MIN_TOKEN_LENGTH
-            )
+            _(
+                "the token in '{file}' is shorter than {least} characters or not printable ASCII; delete the "
+                "file to create a new one"
+            ).format(file=file, least=_MIN_TOKEN_LENGTH)
         )
     return found
 
 
 def _written(file: Path) -> str:
-    """A new token in a new file that only its owner can read."""
-    made = new_token()
+    """Create a file that only its owner can read, with a new token; return the token."""
+    token = new_token()
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
-        opened.write(made + "\n")
-    return made
+        opened.write(token + "\n")
+    return token
 
 
 def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | None) -> None:
-    """Print where to connect, who may, and what is missing."""
+    """Print the URLs, the access rules, and a missing master."""
     out = console(out=terminal)
     token = server.settings.access.token
     query = f"/?token={token}" if token and token_file is None else ""
@@ -165,14 +166,17 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
         url = f"ws://{host}:{server.port}{query}"
         out.print(_("[bold yellow]●[/] other computers connect to [bold]{url}[/]").format(url=url))
     if token_file is not None:
-        said = _("  add /?token=TOKEN to it, with the token in {file}")
-        out.print(said.format(file=token_file), style="dim")
+        words = _("  append /?token=TOKEN to the URL, with the token in {file}")
+        out.print(words.format(file=token_file), style="dim")
     if not server.settings.access.origins:
-        out.print(_("  only pages of this computer and programs; --origin allows others"), style="dim")
+        out.print(
+            _("  only programs and pages of this computer can connect; --origin allows other pages"),
+            style="dim",
+        )
     address = master_address(server.settings.master)
     if not is_running(address, _MASTER_TIMEOUT_S):
-        said = _("no master answers at '{address}' yet; start one with 'nep master'")
-        say(said.format(address=address), terminal)
+        words = _("no master at '{address}'; start one with 'nep master'")
+        say(words.format(address=address), terminal)
     out.print(_("  Ctrl+C ends it"), style="dim")
 
 
@@ -184,9 +188,9 @@ def _say_ended(server: WebServer, terminal: Terminal) -> None:
     counts = server.counts
     if not (counts.opened or counts.turned_away):
         return
-    said = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
-    said += _(
+    words = ngettext("{count} connection", "{count} connections", counts.opened).format(count=counts.opened)
+    words += _(
         ", {turned_away} refused; {operations} operations, {rejected} rejected; {sent} messages sent, "
         "{dropped} dropped"
     ).format(**counts.as_map())
-    say(said, terminal)
+    say(words, terminal)

@@ -94,10 +94,10 @@ class Publisher:
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
-        """Ids, as in the graph, of the subscribers that are connected now.
+        """Ids of connected subscribers, as in the graph.
 
-        A subscriber whose program hangs leaves the graph after some seconds and stays connected. Empty for
-        back ends that can't tell them apart.
+        The subscriber of a hanging program stays connected after its node has left the graph. Empty for back
+        ends that don't identify subscribers.
         """
         if self._is_forked or not isinstance(self._transport, KnowsSubscribers):
             return frozenset()

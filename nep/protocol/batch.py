@@ -83,7 +83,7 @@ def entries(body: bytes) -> list[BatchEntry]:
     numbers = table.unpack_from(body)
     sizes, stamps = numbers[1 : count + 1], numbers[count + 1 :]
     if table.size + sum(sizes) != len(body):
-        reason = _("the messages of a batch have other sizes than it tells")
+        reason = _("the sizes in a batch don't match its messages")
         raise WireError(reason, len(body), code="batch-sizes")
     made, at = [], table.size
     for number, (size, stamp_ns) in enumerate(zip(sizes, stamps, strict=True)):
@@ -93,12 +93,12 @@ def entries(body: bytes) -> list[BatchEntry]:
 
 
 def check_batch(header: Header, body: bytes) -> None:
-    """Raise `WireError` unless the header of one part is that of a batch with this body."""
+    """Raise `WireError` unless flags and size of a batch's header match its body."""
     if header.flags != BATCH:
-        raise WireError(_("a batch is one part and has no other flags"), len(body), code="batch-form")
+        raise WireError(_("a batch must be one part without other flags"), len(body), code="batch-form")
     if header.size != len(body):
         raise WireError(
-            _("its header tells of {size} bytes, its payload has {payload}").format(
+            _("the header declares {size} bytes, but the payload has {payload}").format(
                 size=header.size, payload=len(body)
             ),
             len(body),
@@ -107,10 +107,10 @@ def check_batch(header: Header, body: bytes) -> None:
 
 
 def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
-    """Return the message in `parts`, or the messages of a batch: all that a reader may receive of a topic.
+    """Return the message in `parts`, or the messages if they are a batch.
 
     Raises:
-        WireError: for anything that the specification does not allow, in the order of checks of docs/wire.md.
+        WireError: The parts violate the specification; checked in the order of docs/wire.md.
     """
     one = split(parts)
     found = [one] if not one.header.flags & BATCH else _messages_of(one)
@@ -137,8 +137,8 @@ def _messages_of(one: Parts) -> list[Parts]:
 
 
 def unknown_codec(number: int) -> WireError:
-    """Return the error for a message with this codec, which no version of the wire knows so far."""
+    """Return the error for a message with an unknown codec number."""
     return WireError(
-        _("its codec has the number {codec}, which this nep does not know; update nep").format(codec=number),
+        _("unknown codec {codec}; update nep").format(codec=number),
         code="codec",
     )

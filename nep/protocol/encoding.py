@@ -104,7 +104,7 @@ _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
 
 
 class ReceivedRequest(NamedTuple):
-    """A request as it came in: the number to repeat, and the request, or the error why it is none."""
+    """Decoded request with its call number, or the error of a malformed one."""
 
     call: int
     request: Request | WireError
@@ -129,7 +129,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
         name = envelope.get("do")
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
         if kind is None:
-            raise WireError(_("'{name}' is no request of this version").format(name=name), code="request")
+            raise WireError(_("unknown request '{name}'").format(name=name), code="request")
         return ReceivedRequest(call, read(kind, envelope.get("what", {})))
     except WireError as error:
         return ReceivedRequest(call, error)
@@ -233,7 +233,7 @@ def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
     name, call = envelope.get("is"), envelope.get("re", 0)
     kind = _ANSWERS.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
-        raise WireError(_("'{name}' is no answer of this version").format(name=name), code="answer")
+        raise WireError(_("unknown reply '{name}'").format(name=name), code="answer")
     return call, read(kind, envelope.get("what", {}))
 
 
@@ -241,10 +241,10 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
     try:
         value = unpack_it(body)
     except ValueError as error:
-        reason = _("the body is no msgpack: {error}").format(error=error)
+        reason = _("the body is not valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(body), code="msgpack") from error
     if not isinstance(value, dict):
-        raise WireError(_("the body is no map"), len(body), code="map")
+        raise WireError(_("the body is not a map"), len(body), code="map")
     return value
 
 

@@ -360,9 +360,9 @@ class Seen(_FromMaster):
 
 @dataclass(frozen=True)
 class Refused(_FromMaster):
-    """The request could not be carried out; `reason` is a sentence in the master's language.
+    """Refusal of a request; `reason` is a sentence in the master's language.
 
-    `code` is the same in every language: see the table of codes in docs/wire.md. Empty from older masters.
+    `code` is language-independent: see the table of codes in docs/wire.md. Empty from older masters.
     """
 
     reason: str

@@ -151,7 +151,7 @@ def _read(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, byte
     version, kind, codec, limit_ms, number = _HEADER.unpack(parts[0])
     if version != _VERSION:
         raise WireError(
-            _("version {version} of services is not known here; update nep").format(version=version),
+            _("unsupported version {version} of the service protocol; update nep").format(version=version),
             code="call-version",
         )
     return kind, codec, limit_ms, number, parts[1]

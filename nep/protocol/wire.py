@@ -71,7 +71,7 @@ EXTENSION = 2
 BYE = 4
 """Flag of a notice: the publisher is closing and has sent everything."""
 BATCH = 8
-"""Flag: one part holds several messages. Only subscribers get it whose hello says that they read batches."""
+"""Flag: one part has several messages. Sent only to subscribers whose hello has level 3."""
 SHARED = 16
 """Flag: the payload lies in memory that publisher and subscriber share; its part is the number, u64."""
 OFFER = 32
@@ -292,7 +292,7 @@ def extension_part(extension: Mapping[str, object]) -> bytes:
     try:
         return pack(dict(extension))
     except ValueError as error:
-        reason = _("an extension holds what msgpack cannot: {error}").format(error=error)
+        reason = _("can't encode the extension as msgpack: {error}").format(error=error)
         raise WireError(reason, code="extension") from error
 
 
@@ -301,12 +301,12 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
     try:
         value = unpack(part)
     except ValueError as error:
-        reason = _("the extension is no msgpack: {error}").format(error=error)
+        reason = _("the extension is not valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(part), code="extension") from error
     if packed_is_too_deep(part, value):
         raise WireError(too_deep(), len(part), code="extension")
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise WireError(_("the extension is no map with names"), len(part), code="extension")
+        raise WireError(_("the extension is not a map with string keys"), len(part), code="extension")
     return value
 
 
@@ -344,7 +344,7 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """Return the message in `parts`. The body of a batch is its payload: see `nep.protocol.batch.read_parts`.
 
     Raises:
-        WireError: for anything that the specification does not allow, in the order of checks of docs/wire.md.
+        WireError: The parts violate the specification; checked in the order of docs/wire.md.
     """
     if not parts:
         raise WireError(_("a message has 3 or 4 parts, this one has none"), code="part-count")
@@ -357,9 +357,9 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
 def split_rest(
     rest: Sequence[bytes | memoryview], *, is_one_part: bool = False
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
-    """Header, payload and extension of a message from what follows its first part. Raises `WireError`.
+    """Return header, payload and extension from the parts after the first. Raises `WireError`.
 
-    `is_one_part`: they come from one part, which alone may hold a batch.
+    ``is_one_part`` is True if they were split from one part; only then a batch is allowed.
     """
     if not rest:
         raise WireError(_("a message has 3 or 4 parts, this one has 1"), code="part-count")
@@ -370,15 +370,15 @@ def split_rest(
         raise WireError(reason, code="part-count")
     if there != wanted:
         raise WireError(
-            _("its flags ask for {wanted} parts, there are {there}").format(wanted=wanted, there=there),
+            _("the flags require {wanted} parts, but there are {there}").format(wanted=wanted, there=there),
             code="part-count",
         )
     if header.flags & BATCH and not (is_one_part and header.flags == BATCH):
-        raise WireError(_("a batch is one part and has no other flags"), code="batch-form")
+        raise WireError(_("a batch must be one part without other flags"), code="batch-form")
     size = len(rest[1])
     if header.size and header.size != size:
         raise WireError(
-            _("its header tells of {size} bytes, its payload has {payload}").format(
+            _("the header declares {size} bytes, but the payload has {payload}").format(
                 size=header.size, payload=size
             ),
             size,
@@ -394,6 +394,4 @@ def _topic_in(part: bytes) -> str:
             raise WireError(_("its topic does not end with a zero byte"), len(part), code="topic-end")
         return check_topic(part[:-1].decode("utf-8"))
     except (UnicodeDecodeError, BadTopicError) as error:
-        raise WireError(
-            _("its topic is none: {error}").format(error=error), len(part), code="topic"
-        ) from error
+        raise WireError(_("invalid topic: {error}").format(error=error), len(part), code="topic") from error

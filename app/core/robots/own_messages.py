@@ -1,4 +1,4 @@
-"""Which messages count as a robot's own: those that its own program sent."""
+"""Filter of messages by their sender: only those of a robot's own program count."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from nep.protocol.graph_view import GraphView
 
 
 class OwnMessages:
-    """Judges messages of robots by who sent them. One thread uses it (the window's)."""
+    """Filter robots' messages by sender. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, senders: Senders, links: Mapping[str, RobotLink]) -> None:
-        """``senders`` know the nodes of publishers, ``links`` are the robots by name."""
+        """``senders`` map publishers to nodes; ``links`` are the robots by name."""
         self._senders, self._links = senders, links
         self.view = GraphView(0, 0)
-        """The newest graph."""
+        """Newest graph."""
         self._lapsed: dict[str, dict[int, Identity]] = {}
-        """Programs that left the graph with their connection up, by robot and by their subscriber's id."""
+        """Unlisted programs that are still connected, by robot and subscriber id."""
 
     def update(self, view: GraphView) -> None:
-        """Take over a new graph, and remember programs that left it although they may only hang."""
+        """Take a new graph; keep programs that left it but are still connected, as they may only hang."""
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
             topic, serving = before.topics.get(link.robot.topics.command), self._serving(link, before)
@@ -49,9 +49,9 @@ class OwnMessages:
         return {robot.topics.answer, *topics_of(robot)}
 
     def other_programs(self, name: str) -> list[Identity]:
-        """Return the programs besides a robot's own that hear its commands and answer them.
+        """Return programs other than the robot's own that receive its commands and publish its answers.
 
-        Those that hang are among them as long as they are connected: they hear what is sent when they go on.
+        Includes hanging programs while they are connected: they process pending commands when they resume.
         """
         link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
@@ -62,7 +62,7 @@ class OwnMessages:
         return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
-        """Return the programs that hear the robot's commands and answer them now, and did not ``before``."""
+        """Return programs that receive the robot's commands and publish its answers, unlike ``before``."""
         if link.robot.dialect != "native":
             return []
         earlier = self._serving(link, before)

@@ -31,9 +31,9 @@ SLICE_S = 0.1
 _END_S = 2.0
 
 Callback = Callable[[object], object]
-"""Takes the request and returns the answer, or a `concurrent.futures.Future` of it.
+"""Takes the request and returns the answer, or a `concurrent.futures.Future` with the answer.
 
-None is answered as an empty map.
+None is sent as an empty map.
 """
 
 
@@ -141,7 +141,7 @@ class Server:
                 answer.add_done_callback(partial(self._answer_later, call))
                 return
             reply = self._encoded(answer, call.codec)
-        except Exception as error:  # noqa: BLE001 - it is the client's `ServiceError`
+        except Exception as error:  # noqa: BLE001 - sent to the client
             reply = self._failure(error)
         except BaseException as error:  # Ctrl+C: who waits is told, and it comes out of `spin`
             call.answer(_failed(error))
@@ -152,12 +152,12 @@ class Server:
         """Answer a call whose callback returned a future."""
         try:
             reply = self._encoded(done.result(), call.codec)
-        except BaseException as error:  # noqa: BLE001 - also a future that was cancelled
+        except BaseException as error:  # noqa: BLE001 - includes CancelledError
             reply = self._failure(error)
         call.answer(reply)
 
     def _failure(self, error: BaseException) -> Reply:
-        """What the client of a callback that raised is told; it is logged rarely."""
+        # Logged at increasing intervals.
         self._failures += 1
         if is_logged(self._failures):
             _logger.warning(

@@ -97,7 +97,7 @@ def _packages(facts: Facts) -> Iterator[Finding]:
 
 
 def _namesakes(facts: Facts) -> Iterator[Finding]:
-    """Find packages of others that programs of another Python, or of Node.js, import instead of ours."""
+    """Find packages of other projects that another Python or Node.js imports under our names."""
     if facts.path_package is not None:
         yield Finding(
             "package:python3",
@@ -118,9 +118,9 @@ def _namesakes(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "package:nep-js",
             "ok",
-            _("Programs in JavaScript import NEP Studio's nep-js {version} from {folder}.").format(
-                version=imported.version, folder=imported.place
-            ),
+            _(
+                "JavaScript programs in this folder import nep-js {version} of NEP Studio from {folder}."
+            ).format(version=imported.version, folder=imported.place),
         )
     elif ours is not None:
         yield Finding(

@@ -53,7 +53,7 @@ class PortFact:
 
 @dataclass(frozen=True)
 class PackageFact:
-    """An installed package; not `is_ours`: another one with the name of one of NEP Studio's."""
+    """Installed package; `is_ours` is False for a package of another project with the same name."""
 
     name: str
     version: str
@@ -112,9 +112,9 @@ class Facts:
     `answers_at` is the loopback address at which a master answers when none does at `address`, which is of
     this computer, too; "" when none answers there, either. `reach` is why the address of a master that is
     on another computer and does not answer is not reached, "" when somebody is there, None when it was not
-    tried. `packages` are those of this Python, `path_package` is the original `nep` that `python3` imports
-    when that is another Python, and `node_packages` are the `nep-js` that Node.js finds in this folder, the
-    one that programs import first.
+    tried. `packages` are those of this Python; `path_package` is the original `nep` imported by another
+    Python that is `python3`; `node_packages` are the `nep-js` packages found by Node.js in this folder,
+    starting with the imported one.
     """
 
     now_s: float

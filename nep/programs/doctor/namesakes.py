@@ -1,6 +1,6 @@
-"""Packages named `nep` and `nep-js` that programs on this computer import: NEP Studio's or others'.
+"""Packages named `nep` and `nep-js` on this computer: NEP Studio's or those of the original NEP.
 
-The names on the public registries belong to the original NEP. Nothing is imported or run to find out.
+The names on the public registries belong to the original NEP. The search neither imports nor runs anything.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ORIGINAL_BELOW = (0, 6)
 
 
 def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
-    """Return each `nep-js` that Node.js finds for a program in a folder; it imports the first."""
+    """Return all `nep-js` packages on Node.js's search path of a folder; the first is imported."""
     folder = here.absolute()
     modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
     more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
@@ -43,9 +43,9 @@ def _node_package(folder: Path) -> PackageFact | None:
 def path_python_package(
     path: str | None = None, own: Path = Path(sys.prefix), home: Path | None = None
 ) -> PackageFact | None:
-    """Return the original `nep` that `python3` of the PATH imports, None when it imports none or is our own.
+    """Return the original `nep` imported by `python3` in the PATH, or None.
 
-    `own` is the environment of this program, whose packages are looked at on their own.
+    None also if `python3` belongs to ``own``, the environment of this program, which is checked separately.
     """
     python = shutil.which("python3", path=path) or shutil.which("python", path=path)
     if python is None:

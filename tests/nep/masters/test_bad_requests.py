@@ -20,16 +20,16 @@ def test_each_sender_is_counted_and_told_for_some_seconds() -> None:
     bad = BadRequests()
     assert bad.alerts(0.0) == ()
     for _ in range(3):
-        bad.add("a", "“A”", "the body is no map", 10.0)
-    bad.add("b", "“B”", "the body is no msgpack", 10.0)
+        bad.add("a", "“A”", "the body is not a map", 10.0)
+    bad.add("b", "“B”", "the body is not valid msgpack", 10.0)
     first, second = bad.alerts(10.0)
     assert (first.id, second.id) == ("request:a", "request:b")
     assert first.sentence == (
-        "“A” sends what the master does not understand (3 times so far): the body is no map"
+        "“A” sends what the master does not understand (3 times so far): the body is not a map"
     )
-    assert second.sentence.endswith("(once): the body is no msgpack")
+    assert second.sentence.endswith("(once): the body is not valid msgpack")
     assert first.hint
-    bad.add("a", "“A”", "the body is no map", 19.0)
+    bad.add("a", "“A”", "the body is not a map", 19.0)
     (alert,) = bad.alerts(21.0)
     assert "4 times" in alert.sentence
     assert bad.alerts(29.5) == ()
@@ -57,7 +57,7 @@ def test_strangers_without_end_take_no_memory_without_end() -> None:
 
 def test_what_a_stranger_wrote_does_not_write_lines_of_its_own() -> None:
     bad = BadRequests()
-    bad.add("a", "“A”", "'x\nERROR all is lost\x1b[31m' is no request of this version", 10.0)
+    bad.add("a", "“A”", "unknown request 'x\nERROR all is lost\x1b[31m'", 10.0)
     assert bad.alerts(10.0)[0].sentence.isprintable()
 
 
@@ -85,7 +85,7 @@ def test_the_master_logs_the_first_then_rarely_and_shows_an_alert(
     context.term()
     assert alert.id == "request:127.0.0.1"
     assert alert.sentence.startswith("A program on 127.0.0.1 sends what the master does not understand")
-    assert "'fly' is no request of this version" in alert.sentence
+    assert "unknown request 'fly'" in alert.sentence
     logged = [each.getMessage() for each in caplog.records]
     assert len(logged) == 2
     assert "(once)" in logged[0]

@@ -48,7 +48,7 @@ def test_a_payload_of_another_size_than_told_is_refused(payload: bytes, told: in
     if told == len(payload):
         assert wire.split(parts).payload == payload
     else:
-        with pytest.raises(WireError, match=f"tells of {told} bytes, its payload has {len(payload)}"):
+        with pytest.raises(WireError, match=f"declares {told} bytes, but the payload has {len(payload)}"):
             wire.split(parts)
 
 
@@ -167,7 +167,7 @@ def test_an_unknown_version_is_named() -> None:
 
 
 def test_an_extension_that_msgpack_cannot_hold() -> None:
-    with pytest.raises(WireError, match="an extension holds what msgpack cannot"):
+    with pytest.raises(WireError, match="can't encode the extension"):
         wire.extension_part({"a": object()})
 
 

@@ -94,11 +94,11 @@ class MovedRobots:
         self._motions: dict[str, list[UnprovenMotion]] = {}
         self._count = 0
         self._sent: dict[str, UnprovenMotion] = {}
-        """The newest command of each robot since the graph before the last one."""
+        """Newest command to each robot since the graph before the last one."""
         self._proven: dict[str, int] = {}
-        """Marks of the Stops that programs proved since then, by node id."""
+        """Marks of Stops proven by programs since then, by node id."""
         self._graph_mark = 0
-        """The `mark` when the newest graph came."""
+        """`mark` at the newest graph."""
 
     def __contains__(self, name: object) -> bool:
         return name in self._motions
@@ -115,7 +115,7 @@ class MovedRobots:
 
     @property
     def sent_to(self) -> tuple[str, ...]:
-        """Robots that were told to move since the graph before the last one."""
+        """Robots with a command since the graph before the last one."""
         return tuple(self._sent)
 
     def motion(self, name: str) -> UnprovenMotion | None:
@@ -170,14 +170,13 @@ class MovedRobots:
                 found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
 
     def take_newcomers(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
-        """Take over from a new graph which programs began to hear robots' commands since the graph before.
+        """Note the commands that programs may have received which a new graph lists for the first time.
 
-        Each may have heard what was sent meanwhile, although its robot had no such program yet when it was
-        sent. Call it once for each graph. A graph is older than the moment when it is taken over, so commands
-        count from the graph before the last one on.
+        A program can receive a command before the graph lists it. Call this once per graph. A graph is older
+        than the call, so commands since the graph before the last one count.
 
         Args:
-            newcomers: The programs by robot; of robots in `sent_to` only.
+            newcomers: New programs by robot, for robots in `sent_to`.
         """
         for name, programs in newcomers.items():
             sent, found = self._sent[name], self._motions.get(name, [])
