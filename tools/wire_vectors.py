@@ -1,12 +1,12 @@
 """Write the generated test vectors of the native wire: tests/data/wire.
 
-    python tools/wire_vectors.py            write them anew
-    python tools/wire_vectors.py --check    1 when a file differs from what is generated
+    python tools/wire_vectors.py            write the files
+    python tools/wire_vectors.py --check    exit with 1 if a file is out of date
 
-`filters.json`, `notices.json`, `master.json` and `malformed.json` are made here; `messages.json`,
-`batches.json`, `ids.json` and `services.json` are kept by hand. tests/data/wire/README.md describes their
-form. The code of malformed parts comes from how they are made, not from the reader that the tests hold
-against them.
+`filters.json`, `notices.json`, `master.json` and `malformed.json` are generated; `messages.json`,
+`batches.json`, `ids.json` and `services.json` are written by hand. See tests/data/wire/README.md for their
+format. The error code of a malformed message follows from its generator, independently of the parser under
+test.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PAYLOAD = b'{"message":"hello"}'
 
 
 def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
-    """Return `value` with every integer as decimal text, also those that are keys."""
+    """Return `value` with every integer, including keys, as decimal text."""
     if isinstance(value, bool) or value is None or isinstance(value, (str, float)):
         return value
     if isinstance(value, int):
@@ -52,7 +52,7 @@ def as_text(value: Any) -> Any:  # noqa: ANN401 - any plain value
 
 
 def filters() -> list[dict[str, Any]]:
-    """Return what a subscriber subscribes to: hellos, and its answers to echoes and offers."""
+    """Return the filters of subscribers: topics, hellos, answers to echoes and offers, and malformed ones."""
     made: list[dict[str, Any]] = [
         {"name": "topic", "filter": wire.topic_part(TOPIC).hex(), "means": {"kind": "topic", "topic": TOPIC}},
         {
@@ -62,12 +62,12 @@ def filters() -> list[dict[str, Any]]:
         },
     ]
     levels: tuple[dict[str, bool], ...] = ({}, {"one_part": True}, {"tells": True}, {"batches": True})
-    for level, said in enumerate(levels):
+    for level, options in enumerate(levels):
         for subscriber, topic in ((SUBSCRIBER, TOPIC), (1, "/a/b"), (2**63 - 1, "/größe")):
             made.append(
                 {
                     "name": f"hello of level {level} for {topic}",
-                    "filter": wire.hello_part(subscriber, topic, **said).hex(),
+                    "filter": wire.hello_part(subscriber, topic, **options).hex(),
                     "means": {
                         "kind": "hello",
                         "subscriber": str(subscriber),
@@ -102,7 +102,7 @@ def filters() -> list[dict[str, Any]]:
         "hello with a sign": b"\xffhello/+" + digits[1:] + b"/example",
         "hello with an underscore": b"\xffhello/" + digits[:8] + b"_" + digits[9:] + b"/example",
         "hello of level 4": b"\xffhello4/" + digits + b"/example",
-        "hello whose topic is no UTF-8": b"\xffhello/" + digits + b"/\xc3",
+        "hello whose topic is not UTF-8": b"\xffhello/" + digits + b"/\xc3",
         "read with three numbers": b"\xffread/" + b"/".join([digits] * 3),
         "read with five numbers": b"\xffread/" + b"/".join([digits] * 5),
         "read with a letter": b"\xffread/" + b"/".join([digits] * 3) + b"/000000000000000g",
@@ -115,7 +115,7 @@ def filters() -> list[dict[str, Any]]:
 
 
 def notices() -> list[dict[str, Any]]:
-    """Return what a publisher sends under a hello: each notice, and a message for one subscriber alone."""
+    """Return the notices that a publisher sends under a hello, and a message sent under a hello."""
     hello = wire.hello_part(SUBSCRIBER, TOPIC, batches=True)
     kinds: list[tuple[str, str, wire.Header, bytes | None]] = [
         ("echo", "echo before the first message", wire.Header(1, 0, 0, STAMP_NS, PUBLISHER), None),
@@ -160,43 +160,43 @@ def node(key: str, name: str) -> requests.NodeRecord:
 
 TALKER, LISTENER = node(KEY, "talker"), node(OTHER_KEY, "listener")
 ODOM = requests.PublisherRecord(PUBLISHER, "/odom", "json", "json", ("tcp://127.0.0.1:40000",), number=1)
-HEARS = requests.SubscriberRecord(requests.id_from(OTHER_KEY, 1), "/odom", "json", number=1)
-ADDS, SUBSCRIBES = requests.AddPublisher(TALKER, ODOM), requests.AddSubscriber(LISTENER, HEARS)
+LISTENS = requests.SubscriberRecord(requests.id_from(OTHER_KEY, 1), "/odom", "json", number=1)
+ADDS, SUBSCRIBES = requests.AddPublisher(TALKER, ODOM), requests.AddSubscriber(LISTENER, LISTENS)
 ALL = requests.PublisherRecord(
     requests.id_from(KEY, 3), "/map", "json", "json", ("tcp://127.0.0.1:40001",), True, False, 3, 5
 )
 COUNTS = requests.PublisherCount(PUBLISHER, 12, 2**40, 12, STAMP_NS)
-HEARD = requests.SubscriberCount(HEARS.id, 11, 1)
+RECEIVED = requests.SubscriberCount(LISTENS.id, 11, 1)
 Asked = tuple[str, requests.Request]
-"""By which connection something is asked: that of the talker or the listener, and what."""
+"""Name of the connection, talker or listener, and the request."""
 
 ASKED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
     ("ping", (), ("talker", requests.Ping())),
-    ("a publisher comes", (), ("talker", ADDS)),
-    ("the same publisher again", (("talker", ADDS),), ("talker", ADDS)),
-    ("a publisher comes that has a subscriber", (("listener", SUBSCRIBES),), ("talker", ADDS)),
-    ("a subscriber comes", (), ("listener", SUBSCRIBES)),
-    ("a subscriber comes that has a publisher", (("talker", ADDS),), ("listener", SUBSCRIBES)),
+    ("a publisher registers", (), ("talker", ADDS)),
+    ("a publisher registers twice", (("talker", ADDS),), ("talker", ADDS)),
+    ("a publisher with a subscriber registers", (("listener", SUBSCRIBES),), ("talker", ADDS)),
+    ("a subscriber registers", (), ("listener", SUBSCRIBES)),
+    ("a subscriber with a publisher registers", (("talker", ADDS),), ("listener", SUBSCRIBES)),
     (
-        "a publisher goes",
+        "a publisher unregisters",
         (("talker", ADDS),),
         ("talker", requests.RemovePublisher(TALKER.id, PUBLISHER, 2**53 + 1)),
     ),
     (
-        "a subscriber goes",
+        "a subscriber unregisters",
         (("listener", SUBSCRIBES),),
-        ("listener", requests.RemoveSubscriber(LISTENER.id, HEARS.id)),
+        ("listener", requests.RemoveSubscriber(LISTENER.id, LISTENS.id)),
     ),
     ("a node leaves", (("talker", ADDS),), ("talker", requests.Leave(TALKER.id))),
     (
-        "a node joins with all that it has",
+        "a node joins with its publishers",
         (("listener", SUBSCRIBES),),
         ("talker", requests.Join(TALKER, 77, (ODOM, ALL), ())),
     ),
     (
         "a subscriber's node joins",
         (("talker", ADDS),),
-        ("listener", requests.Join(LISTENER, 0, (), (HEARS,))),
+        ("listener", requests.Join(LISTENER, 0, (), (LISTENS,))),
     ),
     (
         "a publisher's node renews",
@@ -204,49 +204,53 @@ ASKED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
         ("talker", requests.Renew(TALKER.id, EPOCH, 3, (COUNTS,), (), 0.25)),
     ),
     (
-        "a subscriber's node renews and hears of last seqs",
+        "a subscriber's node renews and receives last seqs",
         (
             ("talker", ADDS),
             ("listener", SUBSCRIBES),
             ("talker", requests.Renew(TALKER.id, EPOCH, 3, (COUNTS,))),
         ),
-        ("listener", requests.Renew(LISTENER.id, EPOCH, 5, (), (HEARD,))),
+        ("listener", requests.Renew(LISTENER.id, EPOCH, 5, (), (RECEIVED,))),
     ),
     (
-        "a renewal with an old revision is told of the topic's publishers",
+        "a renewal with an old revision receives the topic's publishers",
         (("listener", SUBSCRIBES), ("talker", ADDS)),
-        ("listener", requests.Renew(LISTENER.id, EPOCH, 3, (), (HEARD,))),
+        ("listener", requests.Renew(LISTENER.id, EPOCH, 3, (), (RECEIVED,))),
     ),
-    ("an unknown node renews and is to join again", (), ("talker", requests.Renew(TALKER.id, EPOCH, 0))),
+    ("an unknown node renews and has to join", (), ("talker", requests.Renew(TALKER.id, EPOCH, 0))),
     (
-        "a renewal with another epoch is to join again",
+        "a node renews with another epoch and has to join",
         (("talker", ADDS),),
         ("talker", requests.Renew(TALKER.id, EPOCH - 1, 3, (COUNTS,))),
     ),
     (
-        "subscribers did not answer",
+        "a publisher reports subscribers without a hello",
         (("listener", SUBSCRIBES), ("talker", ADDS)),
-        ("talker", requests.ReportMissing(TALKER.id, PUBLISHER, (HEARS.id,))),
+        ("talker", requests.ReportMissing(TALKER.id, PUBLISHER, (LISTENS.id,))),
     ),
     (
-        "a topic that is none",
+        "an invalid topic",
         (),
         ("talker", requests.AddPublisher(TALKER, requests.PublisherRecord(PUBLISHER, "a b", "json", "json"))),
     ),
     (
-        "an id that does not come from the key",
+        "an id that is not derived from the key",
         (),
         (
             "talker",
             requests.AddPublisher(TALKER, requests.PublisherRecord(7, "/odom", "json", "json", (), number=1)),
         ),
     ),
-    ("another connection speaks for the node", (("talker", ADDS),), ("listener", requests.Leave(TALKER.id))),
+    (
+        "another connection sends a request of the node",
+        (("talker", ADDS),),
+        ("listener", requests.Leave(TALKER.id)),
+    ),
 )
 PUSHED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
-    ("a publisher came", (("listener", SUBSCRIBES),), ("talker", ADDS)),
+    ("a publisher registered", (("listener", SUBSCRIBES),), ("talker", ADDS)),
     (
-        "a publisher has closed",
+        "a publisher closed",
         (("listener", SUBSCRIBES), ("talker", ADDS)),
         ("talker", requests.RemovePublisher(TALKER.id, PUBLISHER, 2**53 + 1)),
     ),
@@ -269,18 +273,18 @@ class _Master:
         self._calls = {"talker": 0, "listener": 0}
 
     def ask(self, asked: Asked) -> tuple[bytes, bytes, list[bytes]]:
-        """Return the request's body, the answer's, and those of pushes to others."""
-        who, request = asked
-        self._calls[who] += 1
-        call = self._calls[who]
-        said = self._graph.apply(request, call, 0.0, who, is_foreign=True)
-        reply = next(self._encoder.encode(each.answer, call) for each in said if each.call is not None)
-        pushes = [self._encoder.encode(each.answer) for each in said if each.call is None]
+        """Return the bodies of the request, of its reply, and of the pushes to other nodes."""
+        sender, request = asked
+        self._calls[sender] += 1
+        call = self._calls[sender]
+        outgoing = self._graph.apply(request, call, 0.0, sender, is_foreign=True)
+        reply = next(self._encoder.encode(each.answer, call) for each in outgoing if each.call is not None)
+        pushes = [self._encoder.encode(each.answer) for each in outgoing if each.call is None]
         return encode_request(request, call), reply, pushes
 
 
 def master() -> dict[str, Any]:
-    """Return requests with their answers, and pushes."""
+    """Return requests with their replies, and pushes."""
     asked = []
     for name, before, last in ASKED:
         answers = _Master()
@@ -327,7 +331,7 @@ def master() -> dict[str, Any]:
 
 
 class _Bytes:
-    """Bytes that look random and are the same everywhere."""
+    """Deterministic pseudorandom bytes, the same on every platform."""
 
     def __init__(self, seed: str) -> None:
         self._seed, self._count = seed, 0
@@ -342,7 +346,7 @@ class _Bytes:
     def below(self, limit: int) -> int:
         return int.from_bytes(self.bytes(8), "little") % limit
 
-    def of(self, choices: Sequence[Any]) -> Any:  # noqa: ANN401 - one of them
+    def of(self, choices: Sequence[Any]) -> Any:  # noqa: ANN401 - type of the choices
         return choices[self.below(len(choices))]
 
 
@@ -419,10 +423,10 @@ def _version(some: _Bytes) -> Parts:
 
 def _payload_size(some: _Bytes) -> Parts:
     payload = some.bytes(some.below(40))
-    told = some.of((len(payload) + 1, len(payload) + 32, 2**31, 2**32 - 1, max(1, len(payload) - 1)))
-    told += told == len(payload)
-    head = _header(some, size=told)
-    extended = _header(some, flags=wire.EXTENSION, size=told)
+    claimed = some.of((len(payload) + 1, len(payload) + 32, 2**31, 2**32 - 1, max(1, len(payload) - 1)))
+    claimed += claimed == len(payload)
+    head = _header(some, size=claimed)
+    extended = _header(some, flags=wire.EXTENSION, size=claimed)
     return some.of(  # type: ignore[no-any-return]
         (
             [_GOOD_TOPIC, head, payload],
@@ -502,10 +506,10 @@ def _batch_table(some: _Bytes) -> Parts:
 def _batch_sizes(some: _Bytes) -> Parts:
     sizes = [some.below(9) for _each in range(1 + some.below(5))]
     payloads = some.bytes(sum(sizes))
-    told = list(sizes)
-    told[some.below(len(told))] += some.of((1, 7, 2**31, 2**32 - 9))
+    claimed = list(sizes)
+    claimed[some.below(len(claimed))] += some.of((1, 7, 2**31, 2**32 - 9))
     short = _table(some, len(sizes), sizes) + payloads + some.bytes(1 + some.below(4))
-    return _batch(some, some.of((_table(some, len(told), told) + payloads, short)))
+    return _batch(some, some.of((_table(some, len(claimed), claimed) + payloads, short)))
 
 
 def _codec(some: _Bytes) -> Parts:
@@ -540,7 +544,7 @@ KINDS: tuple[tuple[str, Callable[[_Bytes], Parts]], ...] = (
 
 
 def malformed() -> Iterator[list[str]]:
-    """Yield each malformed message: its code, and its parts as hexadecimal digits. No two are the same."""
+    """Yield code and parts (hexadecimal) of each malformed message, without duplicates."""
     seen: set[tuple[bytes, ...]] = set()
     number = 0
     while len(seen) < MALFORMED_COUNT:
@@ -561,7 +565,7 @@ def files() -> dict[str, str]:
 
 
 def main() -> int:
-    """Write the files, or compare them."""
+    """Write the files, or check that they are up to date."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

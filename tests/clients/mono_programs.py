@@ -41,14 +41,14 @@ def program(name: str, *files: Path) -> Path:
 
 
 def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
-    """Compile under a lock: pytest's workers are processes of their own."""
+    """Compile under a file lock, because pytest's workers are processes."""
     BUILD.mkdir(exist_ok=True)
     target = BUILD / name
     needed = [*files, *(Path(each[3:]) for each in options if each.startswith("-r:"))]
     with (BUILD / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not target.exists() or any(each.stat().st_mtime > target.stat().st_mtime for each in needed):
-            made = BUILD / "new" / name  # the file's name becomes the assembly's
+            made = BUILD / "new" / name  # mcs names the assembly after the file
             made.parent.mkdir(exist_ok=True)
             done = subprocess.run(
                 [*COMPILE, *options, f"-out:{made}", *map(str, files)],
@@ -62,7 +62,7 @@ def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
 
 
 class MonoProgram:
-    """A running C# program that reads and writes lines."""
+    """Running C# program that reads and writes lines."""
 
     def __init__(self, path: Path, *args: str, **environment: str) -> None:
         self.process = subprocess.Popen(
@@ -80,20 +80,20 @@ class MonoProgram:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self._lines.put(line.rstrip("\n"))
-        self._lines.put("(it ended)")
+        self._lines.put("(exited)")
 
     def line(self, timeout_s: float = _LINE_S) -> str:
-        """Return the next line that it prints."""
+        """Return the next line of its output."""
         return self._lines.get(timeout=timeout_s)
 
     def say(self, text: str) -> None:
-        """Give it a line."""
+        """Write a line to its input."""
         assert self.process.stdin is not None
         self.process.stdin.write(text + "\n")
         self.process.stdin.flush()
 
     def ask(self, text: str) -> str:
-        """Give it a line and return the next line that it prints."""
+        """Write a line to its input, and return the next line of its output."""
         self.say(text)
         return self.line()
 
@@ -115,7 +115,7 @@ class MonoProgram:
 
 @contextmanager
 def running(path: Path, *args: str, **environment: str) -> Iterator[MonoProgram]:
-    """Run a program; it is killed at the end."""
+    """Run a program, and kill it at the end."""
     started = MonoProgram(path, *args, **environment)
     try:
         yield started

@@ -31,7 +31,7 @@ NEEDS_NODE = [
 
 
 def build_package() -> None:
-    """Install what nep-js is made of and build it; skip the test when npm can't reach its registry."""
+    """Install the dependencies of nep-js and build it; skip the test if npm can't reach its registry."""
     if not (PACKAGE / "node_modules" / "zeromq").is_dir():
         run_npm("ci", "--no-audit", "--no-fund", "--silent")
     sources = [*(PACKAGE / "src").rglob("*.ts"), PACKAGE / "tsconfig.json", PACKAGE / "build.mjs"]
@@ -58,7 +58,7 @@ def run_npm(*arguments: str, folder: Path = PACKAGE) -> None:
 
 
 def run_script(script: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a CommonJS program that finds nep-js as an installed package, until it ends by itself."""
+    """Run a CommonJS program with nep-js as an installed package until it exits."""
     return subprocess.run(
         prepared(script, folder),
         cwd=folder,
@@ -72,7 +72,7 @@ def run_script(script: str, folder: Path, **environment: str) -> subprocess.Comp
 
 @contextmanager
 def running_script(script: str, folder: Path, *arguments: str, **environment: str) -> Iterator[None]:
-    """Run such a program in the background; kill it in the end."""
+    """Run such a program in the background, and kill it at the end."""
     command = [*prepared(script, folder), *arguments]
     process = subprocess.Popen(command, cwd=folder, env={**os.environ, **environment})
     try:
@@ -83,7 +83,7 @@ def running_script(script: str, folder: Path, *arguments: str, **environment: st
 
 
 def prepared(script: str, folder: Path, name: str = "program.cjs") -> list[str]:
-    """Write a program into a folder from which nep-js and zeromq are importable; the command that runs it."""
+    """Write a program into a folder where it can import nep-js and zeromq; return its command."""
     modules = folder / "node_modules"
     modules.mkdir(exist_ok=True)
     for package, target in (("nep-js", PACKAGE), ("zeromq", PACKAGE / "node_modules" / "zeromq")):
@@ -123,7 +123,7 @@ class Adapter:
                 self._news.notify_all()
 
     def begin(self, do: str, **members: object) -> int:
-        """Send a command; its number."""
+        """Send a command and return its number."""
         self._last += 1
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps({"id": self._last, "do": do, **members}) + "\n")
@@ -137,18 +137,18 @@ class Adapter:
             return self._replies[number]
 
     def do(self, do: str, **members: object) -> Mapping[str, Any]:
-        """Send a command and return its reply, which must not be an error."""
+        """Send a command and return its reply; fails on an error."""
         reply = self.reply(self.begin(do, **members))
         assert "error" not in reply, reply
         return reply
 
     def wait(self, is_met: Callable[[list[Mapping[str, Any]]], bool], timeout_s: float = LONG_S) -> bool:
-        """Wait until something is true of the messages that it reported."""
+        """Wait until the reported messages meet a condition."""
         with self._news:
             return self._news.wait_for(lambda: is_met(self.messages), timeout_s)
 
     def end(self) -> None:
-        """Kill it if it runs, and give everything back."""
+        """Kill the process if it runs, and close its streams."""
         self.process.kill()
         self.process.wait(LONG_S)
         self._reader.join(LONG_S)

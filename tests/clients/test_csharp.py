@@ -1,4 +1,4 @@
-"""Programs in C# and in Python in one network."""
+"""Exchange between programs in C# and Python."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def peer(name: str) -> Path:
 
 
 class Adapter:
-    """The adapter of the conformance tester, asked from here."""
+    """Client of the C# conformance adapter."""
 
     def __init__(self, started: MonoProgram) -> None:
         self.program = started
@@ -61,13 +61,13 @@ class Adapter:
         return said
 
     def refused(self, what: str, **members: object) -> str:
-        """Ask for something that fails and return the sentence."""
+        """Send a request that fails, and return its error message."""
         self._asked += 1
         self.program.say(json.dumps({"id": self._asked, "do": what, **members}))
         return str(json.loads(self.program.line())["error"])
 
     def heard(self, count: int) -> list[dict[str, Any]]:
-        """Wait for so many messages and return them."""
+        """Wait for ``count`` messages and return them."""
         while len(self.events) < count:
             self.events.append(json.loads(self.program.line()))
         return self.events
@@ -103,14 +103,14 @@ def test_first_example_of_the_readme_prints_its_own_message(master: Master) -> N
         assert hello.end() == 0
 
 
-def test_listing_9_delivers_its_message_and_ends(node: Node) -> None:
+def test_listing_9_delivers_its_message_and_exits(node: Node) -> None:
     subscriber = node.new_sub("test", "json")
     with running(example("Listing9")) as sender:
         assert listen(subscriber) == {"message": "hello"}
         assert sender.process.wait(LONG_S) == 0
 
 
-def test_listing_10_prints_what_is_published(node: Node) -> None:
+def test_listing_10_prints_published_messages(node: Node) -> None:
     with running(example("Listing10")) as receiver:
         publisher = node.new_pub("test", "json")
         eventually(lambda: publisher.subscribers > 0)
@@ -155,7 +155,7 @@ def test_payloads_of_every_type_arrive_in_both_directions(
     assert event.get("value", event["payload"]) == sent
 
 
-def test_bursts_and_large_messages_arrive_whole_in_both_directions(adapter: Adapter, node: Node) -> None:
+def test_bursts_and_large_messages_arrive_intact_in_both_directions(adapter: Adapter, node: Node) -> None:
     sub = adapter.ask("subscriber", topic="burst", type="json")["sub"]
     publisher = node.new_pub("burst", "json")
     for number in range(2000):
@@ -168,7 +168,7 @@ def test_bursts_and_large_messages_arrive_whole_in_both_directions(adapter: Adap
     adapter.ask("publish", pub=pub, text=text, count=20)
     assert all(listen(subscriber) == text for _ in range(20))
     assert subscriber.lost == 0
-    adapter.ask("publish", pub=pub, text=text, count=50)  # more than may be under way to one subscriber
+    adapter.ask("publish", pub=pub, text=text, count=50)  # more than the limit in flight to one subscriber
     deadline, received = time.monotonic() + LONG_S, 0
     while received + subscriber.lost < 50 and time.monotonic() < deadline:
         received += subscriber.listen(timeout_s=0.1)[0]
@@ -223,7 +223,7 @@ def names(node: Node) -> set[str]:
     return {each.name for each in node.graph().nodes.values()}
 
 
-def test_killed_program_leaves_the_graph_and_a_restarted_one_is_heard(master: Master, node: Node) -> None:
+def test_killed_program_leaves_the_graph_and_can_be_restarted(master: Master, node: Node) -> None:
     subscriber = node.new_sub("test", "json")
     adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
     for is_last in (False, True):
@@ -241,7 +241,7 @@ def test_killed_program_leaves_the_graph_and_a_restarted_one_is_heard(master: Ma
     assert subscriber.lost == 0
 
 
-def test_slow_subscriber_counts_exactly_what_it_loses(node: Node) -> None:
+def test_slow_subscriber_counts_its_losses_exactly(node: Node) -> None:
     with running(peer("SlowReader")) as slow:
         assert slow.line() == "ready"
         publisher = node.new_pub("fast", "json")
@@ -272,7 +272,7 @@ def test_services_are_called_in_both_directions(adapter: Adapter, node: Node) ->
     assert adapter.ask("call", value={"n": 21}, **asked)["value"] == {"twice": 42}
 
 
-def test_failed_calls_tell_the_client_why(adapter: Adapter, node: Node) -> None:
+def test_failed_calls_raise_the_matching_exception(adapter: Adapter, node: Node) -> None:
     def fail(request: object) -> object:
         raise ValueError("too hot")
 
@@ -287,7 +287,7 @@ def test_failed_calls_tell_the_client_why(adapter: Adapter, node: Node) -> None:
         node.new_client("/gone", timeout_s=0.05).call({})
 
 
-def test_subscriber_with_wildcards_hears_all_topics_that_match(adapter: Adapter, node: Node) -> None:
+def test_subscriber_with_wildcards_receives_all_matching_topics(adapter: Adapter, node: Node) -> None:
     early = node.new_pub("robots/one/state", "json")
     adapter.ask("subscriber", topic="robots/*/state", type="json", pattern=True)
     late = node.new_pub("robots/two/state", "json")
@@ -307,7 +307,7 @@ def test_image_files_arrive_as_pictures(adapter: Adapter, node: Node) -> None:
     assert "JPEG or PNG" in adapter.refused("publish", pub=pub, bytes="AAEC")
 
 
-def test_public_calls_keep_their_promises(master: Master) -> None:
+def test_public_calls_behave_as_documented(master: Master) -> None:
     with running(peer("Api")) as api:
         assert api.line() == "ok"
         assert api.end() == 0
@@ -329,7 +329,7 @@ def test_conformance_tester_finds_no_broken_rule() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_talker_and_listener_of_the_examples_meet(master: Master) -> None:
+def test_talker_and_listener_of_the_examples_exchange_messages(master: Master) -> None:
     with running(example("Talker")) as talker, running(example("Listener")) as listener:
         assert listener.line().startswith("Press Enter")
         assert [listener.line().split(": ")[1].lstrip("-").isdigit() for _ in range(2)] == [True, True]

@@ -35,7 +35,7 @@ def as_text(value: object) -> object:
     return str(value) if isinstance(value, int) else value
 
 
-def test_messages_are_read_and_written_as_the_vectors_say(wire: MonoProgram) -> None:
+def test_messages_are_read_and_written_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("messages"):
         answer = read(wire, vector["parts"])
         if "error" in vector:
@@ -54,7 +54,7 @@ def test_messages_are_read_and_written_as_the_vectors_say(wire: MonoProgram) -> 
             assert msgpack.unpackb(bytes.fromhex(message["extension"])) == means["extension"]
 
 
-def test_batches_are_read_as_the_vectors_say(wire: MonoProgram) -> None:
+def test_batches_are_read_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("batches"):
         answer = read(wire, [vector["part"]])
         if "error" in vector:
@@ -68,7 +68,7 @@ def test_batches_are_read_as_the_vectors_say(wire: MonoProgram) -> None:
             }
 
 
-def test_ids_come_from_the_key(wire: MonoProgram) -> None:
+def test_ids_are_derived_from_the_key(wire: MonoProgram) -> None:
     for node in vectors("ids")["nodes"]:
         key = "e9" if node["key"] == "\u00e9" else node["key"]
         assert json.loads(wire.ask(f"id {key}")) == node["node_id"]
@@ -95,7 +95,7 @@ def test_malformed_messages_are_refused_with_the_same_codes(wire: MonoProgram) -
 
 
 @pytest.mark.skipif(not HAS_CODES, reason="these vectors are not there yet")
-def test_filters_and_notices_are_read_and_written_as_the_vectors_say(wire: MonoProgram) -> None:
+def test_filters_and_notices_are_read_and_written_as_in_the_vectors(wire: MonoProgram) -> None:
     for vector in vectors("filters"):
         answer = json.loads(wire.ask(f"filter {vector['filter']}"))
         if "error" in vector:

@@ -141,7 +141,7 @@ def test_xpub_bounds_the_queue_of_a_slow_reader_and_keeps_serving_others(context
         xpub.line()
         taken = int(xpub.ask(f"burst {TOPIC.hex()} 400 1000000").split()[1])
         assert 0 < taken < 300
-        for _ in range(taken):  # what was taken arrives, and what was dropped does not
+        for _ in range(taken):  # accepted messages arrive, dropped ones do not
             slow.recv_multipart()
         xpub.say(f"send {TOPIC.hex()} {b'end'.hex()}")
         assert slow.recv_multipart() == [TOPIC, b"end"]
@@ -165,7 +165,7 @@ READY = b"\x04\x19\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
 
 
 @pytest.mark.parametrize(
-    ("said", "code"),
+    ("data", "code"),
     [
         (b"GET / HTTP/1.1\r\n\r\n" + bytes(60), "no-greeting"),
         (GREETING.replace(b"\x03\x00NULL", b"\x01\x00NULL"), "old-version"),
@@ -180,21 +180,21 @@ READY = b"\x04\x19\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB"
     ],
 )
 def test_malformed_peer_is_disconnected_and_counted_with_a_reason(
-    stack: ExitStack, said: bytes, code: str
+    stack: ExitStack, data: bytes, code: str
 ) -> None:
     xpub = started(stack, "xpub", "127.0.0.1", "handshake_ms=300")
     port = int(xpub.line().split()[1])
     with socket.create_connection(("127.0.0.1", port), timeout=40.0) as stranger:
-        stranger.sendall(said)
+        stranger.sendall(data)
         try:
             while stranger.recv(4096):
                 pass
         except ConnectionResetError:
             pass
-    told = [xpub.ask("refused")]
-    while not told[-1].startswith("refused"):
-        told.append(xpub.line())
-    assert told[-1] == f"refused {code}=1"
+    lines = [xpub.ask("refused")]
+    while not lines[-1].startswith("refused"):
+        lines.append(xpub.line())
+    assert lines[-1] == f"refused {code}=1"
 
 
 def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None:
@@ -217,12 +217,12 @@ def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None
         xpub.say(f"send {b'alive'.hex()}")
         assert sub.recv() == b"alive"
     xpub.say("refused")
-    while not (told := xpub.line()).startswith("refused"):
+    while not (lines := xpub.line()).startswith("refused"):
         pass
-    assert "unexpected" not in told
+    assert "unexpected" not in lines
 
 
-def test_silent_peer_is_left_and_one_that_answers_heartbeats_is_kept(context, stack: ExitStack) -> None:
+def test_silent_peer_is_disconnected_and_answering_peer_is_kept(context, stack: ExitStack) -> None:
     with context.socket(zmq.DEALER) as peer, socket.create_server(("127.0.0.1", 0)) as silent:
         port = peer.bind_to_random_port("tcp://127.0.0.1")
         kept = started(stack, "dealer", f"tcp://127.0.0.1:{port}", "heartbeat_ms=50")
@@ -231,7 +231,7 @@ def test_silent_peer_is_left_and_one_that_answers_heartbeats_is_kept(context, st
             connection.sendall(GREETING + READY.replace(b"\x19", b"\x1c").replace(b"\x03SUB", b"\x06DEALER"))
             assert [left.line(), left.line()] == ["connected", "disconnected"]
         assert kept.line() == "connected"
-        assert kept.ask("refused") == "refused "  # nothing else was said meanwhile
+        assert kept.ask("refused") == "refused "  # no other line in between
 
 
 def test_mutated_publishers_do_not_stop_the_subscriber(context, stack: ExitStack) -> None:
@@ -256,6 +256,6 @@ def test_mutated_publishers_do_not_stop_the_subscriber(context, stack: ExitStack
         while sub.line() != f"message {TOPIC.hex()} {b'alive'.hex()}":
             pass
     sub.say("refused")
-    while not (told := sub.line()).startswith("refused"):
+    while not (lines := sub.line()).startswith("refused"):
         pass
-    assert "unexpected" not in told
+    assert "unexpected" not in lines

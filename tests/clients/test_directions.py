@@ -104,7 +104,7 @@ var subscriber = node.new_callback("test", "json", callback);
 
 @pytest.fixture
 def commands(tmp_path: Path) -> dict[str, list[str]]:
-    """Commands that start the program of each language."""
+    """Return the command of the program in each language."""
     build_package()
     compiled = mono_programs.program(
         "Directions.exe", mono_programs.CSHARP / "tests" / "peer" / "Directions.cs"
@@ -127,7 +127,7 @@ def subscriber_count(node: nep.node) -> int:
 
 
 class Programs:
-    """Running programs that print into files of a folder; killed at the end."""
+    """Running programs with output files in a folder; killed by `close`."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

@@ -1,4 +1,4 @@
-"""nep-js: its own tests, the listings of the paper, and exchange with Python, also on bad days."""
+"""nep-js: its own tests, the listings of the paper, and exchange with Python, also under failures."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ SLOW_RULES = {
     "again", "bye-again", "closed-is-left", "lost-last-seq", "lost-late", "malformed-named", "next-s",
     "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
 }  # fmt: skip
-"""They wait for renewals for seconds each; `nep wire check` without --rule has them, too."""
+"""Rules that wait for renewals; only `nep wire check` without --rule runs them."""
 ALL_TYPES = """\
 const { Robot } = require("nep-js/robot");
 
@@ -114,7 +114,7 @@ def _package() -> None:
 
 @pytest.fixture
 def program(master: Master) -> Iterator[Adapter]:
-    """A program in JavaScript that does what it is told, with a node of the name `js`."""
+    """JavaScript program that carries out requests with a node named `js`."""
     running = Adapter(master.address)
     running.do("node", name="js")
     yield running
@@ -166,7 +166,7 @@ def test_published_message_arrives_and_the_program_ends(python, master, tmp_path
     assert subscriber.lost == 0
 
 
-def test_callback_of_the_listing_gets_the_message(python, master, tmp_path):
+def test_callback_of_the_listing_receives_the_message(python, master, tmp_path):
     publisher = python.new_pub("test", "json", latched=True)
     publisher.publish({"message": "hello world"})
     done = run_script(SUBSCRIBER.format(node="Node"), tmp_path, NEP_MASTER=master.address)
@@ -249,7 +249,7 @@ def test_late_subscribers_receive_latched_messages_and_history(program, python):
     assert [each["value"] for each in program.messages] == [2, 3]
 
 
-def test_patterns_hear_topics_that_come_later(program, python):
+def test_patterns_match_later_topics(program, python):
     sub = program.do("subscriber", topic="/*/camera", type="json")["sub"]
     for name in ("left", "right"):
         python.new_pub(f"/{name}/camera", "json").publish(name)
@@ -283,7 +283,7 @@ def test_call_ends_when_its_server_is_killed(program):
     assert "ended" in ended["error"]
 
 
-def test_programs_of_the_readme_talk_to_each_other(python, tmp_path):
+def test_programs_of_the_readme_exchange_messages(python, tmp_path):
     readme = (PACKAGE / "README.md").read_text(encoding="utf-8")
     programs = dict(re.findall(r"```js\n// (\w+\.mjs)\n(.*?)```", readme, re.DOTALL))
     commands = {name: prepared(text, tmp_path, name) for name, text in programs.items()}
@@ -298,7 +298,7 @@ def test_programs_of_the_readme_talk_to_each_other(python, tmp_path):
         subscriber.communicate()
 
 
-def test_master_that_is_restarted_under_traffic_loses_nothing(monkeypatch):
+def test_master_restart_under_traffic_loses_nothing(monkeypatch):
     with Master("127.0.0.1:0", learn_s=0.5) as first:
         address = first.address
         monkeypatch.setenv("NEP_MASTER", address)
@@ -329,7 +329,7 @@ def test_master_that_is_restarted_under_traffic_loses_nothing(monkeypatch):
         program.end()
 
 
-def test_killed_program_leaves_the_graph_and_costs_new_publishers_nothing(program, python):
+def test_killed_program_leaves_the_graph_and_does_not_delay_new_publishers(program, python):
     program.do("subscriber", topic="test", type="json")
     publisher = python.new_pub("test", "json")
     assert publisher.subscribers == 1
@@ -338,7 +338,7 @@ def test_killed_program_leaves_the_graph_and_costs_new_publishers_nothing(progra
     publisher.publish(1)
 
 
-def test_subscriber_that_reads_nothing_for_a_while_counts_what_it_missed(program, python):
+def test_suspended_subscriber_counts_its_losses(program, python):
     sub = program.do("subscriber", topic="large", type="bytes", latest=True)["sub"]
     publisher = python.new_pub("large", "bytes")
     hang = program.begin("hang", seconds=0.5)
@@ -353,7 +353,7 @@ def test_subscriber_that_reads_nothing_for_a_while_counts_what_it_missed(program
     eventually(is_complete)
 
 
-def test_publisher_bounds_what_is_under_way_to_a_slow_subscriber(program, python):
+def test_publisher_bounds_messages_in_flight_to_a_slow_subscriber(program, python):
     subscriber = python.new_sub("large", "bytes")
     pub = program.do("publisher", topic="large", type="bytes")["pub"]
     payload = base64.b64encode(bytes(LARGE_BYTES)).decode()
@@ -417,7 +417,7 @@ def test_declared_types_are_described_as_in_python(tmp_path):
     assert robot.events[0].filters == ("side",)
 
 
-def test_robot_keeps_the_contract_of_drivers(tmp_path):
+def test_robot_passes_the_contract_of_drivers(tmp_path):
     example = (PACKAGE / "examples" / "turntable.mjs").read_text(encoding="utf-8")
     command, program = prepared(example, tmp_path, "turntable.mjs")
     contract = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider"]

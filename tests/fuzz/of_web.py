@@ -1,4 +1,4 @@
-"""Targets: what web pages send and who they say they are, and messages in the form that pages ask for."""
+"""Targets: operations and origins of web pages, and messages in each compression."""
 
 from __future__ import annotations
 

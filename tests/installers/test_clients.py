@@ -1,4 +1,4 @@
-"""Packages of the client libraries: nep-js installs from its file; a missing tool leaves its package out."""
+"""Packages of the client libraries: nep-js can be installed from its file; missing tools skip a package."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_installed_package_of_javascript_can_be_required_and_imported(tmp_path: 
 
 
 @pytest.mark.parametrize("pack", [pack_javascript, pack_nuget])
-def test_package_is_left_out_without_its_tool(
+def test_package_is_skipped_without_its_tool(
     pack: Callable[[Path, Path], list[Path]],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

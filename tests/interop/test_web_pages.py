@@ -1,4 +1,4 @@
-"""roslib and roslibpy, unmodified, with `nep web`: what their own examples do."""
+"""Unmodified roslib and roslibpy with `nep web`, as in their own examples."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def server(master: Master) -> Iterator[WebServer]:
 
 @pytest.fixture
 def clients() -> Iterator[Peers]:
-    """Clients of rosbridge, which need none of the original NEP's fixed ports."""
+    """Clients of rosbridge; they don't use the fixed ports of the original NEP."""
     started = Peers()
     yield started
     started.close()
@@ -51,7 +51,7 @@ def started(clients: Peers, client: str, server: WebServer) -> Program:
 
 
 @pytest.mark.parametrize("client", CLIENTS)
-def test_client_does_what_its_examples_do(
+def test_client_runs_like_its_examples(
     clients: Peers, server: WebServer, node: nep.Node, client: str
 ) -> None:
     heard = node.new_sub("/listener", "string")
@@ -104,11 +104,11 @@ def test_roslib_reads_every_compression(clients: Peers, server: WebServer, node:
     page.wait(lambda: "failed" in str(page.got[-1]), "the refusal of a parameter")
 
 
-def test_roslib_is_told_when_the_server_ends(clients: Peers, master: Master, node: nep.Node) -> None:
+def test_roslib_receives_the_close_of_the_server(clients: Peers, master: Master, node: nep.Node) -> None:
     settings = WebSettings(port=0, master=master.address)
     with WebServer(settings) as first:
         page = started(clients, "roslib", first)
         page.tell(["listen", "/chatter", "std_msgs/String"])
         eventually(lambda: "/chatter" in node.graph().topics)
-    assert page.process.wait(30) == 0  # told that it was closed, not cut off
+    assert page.process.wait(30) == 0  # by a close frame, not a broken connection
     eventually(lambda: not node.graph().topics)

@@ -22,20 +22,20 @@ pytestmark = [pytest.mark.web, pytest.mark.interop, pytest.mark.timeout(600)]
 GUIDE = Path(__file__).parents[2] / "docs/web.md"
 PAGE = """<!doctype html><title>waiting</title><script>%s</script><script>
 const seen = {};
-const told = (name, value) => { seen[name] = value; document.title = JSON.stringify(seen); };
+const report = (name, value) => { seen[name] = value; document.title = JSON.stringify(seen); };
 const ros = new ROSLIB.Ros({ url: "%s" });
-ros.on("error", () => told("error", true));
-ros.on("close", () => told("closed", true));
+ros.on("error", () => report("error", true));
+ros.on("close", () => report("closed", true));
 ros.on("connection", () => {
   const talker = new ROSLIB.Topic({ ros, name: "/talker", messageType: "std_msgs/String" });
   talker.publish(new ROSLIB.Message({ data: "from the page" }));
   new ROSLIB.Topic({ ros, name: "/chatter", messageType: "std_msgs/String" })
-    .subscribe((message) => told("chatter", message.data));
+    .subscribe((message) => report("chatter", message.data));
   new ROSLIB.Topic({ ros, name: "/scan", messageType: "sensor_msgs/LaserScan", compression: "cbor" })
-    .subscribe((message) => told("scan", [message.ranges.constructor.name, message.ranges[1]]));
+    .subscribe((message) => report("scan", [message.ranges.constructor.name, message.ranges[1]]));
   new ROSLIB.Service({ ros, name: "/add", serviceType: "x/Add" })
-    .callService(new ROSLIB.ServiceRequest({ a: 1, b: 2 }), (result) => told("sum", result.sum));
-  ros.getTopics((result) => told("topics", result.topics.includes("/chatter")));
+    .callService(new ROSLIB.ServiceRequest({ a: 1, b: 2 }), (result) => report("sum", result.sum));
+  ros.getTopics((result) => report("topics", result.topics.includes("/chatter")));
 });
 </script>"""
 
@@ -62,7 +62,7 @@ def page(qtbot: QtBot) -> Iterator[QWebEnginePage]:
     profile.deleteLater()
 
 
-def test_page_of_this_computer_talks_and_one_of_another_site_is_refused(
+def test_page_of_this_computer_connects_and_page_of_another_site_is_refused(
     qtbot: QtBot, page: QWebEnginePage, node: nep.Node, master: Master, roslib: str
 ) -> None:
     heard = node.new_sub("/talker", "string")

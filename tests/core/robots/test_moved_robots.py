@@ -106,7 +106,7 @@ def test_motions_are_bounded_and_none_is_forgotten(ledger: Ledger) -> None:
 
 
 def newcomer_after(ledger: Ledger, graphs: int) -> None:
-    """A robot is told something and ends it; a twin is first seen in the graph after `graphs` others."""
+    """Command a robot, which finishes; a twin appears in the graph after ``graphs`` others."""
     ledger.note(["Pepper"], "form", id="1")
     ledger.ended("Pepper", "1", OLD)
     for _ in range(graphs):
@@ -115,7 +115,7 @@ def newcomer_after(ledger: Ledger, graphs: int) -> None:
 
 
 @pytest.mark.parametrize("graphs", [0, 1])
-def test_a_twin_that_appears_right_after_a_command_may_have_heard_it(ledger: Ledger, graphs: int) -> None:
+def test_twin_that_appears_right_after_a_command_may_have_received_it(ledger: Ledger, graphs: int) -> None:
     newcomer_after(ledger, graphs)
     assert ledger.other_programs("Pepper", OLD) == (NEW,)
     ledger.stood_still("Pepper", {"old"}, ledger.mark)
@@ -124,19 +124,19 @@ def test_a_twin_that_appears_right_after_a_command_may_have_heard_it(ledger: Led
     assert "Pepper" not in ledger
 
 
-def test_a_twin_that_appears_later_has_not_heard_it(ledger: Ledger) -> None:
+def test_twin_that_appears_later_has_not_received_the_command(ledger: Ledger) -> None:
     newcomer_after(ledger, 2)
     assert "Pepper" not in ledger
 
 
-def test_a_twin_that_proved_a_stop_before_a_graph_shows_it_is_no_newcomer(ledger: Ledger) -> None:
+def test_twin_with_a_proven_stop_is_not_a_newcomer(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "form", id="1")
     ledger.stood_still("Pepper", {"old", "new"}, ledger.mark)
     ledger.take_newcomers({"Pepper": [NEW]})
     assert "Pepper" not in ledger
 
 
-def test_a_person_who_confirms_means_newcomers_too(ledger: Ledger) -> None:
+def test_confirmation_of_the_user_includes_newcomers(ledger: Ledger) -> None:
     ledger.note(["Pepper"], "key")
     ledger.confirm(["Pepper"])
     assert ledger.sent_to == ()

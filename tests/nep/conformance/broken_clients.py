@@ -1,4 +1,4 @@
-"""Clients with one deliberate error each: `BROKEN` has one for every rule."""
+"""Clients with one deliberate error each: `BROKEN` maps each rule to a client that breaks it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BROKEN: dict[str, type[Client]] = {}
 
 
 def breaks(rule: str) -> Callable[[type[Client]], type[Client]]:
-    """Register a client that breaks this rule."""
+    """Register the client that breaks a rule."""
 
     def register(client: type[Client]) -> type[Client]:
         assert rule not in BROKEN

@@ -1,4 +1,4 @@
-"""A small client of the native wire that passes every rule. Each of its parts can be replaced.
+"""Small client of the native wire that passes every rule; subclasses override single methods.
 
 It is an adapter at the same time: it runs in a thread and reads its requests from a queue. All times but the
 bound of the handshake are shortened by `SCALE`.
@@ -35,7 +35,7 @@ class Client(Services):
 
     def __init__(self, master: str) -> None:
         self.reads, self.writes = Stream(), Stream()
-        """What the tester reads and writes."""
+        """Streams of the tester."""
         self._context: zmq.Context[Any] = zmq.Context()
         self._context.linger = 0
         self.master: zmq.Socket[bytes] = self._context.socket(zmq.DEALER)
@@ -76,14 +76,14 @@ class Client(Services):
                     self._do(json.loads(line))
                 self.step()
             self.code = 0
-        except BaseException:  # noqa: BLE001 - the tester sees its exit code
+        except BaseException:  # noqa: BLE001 - reported as the exit code
             self.code = 1
         finally:
             self.reads.close()
             self._context.destroy()
 
-    def say(self, said: Mapping[str, Any]) -> None:
-        self.reads.write(json.dumps(said).encode() + b"\n")
+    def say(self, line: Mapping[str, Any]) -> None:
+        self.reads.write(json.dumps(line).encode() + b"\n")
 
     def _do(self, request: dict[str, Any]) -> None:
         number = request.pop("id")
@@ -92,7 +92,7 @@ class Client(Services):
                 request[own] = request.pop(name)
         self.say({"re": number, **getattr(self, "do_" + request.pop("do"))(**request)})
 
-    # ---- what it is told to do
+    # ---- requests of the tester
 
     def do_features(self) -> dict[str, Any]:
         features = [
@@ -175,8 +175,8 @@ class Client(Services):
             elif data is not None:
                 payload = base64.b64decode(data)
             else:
-                said = {**value, "n": number} if count and isinstance(value, dict) else value
-                payload = self.encode(self.pubs[pub], said)
+                counted = {**value, "n": number} if count and isinstance(value, dict) else value
+                payload = self.encode(self.pubs[pub], counted)
             self.publish(self.pubs[pub], payload)
         return {}
 
@@ -347,8 +347,8 @@ class Client(Services):
                 self.promised(sub, id, seq)
 
     def next_s(self, what: Mapping[str, Any]) -> float:
-        told = what.get("next_s")
-        return SCALE if told is None or told == 1.0 else float(told)
+        next_s = what.get("next_s")
+        return SCALE if next_s is None or next_s == 1.0 else float(next_s)
 
     def in_topics(self, what: Mapping[str, Any]) -> list[Mapping[str, Any]]:
         return [each for topic in what.get("topics", ()) for each in topic["publishers"]]
@@ -377,7 +377,7 @@ class Client(Services):
         return True
 
     def unusable(self, sub: Sub, endpoint: str) -> None:
-        sub.problem = f"{endpoint} is no endpoint"
+        sub.problem = f"{endpoint} is not an endpoint"
 
     def move(self, sub: Sub, source: Source, endpoint: str) -> None:
         if source.endpoint:
@@ -426,7 +426,9 @@ class Client(Services):
     # ---- subscribers
 
     def read(self, sub: Sub, parts: list[bytes]) -> None:
-        if parts[0] != sub.hello and parts[0].startswith(b"\xffhello"):  # for one of several topics
+        if parts[0] != sub.hello and parts[0].startswith(
+            b"\xffhello"
+        ):  # pattern subscribers have a hello for each topic
             sub.sources[wire.read_header(parts[1]).publisher].has_echoed = True
             return
         if parts[0] == sub.hello and len(parts) == 2:
@@ -476,7 +478,7 @@ class Client(Services):
         header, payload = read.header, bytes(read.payload)
         codec = codec_numbered(header.codec)
         assert codec is not None
-        said = {
+        event = {
             "event": "message",
             "sub": sub.number,
             "topic": read.topic,
@@ -488,11 +490,11 @@ class Client(Services):
         }
         if codec.name != "bytes":
             try:
-                said["value"] = self.decode(codec.name, payload)
-                json.dumps(said["value"])
+                event["value"] = self.decode(codec.name, payload)
+                json.dumps(event["value"])
             except (ValueError, RecursionError):
-                said.pop("value", None)
-        self.say(said)
+                event.pop("value", None)
+        self.say(event)
 
     def decode(self, codec: str, payload: bytes) -> Any:
         if codec == "msgpack":
@@ -520,9 +522,9 @@ class Client(Services):
         return source.has_echoed
 
     def tell_read(self, sub: Sub, header: wire.Header) -> None:
-        said = wire.read_part(wire.Read(sub.id, header.publisher, header.seq, 2**30))
-        sub.socket.subscribe(said)
-        sub.socket.unsubscribe(said)
+        answer = wire.read_part(wire.Read(sub.id, header.publisher, header.seq, 2**30))
+        sub.socket.subscribe(answer)
+        sub.socket.unsubscribe(answer)
 
     def reached(self, sub: Sub, source: Source, seq: int) -> None:
         if source.last is not None and seq > source.last:
@@ -546,7 +548,7 @@ class Client(Services):
     def refuse(self, sub: Sub, error: WireError) -> None:
         sub.problem = error.reason
 
-    # ---- its loop
+    # ---- event loop
 
     def step(self) -> None:
         now = time.monotonic()

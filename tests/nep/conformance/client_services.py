@@ -1,4 +1,4 @@
-"""The part of the small client that serves and calls services."""
+"""Services of the small client: servers and calls."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from tests.nep.conformance.client_state import Pub
 
 
 class Services:
-    """What it needs of the rest comes from `Client`."""
+    """Mixin of `Client`."""
 
     node: dict[str, Any]
     servers: list[zmq.Socket[bytes]]
     counted: list[Pub]
-    """Servers, as they are counted in renewals."""
+    """Servers, for the counts in renewals."""
     _context: zmq.Context[Any]
     ask: Callable[..., dict[str, Any]]
     tell: Callable[..., int]
@@ -53,7 +53,7 @@ class Services:
             json.loads(bytes(call.data))
             reply = self.answer(call)
         except ValueError:
-            reply = service_wire.failure(service_wire.CallKind.REFUSED, "", "no JSON")
+            reply = service_wire.failure(service_wire.CallKind.REFUSED, "", "not JSON")
         socket.send_multipart([sender, *service_wire.NATIVE.answer(call.number, reply)])
 
     def refuse_call(self, error: WireError) -> None:

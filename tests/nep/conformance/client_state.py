@@ -1,4 +1,4 @@
-"""What the small client of these tests remembers: its streams, publishers and subscribers."""
+"""State of the small client of these tests: streams, publishers and subscribers."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Sub:
     hello: bytes
     sources: dict[int, Source] = field(default_factory=dict)
     topics: list[str] = field(default_factory=list)
-    """Those that match, of a subscriber with wildcards."""
+    """Matching topics of a subscriber with wildcards."""
     received: int = 0
     lost: int = 0
     problem: str = ""

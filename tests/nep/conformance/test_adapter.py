@@ -1,4 +1,4 @@
-"""The adapter of nep passes every rule, and the command `nep wire check` says so."""
+"""The adapter of nep passes every rule, also by the command `nep wire check`."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def test_unknown_rule_and_missing_command_are_usage_errors() -> None:
 
 def test_list_has_all_rules(capsys: pytest.CaptureFixture[str]) -> None:
     wire.check([], [], list_rules=True)
-    said = capsys.readouterr().out
-    assert all(each.id in said for each in chosen_rules(()))
+    output = capsys.readouterr().out
+    assert all(each.id in output for each in chosen_rules(()))
 
 
 def test_sections_of_rules_are_in_the_documentation() -> None:

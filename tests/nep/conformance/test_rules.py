@@ -13,14 +13,14 @@ from tests.nep.conformance.client import SCALE, Client
 
 
 def judged(rule: str) -> Outcome:
-    """The outcome of a rule for the client that breaks it."""
+    """Return the outcome of a rule for the client that breaks it."""
     (outcome,) = check(BROKEN[rule], chosen_rules([rule]), SCALE)
     return outcome
 
 
 @pytest.fixture(scope="module")
 def outcomes() -> Mapping[str, Outcome]:
-    """The outcomes of all broken clients, which mostly wait: side by side."""
+    """Outcomes of all broken clients, checked in parallel because they mostly wait."""
     with ThreadPoolExecutor(12) as pool:
         return dict(zip(BROKEN, pool.map(judged, BROKEN), strict=True))
 

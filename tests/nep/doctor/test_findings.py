@@ -249,14 +249,14 @@ OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", 
         ((OTHER_JS, OUR_JS), "warning", f'npm uninstall --prefix "{Path("/home/me/robot")}" nep-js'),
     ],
 )
-def test_another_nep_js_is_a_warning_where_it_hides_ours(packages, severity, command):
+def test_foreign_nep_js_that_hides_ours_is_a_warning(packages, severity, command):
     one = found(node_packages=packages)["package:nep-js"]
     assert (one.severity, one.command) == (severity, command)
     assert packages[0].place in one.sentence
     assert "package:nep-js" not in found()
 
 
-def test_original_package_of_the_terminals_python_is_told():
+def test_original_package_of_the_terminals_python_is_reported():
     original = PackageFact("nep", "0.5.4.8", "/usr/lib/python3/dist-packages", is_ours=False)
     one = found(path_package=original)["package:python3"]
     assert one.severity == "info"

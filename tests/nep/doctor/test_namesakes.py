@@ -1,4 +1,4 @@
-"""Packages with the names of NEP Studio's that other programs of this computer import."""
+"""Detection of other packages named nep and nep-js on this computer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def node_package(folder: Path, described: str) -> str:
     return str(package)
 
 
-def test_nep_js_packages_come_in_the_order_of_node(tmp_path):
+def test_nep_js_packages_are_listed_in_search_order_of_node(tmp_path):
     ours = (CLIENT / "package.json").read_text("utf-8")
     project, shared = tmp_path / "project", tmp_path / "shared"
     near = node_package(project, json.dumps({"name": "nep-js", "version": "0.1.1"}))
@@ -44,7 +44,7 @@ def test_unreadable_package_of_node_is_skipped(tmp_path, described):
 
 @pytest.fixture
 def environment(tmp_path):
-    """An environment with a `python3` and its packages' folder."""
+    """Environment with a `python3` and a folder of packages."""
     made = tmp_path / "env"
     (made / "bin").mkdir(parents=True)
     python = made / "bin" / "python3"

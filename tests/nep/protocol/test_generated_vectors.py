@@ -1,4 +1,4 @@
-"""The generated vectors of the wire: they are up to date, and the pure functions read and write them."""
+"""Generated vectors of the wire: they are up to date, and encoders and decoders agree with them."""
 
 from __future__ import annotations
 

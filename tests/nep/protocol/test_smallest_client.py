@@ -1,4 +1,4 @@
-"""The smallest client of docs/smallest-client.md meets a node of nep, in both directions."""
+"""The smallest client of docs/smallest-client.md with nodes of nep, in both directions."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_publisher_without_hello_reaches_a_subscriber(
         assert subscriber.refused == 0
 
 
-def test_subscriber_without_hello_hears_a_publisher(smallest: ModuleType, node: Any, master: Master) -> None:
+def test_subscriber_without_hello_receives_messages(smallest: ModuleType, node: Any, master: Master) -> None:
     subscriber = smallest.Subscriber(node, "example")
     with nep.node("ours") as ours:
         publisher = ours.new_pub("example", "json")
@@ -66,7 +66,7 @@ def test_subscriber_without_hello_hears_a_publisher(smallest: ModuleType, node: 
         eventually(lambda: node.serve() or ours.graph().topics["example"].subscribers[0].received == 50)
 
 
-def test_node_joins_a_master_that_was_started_again(smallest: ModuleType) -> None:
+def test_node_joins_a_restarted_master(smallest: ModuleType) -> None:
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         node = smallest.Node("small", first.address)
         smallest.Publisher(node, "example")

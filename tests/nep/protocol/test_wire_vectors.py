@@ -44,7 +44,7 @@ def parts_of(vector: dict[str, Any]) -> list[bytes]:
 
 
 def meaning_of(means: dict[str, Any]) -> dict[str, Any]:
-    """What a vector says, with 64-bit numbers as numbers: the files have them as text."""
+    """Return the values of a vector with 64-bit numbers as integers: the files have them as text."""
     return {**means, **{name: int(means[name]) for name in ("seq", "stamp_ns", "publisher")}}
 
 
@@ -203,7 +203,7 @@ def test_subscriber_rejects_and_counts_malformed_messages(
     count = 0
     for _code, *vector in MALFORMED:
         parts = [bytes.fromhex(part) for part in vector]
-        if parts and parts[0].startswith(wire.topic_part("example")):  # others do not pass its filter
+        if parts and parts[0].startswith(wire.topic_part("example")):  # other parts are removed by the filter
             theirs.send_multipart(parts)
             count += 1
     theirs.send_multipart(wire.join("example", wire.Header(1, 0, 1, 1, 9), b"{}"))
@@ -218,7 +218,7 @@ def test_subscriber_rejects_and_counts_malformed_messages(
 
 @pytest.fixture
 def fixed_master() -> Iterator[Master]:
-    """A master with the epoch that the vectors say."""
+    """Master with the epoch of the vectors."""
     master = Master("127.0.0.1:0", learn_s=0.0)
     master.epoch = int(MASTER["epoch"])
     with master:
@@ -229,7 +229,7 @@ def fixed_master() -> Iterator[Master]:
 def asks(
     fixed_master: Master, their: Callable[[int], zmq.Socket[bytes]]
 ) -> Callable[[str, str], tuple[bytes, zmq.Socket[bytes]]]:
-    """Ask over the connection of a name; the answer, behind the pushes that came before it."""
+    """Send a request over the named connection; skip pushes and return the reply."""
     connections: dict[str, zmq.Socket[bytes]] = {}
 
     def ask(who: str, request: str) -> tuple[bytes, zmq.Socket[bytes]]:

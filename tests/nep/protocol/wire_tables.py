@@ -1,4 +1,4 @@
-"""The tables of fields in docs/wire.md, made from the values that nep reads and writes."""
+"""Tables of fields in docs/wire.md, generated from the dataclasses of the protocol."""
 
 from __future__ import annotations
 

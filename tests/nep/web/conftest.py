@@ -1,4 +1,4 @@
-"""A web server, and connections to it that speak the protocol by hand."""
+"""Web server, and clients that send raw operations."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from nep.programs.web import WebServer, WebSettings
 
 @pytest.fixture
 def node(master: Master) -> Iterator[nep.Node]:
-    """A node in Python that pages talk to."""
+    """Python node that exchanges messages with pages."""
     with nep.node("python", master=master.address) as node:
         yield node
 
 
 @pytest.fixture
 def server(master: Master) -> Iterator[WebServer]:
-    """A server as it is without options, at a free port."""
+    """Server with default options on a free port."""
     with WebServer(WebSettings(port=0, master=master.address)) as running:
         yield running
 
 
 class Peer:
-    """A page: sends operations, and receives others."""
+    """Client that sends and receives operations."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self.connection = connection
@@ -38,19 +38,19 @@ class Peer:
         self.connection.send(json.dumps({"op": op, **fields}))
 
     def receive(self, op: str, timeout_s: float = 30.0) -> dict[str, object]:
-        """The next operation of this kind; others are skipped."""
+        """Return the next operation of this kind; skip others."""
         while True:
             got = json.loads(self.connection.recv(timeout_s))
             if got["op"] == op:
                 return got
 
     def refusal(self, op: str, /, **fields: object) -> str:
-        """The sentence of the status that answers an operation."""
+        """Return the message of the status that answers an operation."""
         self.send(op, **fields)
         return str(self.receive("status")["msg"])
 
     def call(self, service: str, /, **args: object) -> dict[str, object]:
-        """The answer of a service."""
+        """Return the answer of a service."""
         self.send("call_service", id=f"call {service}", service=service, args=args)
         answer = self.receive("service_response")
         assert answer["id"] == f"call {service}"
@@ -66,5 +66,5 @@ def open_page(server: WebServer) -> Iterator[Callable[..., Peer]]:
 
 @pytest.fixture
 def page(open_page: Callable[..., Peer]) -> Peer:
-    """A page that is connected."""
+    """Connected page."""
     return open_page()

@@ -1,4 +1,4 @@
-"""Who may connect: pages of this computer, pages that were allowed, and whoever has the token."""
+"""Access to the web server: origins of pages, and tokens."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_page_connects_only_from_an_allowed_origin(origin: str | None, is_allowe
     assert refusal.isprintable()
 
 
-def test_origin_is_written_as_browsers_write_it() -> None:
+def test_origin_is_normalized_as_by_browsers() -> None:
     assert checked_origin("HTTP://Example.ORG:80/") == "http://example.org"
     for origin in ("null", "file://"):
         assert Access({checked_origin(origin)}).origin_refusal(origin) == ""
@@ -51,7 +51,7 @@ def test_origin_is_written_as_browsers_write_it() -> None:
             checked_origin(wrong)
 
 
-def test_token_comes_in_the_url_or_the_header() -> None:
+def test_token_is_read_from_the_url_or_the_header() -> None:
     access = Access(token="s3cret")
     assert access.is_given("/?token=s3cret", None)
     assert access.is_given("/a/b?x=1&token=s3cret", None)
@@ -68,7 +68,7 @@ def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
     return Auth(None, hashlib.sha512(text.encode()).hexdigest(), "c", "d", rand, time_s, "user", end_s)
 
 
-def test_auth_is_valid_once_and_now() -> None:
+def test_auth_is_valid_once_and_for_a_limited_time() -> None:
     check = AuthCheck("s3cret", clock=lambda: 1_000.0)
     assert check.is_right(signed("s3cret", 1_001, 2_000))
     assert not check.is_right(signed("s3cret", 1_001, 2_000))

@@ -1,4 +1,4 @@
-"""`nep web` on the command line: where it serves, its token, and what it says when it can't."""
+"""The command `nep web`: its URL, tokens, and error messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def taken_port() -> Iterator[int]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_command_serves_with_a_token_and_ends_when_told(master: Master, tmp_path: Path) -> None:
+def test_command_serves_with_a_token_until_terminated(master: Master, tmp_path: Path) -> None:
     file = tmp_path / "token"
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
@@ -46,7 +46,7 @@ def test_command_serves_with_a_token_and_ends_when_told(master: Master, tmp_path
         assert err == ""
 
 
-def test_command_says_what_to_do_when_it_cannot_serve(
+def test_command_suggests_a_solution_when_it_cannot_serve(
     master: Master, taken_port: int, tmp_path: Path, type_in: TypeIn, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:
@@ -65,7 +65,7 @@ def test_command_says_what_to_do_when_it_cannot_serve(
         assert ended.returncode == 1
         assert hint in ended.stderr
         assert "Traceback" not in ended.stderr
-    monkeypatch.setitem(sys.modules, "websockets", None)  # as where the extra is not installed
+    monkeypatch.setitem(sys.modules, "websockets", None)  # simulates a missing extra
     ended = type_in("web", "--port", str(taken_port))
     assert (ended.returncode, "nep-studio[web]" in ended.stderr) == (1, True)
     assert os.listdir(tmp_path) == ["short"]  # noqa: PTH208

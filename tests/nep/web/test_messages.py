@@ -1,4 +1,4 @@
-"""Messages of NEP in the shapes of ROS, encoded as pages ask for them, and back."""
+"""Conversion between NEP and ROS messages, in each compression."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_string_is_data_both_ways() -> None:
         from_ros({"data": 1}, "std_msgs/String", "string")
 
 
-def test_plain_json_passes_as_it_is() -> None:
+def test_plain_json_is_unchanged() -> None:
     text = b'{"z": 1.50, "a": [1, {"b": null}]}'
     made = message("json", None, Encoded(text))
     (frame,) = publish_frames("/t", made, EncodingOptions())
@@ -101,7 +101,7 @@ def test_picture_is_a_compressed_image_or_pixels_if_asked() -> None:
         from_ros({"height": -1, "data": ""}, "sensor_msgs/Image", "image")
 
 
-def test_cbor_has_typed_arrays_where_the_type_says_so() -> None:
+def test_cbor_has_typed_arrays_for_array_types() -> None:
     scan = message("sensor_msgs/LaserScan", {"header": {}, "ranges": [1.0, None], "intensities": []})
     tag = sent(scan, "cbor")["ranges"]
     assert (tag.tag, tag.value[:4]) == (85, struct.pack("<f", 1.0))
@@ -129,7 +129,7 @@ def test_png_holds_the_text_and_large_ones_are_refused() -> None:
             text_in_png(data)
 
 
-def test_large_message_is_cut_into_fragments() -> None:
+def test_large_message_is_split_into_fragments() -> None:
     frames = publish_frames("/t", message("string", "é" * 1_000), EncodingOptions("none", 200))
     parts = [json.loads(each.data) for each in frames]
     assert {each["op"] for each in parts} == {"fragment"}
@@ -148,7 +148,7 @@ def test_hostile_message_is_sent_or_refused(compression: str) -> None:
                 continue
 
 
-def test_answer_that_has_no_json_is_refused() -> None:
+def test_answer_that_is_not_json_is_refused() -> None:
     with pytest.raises(NepError):
         operation_frames({"op": "service_response", "values": {"x": object()}}, EncodingOptions())
 

@@ -1,4 +1,4 @@
-"""Operations of pages: parsed within limits, or refused with a sentence."""
+"""Operations of pages: parsed within limits, or refused with a message."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def parsed(**fields: object) -> op.Operation:
 
 
 def refusal(data: bytes) -> str | None:
-    """The sentence that refuses an operation."""
+    """Return the error message of a refused operation."""
     try:
         op.parse(data)
     except op.OperationError as error:
@@ -55,7 +55,7 @@ def test_operations_are_parsed_to_typed_values() -> None:
 
 
 @pytest.mark.parametrize("fields", EXAMPLES, ids=lambda each: each["op"])
-def test_hostile_operation_is_parsed_or_refused_with_a_sentence(fields: dict[str, object]) -> None:
+def test_hostile_operation_is_parsed_or_refused_with_a_message(fields: dict[str, object]) -> None:
     for payload in hostile.payloads(fields):
         said = refusal(payload)
         assert said is None or (said and said.isprintable() and len(said) < 1_000)

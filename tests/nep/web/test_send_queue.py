@@ -1,4 +1,4 @@
-"""What waits for a page: bounded, dropped oldest first, and sent by turns at the rate that the page wants."""
+"""Send queue of a page: bounded, oldest messages dropped first, round-robin over topics, throttled."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_subscriptions_of_a_page_are_combined() -> None:
     assert both.subscription_count == 0
 
 
-def test_bytes_that_wait_for_a_page_are_bounded() -> None:
+def test_queued_bytes_of_a_page_are_bounded() -> None:
     async def fill() -> None:
         waiting, first, second = SendQueue(lambda: 0.0, max_bytes=1_000), feed(), feed()
         for number in range(20):
@@ -72,13 +72,13 @@ def test_bytes_that_wait_for_a_page_are_bounded() -> None:
         waiting.add(second, message(0, size=5_000))
         assert first.size_bytes + second.size_bytes <= 1_000
         waiting.remove(first)
-        waiting.add(second, message(0, size=5_000))  # by itself it is sent
+        waiting.add(second, message(0, size=5_000))  # a single message above the limit is sent
         assert len(second) == 1
 
     asyncio.run(fill())
 
 
-def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
+def test_topics_are_sent_round_robin_after_other_operations() -> None:
     async def drain() -> list[object]:
         waiting, busy, quiet = SendQueue(lambda: 0.0), feed(), feed()
         for number in range(3):
@@ -91,7 +91,7 @@ def test_topics_take_turns_after_what_cannot_be_dropped() -> None:
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
 
 
-def test_page_that_reads_no_answers_is_ended_once() -> None:
+def test_page_that_reads_no_answers_is_closed_once() -> None:
     async def fill() -> int:
         ended: list[bool] = []
         waiting = SendQueue(lambda: 0.0, lambda: ended.append(True))
@@ -103,7 +103,7 @@ def test_page_that_reads_no_answers_is_ended_once() -> None:
     assert asyncio.run(fill()) == 1
 
 
-def test_throttled_message_is_sent_when_its_time_has_come() -> None:
+def test_throttled_message_is_sent_after_its_interval() -> None:
     async def wait() -> float:
         loop = asyncio.get_running_loop()
         waiting, slow = SendQueue(loop.time), feed(throttle_s=0.05)

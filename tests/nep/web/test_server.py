@@ -1,4 +1,4 @@
-"""A server of pages: their nodes, topics and services, and what it refuses."""
+"""Web server: nodes, topics and services of pages, and refused operations."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from tests.nep.web.test_operations import EXAMPLES
 Open = Callable[..., Peer]
 
 
-def test_page_is_a_node_until_it_goes(server: WebServer, node: nep.Node, open_page: Open) -> None:
+def test_page_is_a_node_until_it_disconnects(server: WebServer, node: nep.Node, open_page: Open) -> None:
     page = open_page(origin="http://localhost:8000")
     port = page.connection.socket.getsockname()[1]
     name = f"web_localhost:8000_{port}"
     eventually(lambda: name in {each.name for each in node.graph().nodes.values()})
-    page.connection.socket.shutdown(socket.SHUT_RDWR)  # as a tab that crashes
+    page.connection.socket.shutdown(socket.SHUT_RDWR)  # simulates a crashed tab
     eventually(lambda: name not in {each.name for each in node.graph().nodes.values()})
     eventually(lambda: server.page_names == ())
 
@@ -81,7 +81,7 @@ def test_page_calls_services_and_serves_them(node: nep.Node, page: Peer, open_pa
     clients = [node.new_client(name, timeout_s=30) for name in ("/double", "/double", "/fails")]
     futures = [each.call_async({"x": number}) for number, each in enumerate(clients)]
     calls = sorted((server.receive("call_service") for _each in futures), key=lambda each: each["args"]["x"])
-    for call in reversed(calls):  # in any order: none waits for another
+    for call in reversed(calls):  # in any order: calls are independent
         is_right = call["service"] == "/double"
         values = {"y": 2 * call["args"]["x"]} if is_right else "no luck"
         server.send(
@@ -98,7 +98,7 @@ def test_page_calls_services_and_serves_them(node: nep.Node, page: Peer, open_pa
         waiting.result(30)
 
 
-def test_rosapi_tells_what_there_is(node: nep.Node, page: Peer) -> None:
+def test_rosapi_lists_topics_nodes_and_services(node: nep.Node, page: Peer) -> None:
     node.parameters.declare("speed", 1.5)
     node.new_server("/add", lambda given: given, threads=1)
     node.new_pub("/twist", Twist)
@@ -138,9 +138,9 @@ def test_rosapi_tells_what_there_is(node: nep.Node, page: Peer) -> None:
         assert failed["values"]
 
 
-def test_page_moves_no_robot_that_was_not_allowed(server: WebServer, node: nep.Node, page: Peer) -> None:
+def test_page_cannot_move_a_robot_without_permission(server: WebServer, node: nep.Node, page: Peer) -> None:
     description = {"title": "Rover", "rb:topics": {"command": "/orders"}}
-    page.send("advertise", topic="/orders", type="nep/Json")  # before the robot is there
+    page.send("advertise", topic="/orders", type="nep/Json")  # before the robot is announced
     page.send("publish", topic="/orders", msg=0)
     eventually(lambda: "/orders" in node.graph().topics)
     orders = node.new_sub("/orders")
@@ -165,10 +165,10 @@ def test_allowed_robot_is_moved(master: Master, node: nep.Node) -> None:
         assert orders.listen(timeout_s=30) == (True, {"op": "invoke"})
 
 
-# ---- what is refused
+# ---- refused operations
 
 
-def test_wrong_operations_are_answered_and_the_page_goes_on(
+def test_invalid_operations_are_answered_and_the_page_stays_connected(
     server: WebServer, node: nep.Node, page: Peer
 ) -> None:
     node.new_pub("/picture", "image")
@@ -188,7 +188,7 @@ def test_wrong_operations_are_answered_and_the_page_goes_on(
         assert (answer["level"], answer["id"]) == ("error", number)
         assert answer["msg"]
     assert server.counts.rejected == len(wrong)
-    page.send("unadvertise", topic="/nothing")  # a warning, which it does not want
+    page.send("unadvertise", topic="/nothing")  # a warning, below the level of the page
     page.send("set_level", level="none")
     page.send("nothing")
     page.send("set_level", level="info")
@@ -196,7 +196,7 @@ def test_wrong_operations_are_answered_and_the_page_goes_on(
     assert page.receive("status")["level"] == "info"
 
 
-def test_hostile_operations_end_neither_page_nor_server(
+def test_hostile_operations_close_neither_page_nor_server(
     server: WebServer, node: nep.Node, page: Peer
 ) -> None:
     node.new_server("/s", lambda given: given, threads=1)
@@ -218,7 +218,7 @@ def test_hostile_operations_end_neither_page_nor_server(
     drain.join()
 
 
-def test_message_beyond_the_limit_closes_the_page_alone(server: WebServer, open_page: Open) -> None:
+def test_message_beyond_the_limit_closes_only_its_page(server: WebServer, open_page: Open) -> None:
     large, other = open_page(), open_page()
     large.connection.send("x" * (MAX_MESSAGE_BYTES + 1))
     with pytest.raises(ConnectionClosed) as closed:
@@ -227,7 +227,9 @@ def test_message_beyond_the_limit_closes_the_page_alone(server: WebServer, open_
     assert other.refusal("nothing")
 
 
-def test_page_that_reads_nothing_disturbs_nobody(node: nep.Node, server: WebServer, open_page: Open) -> None:
+def test_page_that_reads_nothing_does_not_affect_others(
+    node: nep.Node, server: WebServer, open_page: Open
+) -> None:
     slow, quick = open_page(max_queue=1), open_page()
     pub = node.new_pub("/big", "string")
     for each in (slow, quick):
@@ -252,7 +254,7 @@ def test_other_origins_are_refused_before_they_are_pages(server: WebServer) -> N
     assert (server.counts.turned_away, server.counts.opened) == (2, 0)
 
 
-def test_token_is_needed_where_there_is_one(master: Master) -> None:
+def test_token_is_required_if_configured(master: Master) -> None:
     token = "a-token-of-some-letters"
     settings = WebSettings(port=0, master=master.address, access=Access(token=token))
     with WebServer(settings) as server:
@@ -279,7 +281,7 @@ def test_token_is_needed_where_there_is_one(master: Master) -> None:
             assert Peer(unlocked).refusal("nothing")
 
 
-def test_server_that_ends_says_so_and_frees_its_port(master: Master) -> None:
+def test_server_sends_close_frames_and_releases_its_port(master: Master) -> None:
     server = WebServer(WebSettings(port=0, master=master.address)).start()
     with pytest.raises(AddressInUseError):
         WebServer(WebSettings(port=server.port, master=master.address)).start()

@@ -1,4 +1,4 @@
-"""A driver in any language as a running program, for the contract over the wire.
+"""Driver program in any language, for the contract test over the wire.
 
 The program takes ``--name``, ``--master`` and ``--test-clock``. With the latter its time stands still; each
 line on its stdin is a number of seconds to advance it, and is answered by a line of JSON with the member
@@ -23,29 +23,29 @@ END_S = 30.0
 
 @dataclass(frozen=True)
 class ProgramKind:
-    """A kind of robot that is driven by a program."""
+    """Kind of a robot with a driver program."""
 
     command: tuple[str, ...]
 
     @property
     def model(self) -> str:
-        """A name for tests, made from the command."""
+        """Name of the tests, from the command."""
         return "".join(sign if sign.isalnum() else "_" for sign in self.command[-1].rpartition("/")[2])
 
 
 def program_kind(command_line: str) -> ProgramKind:
-    """The kind of a command line as a shell would split it."""
+    """Return the kind of a command line, split as by a shell."""
     return ProgramKind(tuple(shlex.split(command_line)))
 
 
 class ProgramClock:
-    """The clock of a program, which stands still until it is advanced."""
+    """Simulated clock of a driver program."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
 
     def advance(self, seconds: float) -> None:
-        """Let time pass; returns when the program says so."""
+        """Advance the clock; returns when the program has confirmed."""
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None
         assert stdout is not None
@@ -58,7 +58,7 @@ class ProgramClock:
 
 
 class ProgramDriver:
-    """The running program, with what tests ask of a `Driver`."""
+    """Running driver program, with the interface of `Driver` that the tests use."""
 
     body: object = None
 
@@ -68,7 +68,7 @@ class ProgramDriver:
         self.robot: Robot = parse(description)
 
     def close(self) -> None:
-        """Ask the program to end, and wait until it has ended without an error."""
+        """Terminate the program, and check that it exits with code 0."""
         self._process.terminate()
         assert self._process.wait(END_S) == 0
 
@@ -77,7 +77,7 @@ class ProgramDriver:
 def running_driver(
     kind: ProgramKind, name: str, master: str, ears: Ears, *, real_clock: bool = False
 ) -> Iterator[tuple[ProgramDriver, ProgramClock]]:
-    """Start the program, and wait until it has announced its robot."""
+    """Start the program, and wait for the announcement of its robot."""
     announced = ears.listen("description", "robot/description")
     command = [*kind.command, "--name", name, "--master", master]
     if not real_clock:

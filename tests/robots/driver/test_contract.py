@@ -31,7 +31,7 @@ from tests.robots.conftest import Ears, FakeClock, eventually
 from tests.robots.driver.driver_program import ProgramDriver, ProgramKind, program_kind, running_driver
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-MAX_HOSTILE_BYTES = 60_000  # larger ones begin shared memory, which outlives the test
+MAX_HOSTILE_BYTES = 60_000  # larger messages use shared memory, which outlives the test
 FINAL = {"succeeded", "failed", "canceled"}
 PATIENCE_S = 3.0  # a loaded machine; what stops on its own within its `within` is measured in bench/stop.py
 

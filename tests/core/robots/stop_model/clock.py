@@ -119,7 +119,7 @@ class SimulatedClock:
                 condition.wait(_AFTER_END_S)
             while True:
                 ready = is_ready()
-                with self._changed:  # what the test changes, it changes before it wakes who is registered
+                with self._changed:  # the test changes the state before it notifies waiting threads
                     is_over = not is_frozen() and (ready or self._now >= deadline)
                     if self._has_ended or is_over:
                         break

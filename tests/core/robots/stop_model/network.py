@@ -180,7 +180,7 @@ class SimulatedNode:
             self.disconnect()
 
     def disconnect(self) -> None:
-        """End the connections of its subscribers, as the system does for a process that has ended."""
+        """Close the connections of its subscribers, as the operating system does for an ended process."""
         for node in self.network.nodes.values():
             for publisher in node.publishers:
                 publisher.connected = [each for each in publisher.connected if each.node is not self]
