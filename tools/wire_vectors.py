@@ -94,6 +94,11 @@ def filters() -> list[dict[str, Any]]:
                 "means": {"kind": "shares", **as_text(shares._asdict())},
             }
         )
+    return [*made, *malformed_filters()]
+
+
+def malformed_filters() -> list[dict[str, Any]]:
+    """Return filters that a publisher must ignore."""
     digits = b"%016x" % SUBSCRIBER
     malformed = {
         "hello without a topic": b"\xffhello/" + digits,
@@ -110,8 +115,7 @@ def filters() -> list[dict[str, Any]]:
         "an unknown word": b"\xffbonjour/" + digits + b"/example",
         "ff alone": b"\xff",
     }
-    made += [{"name": name, "filter": each.hex(), "error": "filter"} for name, each in malformed.items()]
-    return made
+    return [{"name": name, "filter": each.hex(), "error": "filter"} for name, each in malformed.items()]
 
 
 def notices() -> list[dict[str, Any]]:

@@ -21,6 +21,19 @@ else:  # the other commands need not wait for it
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup, no_args_is_help=True, help=_("Test clients of the native wire, in any language.")
 )
+CommandArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        help=_("Command that starts the adapter, after '--'."), metavar=_("COMMAND"), show_default=False
+    ),
+]
+RuleOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--rule", metavar=_("ID"), help=_("Check only this rule. Can be repeated."), show_default=False
+    ),
+]
+ListOption = Annotated[bool, typer.Option("--list", help=_("List the rules and exit."))]
 _STYLES = {"passed": "green", "failed": "bold red", "skipped": "dim"}
 _USAGE = 2
 
@@ -32,21 +45,9 @@ def wire() -> None:
 
 @app.command("check")
 def check(
-    command: Annotated[
-        list[str] | None,
-        typer.Argument(
-            help=_("Command that starts the adapter, after '--'."),
-            metavar=_("COMMAND"),
-            show_default=False,
-        ),
-    ] = None,
-    rule: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--rule", metavar=_("ID"), help=_("Check only this rule. Can be repeated."), show_default=False
-        ),
-    ] = None,
-    list_rules: Annotated[bool, typer.Option("--list", help=_("List the rules and exit."))] = False,
+    command: CommandArgument = None,
+    rule: RuleOption = None,
+    list_rules: ListOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check a client library against the rules of the native wire.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from nep.i18n import _
-from nep.programs.doctor.facts import Facts, FolderFact
+from nep.programs.doctor.facts import Facts, FolderFact, PackageFact
 from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.network import clocks, loopback, master_alerts, masters, originals
 from nep.programs.doctor.original_ports import ports
@@ -93,59 +93,61 @@ def _packages(facts: Facts) -> Iterator[Finding]:
         yield Finding(
             "package", "ok", _("“import nep” gives the one in {folder}.").format(folder=facts.nep_file)
         )
-    yield from _namesakes(facts)
+    yield from _python_namesake(facts)
+    if facts.node_packages:
+        yield _node_package(facts.node_packages)
 
 
-def _namesakes(facts: Facts) -> Iterator[Finding]:
-    """Find packages of other projects that another Python or Node.js imports under our names."""
+def _python_namesake(facts: Facts) -> Iterator[Finding]:
     if facts.path_package is not None:
         yield Finding(
             "package:python3",
             "info",
-            _("“python3” of the terminal imports the original nep {version} from {folder}.").format(
+            _("“python3” in the terminal imports the original nep {version} from {folder}.").format(
                 version=facts.path_package.version, folder=facts.path_package.place
             ),
             _(
-                "Programs of the original NEP need it and join through the gateway. Start your other "
-                "programs with the Python that has NEP Studio."
+                "Programs of the original NEP need it and connect through the gateway. Start other programs "
+                "with the Python of NEP Studio."
             ),
         )
-    if not facts.node_packages:
-        return
-    imported, *hidden = facts.node_packages
+
+
+def _node_package(packages: Sequence[PackageFact]) -> Finding:
+    """Report the imported nep-js, and whether it hides NEP Studio's."""
+    imported, *hidden = packages
     ours = next((each for each in hidden if each.is_ours), None)
     if imported.is_ours:
-        yield Finding(
+        return Finding(
             "package:nep-js",
             "ok",
             _(
                 "JavaScript programs in this folder import nep-js {version} of NEP Studio from {folder}."
             ).format(version=imported.version, folder=imported.place),
         )
-    elif ours is not None:
-        yield Finding(
+    if ours is not None:
+        return Finding(
             "package:nep-js",
             "warning",
             _(
-                "Programs in JavaScript that start in this folder import another package nep-js {version} "
-                "from {folder}; NEP Studio's in {hidden} is hidden."
+                "JavaScript programs in this folder import nep-js {version} of another project from {folder}, "
+                "which hides NEP Studio's in {hidden}."
             ).format(version=imported.version, folder=imported.place, hidden=ours.place),
             _("Uninstall the other package, or start programs of the original NEP in a folder of their own."),
             command=f'npm uninstall --prefix "{Path(imported.place).parent.parent}" nep-js',
         )
-    else:
-        yield Finding(
-            "package:nep-js",
-            "info",
-            _(
-                "Programs in JavaScript that start in this folder import nep-js {version} from {folder}, "
-                "which is not NEP Studio's."
-            ).format(version=imported.version, folder=imported.place),
-            _(
-                "Programs of the original NEP join through the gateway. For the others install the file "
-                "nep-js-….tgz of NEP Studio's release in this folder."
-            ),
-        )
+    return Finding(
+        "package:nep-js",
+        "info",
+        _(
+            "JavaScript programs in this folder import nep-js {version} from {folder}, which is not NEP "
+            "Studio's."
+        ).format(version=imported.version, folder=imported.place),
+        _(
+            "Programs of the original NEP connect through the gateway. For other programs, install the file "
+            "nep-js-….tgz of NEP Studio's release in this folder."
+        ),
+    )
 
 
 def _files(facts: Facts) -> Iterator[Finding]:
