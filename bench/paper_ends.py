@@ -144,7 +144,7 @@ class Called(End):
             try:
                 ended, came = self._came.get(timeout=WAIT_S)
             except queue.Empty:
-                raise LostError("a message did not come back") from None
+                raise LostError("a message was not returned") from None
             taken.append(ended - started)
             check(came, value)
         return taken
@@ -153,7 +153,7 @@ class Called(End):
         """Returns when as many have been sent back."""
         for _ in range(count):
             if not self._echoed.acquire(timeout=WAIT_S):
-                raise LostError("a message did not come")
+                raise LostError("a message was not received")
 
 
 class LostError(Exception):
@@ -249,7 +249,7 @@ class NepEnd(Listening):
         """The next one, decoded."""
         ok, value = self._in[kind].listen(timeout_s=WAIT_S)
         if not ok:
-            raise LostError("a message did not come")
+            raise LostError("a message was not received")
         return value
 
 

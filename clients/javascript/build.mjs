@@ -1,5 +1,5 @@
-// Adds the ES module entries to what tsc built. They re-export the CommonJS build instead of being a second one,
-// so a program that uses both `import` and `require` has one set of classes.
+// Adds ES module entries to the output of tsc. They re-export the CommonJS build, so that a program that uses both
+// `import` and `require` has one set of classes.
 import { writeFileSync } from "node:fs";
 
 const named = 'export * from "./index.js";\n';

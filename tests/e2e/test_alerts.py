@@ -144,5 +144,5 @@ def test_alerts_cover_nothing_and_panels_keep_what_they_show(
     fingers.do("recordings", "Recordings")
     first = height_of_timeline(studio)
     studio.click("Back to live")
-    until(lambda: not studio.all(kind="TimelinePanel"), "the Timeline has gone, and Open is where it was")
+    until(lambda: not studio.all(kind="TimelinePanel"), "the Timeline is closed, and Open is in its place")
     assert height_of_timeline(studio) == first

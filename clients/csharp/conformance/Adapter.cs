@@ -5,7 +5,7 @@ using System.Text;
 using Nep;
 using Newtonsoft.Json.Linq;
 
-/// <summary>Does with the library what <c>nep wire check</c> asks for: one JSON object a line on stdin and stdout.</summary>
+/// <summary>Adapter for <c>nep wire check</c>: carries out requests from stdin, replies on stdout; one JSON object per line.</summary>
 internal static class Adapter
 {
     private static readonly object Output = new object();
@@ -157,35 +157,35 @@ internal static class Adapter
 
     private static void Report(long number, Message message)
     {
-        var said = new JObject();
-        said["event"] = "message";
-        said["sub"] = number;
-        said["topic"] = message.Topic;
-        said["codec"] = message.Codec;
-        said["seq"] = message.Sequence.ToString(CultureInfo.InvariantCulture);
-        said["stamp_ns"] = message.StampNanoseconds.ToString(CultureInfo.InvariantCulture);
-        said["publisher"] = message.PublisherId.ToString(CultureInfo.InvariantCulture);
-        said["payload"] = Convert.ToBase64String(message.Payload);
+        var line = new JObject();
+        line["event"] = "message";
+        line["sub"] = number;
+        line["topic"] = message.Topic;
+        line["codec"] = message.Codec;
+        line["seq"] = message.Sequence.ToString(CultureInfo.InvariantCulture);
+        line["stamp_ns"] = message.StampNanoseconds.ToString(CultureInfo.InvariantCulture);
+        line["publisher"] = message.PublisherId.ToString(CultureInfo.InvariantCulture);
+        line["payload"] = Convert.ToBase64String(message.Payload);
         if (message.Codec == "json")
         {
-            said["value"] = message.As<JToken>();
+            line["value"] = message.As<JToken>();
         }
         else if (message.Codec == "string")
         {
-            said["value"] = message.Text;
+            line["value"] = message.Text;
         }
         else if (message.Codec == "msgpack")
         {
             try
             {
-                said["value"] = Token(message.Value);
+                line["value"] = Token(message.Value);
             }
             catch (NotSupportedException)
             {
-                // it has no form in JSON
+                // not representable in JSON
             }
         }
-        Say(said);
+        Say(line);
     }
 
     private static object Plain(JToken token)
@@ -244,11 +244,11 @@ internal static class Adapter
         return new JValue(value);
     }
 
-    private static void Say(JObject said)
+    private static void Say(JObject line)
     {
         lock (Output)
         {
-            Console.Out.WriteLine(said.ToString(Newtonsoft.Json.Formatting.None));
+            Console.Out.WriteLine(line.ToString(Newtonsoft.Json.Formatting.None));
             Console.Out.Flush();
         }
     }

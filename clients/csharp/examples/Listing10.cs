@@ -1,7 +1,7 @@
 using System;
 using Nep;
 
-// The program of the paper's listing 10: wait for messages and print them.
+// Listing 10 of the paper: wait for messages and print them.
 namespace Example
 {
     class Program

@@ -1,6 +1,6 @@
 using Nep;
 
-// The program of the paper's listing 9: publish one message and end.
+// Listing 9 of the paper: publish one message and exit.
 namespace Example
 {
     class Program

@@ -1,5 +1,5 @@
-// The adapter for `nep wire check -- node clients/javascript/conformance/adapter.mjs`: does with the library what it
-// is told over stdin, one JSON object a line, and reports over stdout. 64-bit numbers are decimal text.
+// Adapter for `nep wire check -- node clients/javascript/conformance/adapter.mjs`: carries out requests from stdin and
+// writes replies to stdout, one JSON object per line. 64-bit numbers are decimal strings.
 import { createInterface } from "node:readline";
 import nep from "../dist/index.mjs";
 
@@ -27,7 +27,7 @@ function write(value) {
   process.stdout.write(`${JSON.stringify(value)}\n`);
 }
 
-/** A decoded payload in its JSON form; undefined where it has none. */
+/** Returns a decoded payload as JSON value; undefined if not representable. */
 function jsonForm(message) {
   if (message.codec === "bytes" || message.codec === "image") return undefined;
   try {
@@ -125,7 +125,7 @@ const actions = {
     return { value: await clients.get(service).call(value, { timeoutS }) };
   },
 
-  /** For our own tests: keeps the event loop busy. */
+  /** Blocks the event loop, for tests of this package. */
   hang({ seconds }) {
     const end = performance.now() + seconds * 1000;
     while (performance.now() < end);

@@ -1,4 +1,4 @@
-// Publishes a JPEG or PNG file as a picture of the topic "camera".
+// Publishes a JPEG or PNG file as an image on the topic "camera".
 import { readFile } from "node:fs/promises";
 import { Node } from "nep-js";
 

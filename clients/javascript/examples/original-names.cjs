@@ -1,4 +1,4 @@
-// The names of the original NEP: what is published before the node is connected waits.
+// The names of the original NEP. Messages published before the node is connected are queued.
 const nep = require("nep-js");
 
 const node = new nep.Node("greeter");

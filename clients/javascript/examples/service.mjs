@@ -1,4 +1,4 @@
-// Answers a service and calls it.
+// Serves a service and calls it.
 import { Node } from "nep-js";
 
 const node = new Node("calculator");

@@ -19,7 +19,7 @@ const robot = new Robot({
       },
       async run({ angle }, call) {
         for (let n = 0; n < Math.round(Math.abs(angle)); n++) {
-          await call.wait(0.01); // rejects when the turn is to end
+          await call.wait(0.01); // rejects when the action is canceled
           degrees = (degrees + (angle > 0 ? 1 : 359)) % 360; // move the motor here
           robot.sense("angle", degrees);
         }
@@ -33,7 +33,7 @@ const robot = new Robot({
       },
     },
   },
-  stop: { watchdogS: 1, withinS: 0.2, run() {} }, // hold the motor here; the actions have been told to end
+  stop: { watchdogS: 1, withinS: 0.2, run() {} }, // hold the motor here; the actions have been canceled
 });
 
 await robot.main();

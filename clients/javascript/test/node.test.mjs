@@ -1,4 +1,4 @@
-// The API with a real master: run by tests/clients/test_javascript.py, which starts one. Skipped without NEP_MASTER.
+// Tests of the API with a master, which tests/clients/test_javascript.py starts. Skipped without NEP_MASTER.
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { test } from "node:test";
@@ -7,7 +7,7 @@ import * as nep from "../dist/index.mjs";
 const { Node } = nep;
 const hasMaster = { skip: process.env.NEP_MASTER ? false : "needs a master: set NEP_MASTER" };
 
-/** A node that is closed when the test ends, also by a failure: an open subscription keeps the process. */
+/** Returns a node that is closed at the end of the test: an open subscription would keep the process alive. */
 function opened(t, name, options) {
   const node = new Node(name, options);
   t.after(() => node.close());
@@ -18,7 +18,7 @@ process.on("unhandledRejection", (reason) => {
   throw new Error(`unhandled rejection: ${reason}`);
 });
 
-test("a subscription is iterated and closed by leaving the loop", hasMaster, async (t) => {
+test("leaving the loop over a subscription closes it", hasMaster, async (t) => {
   const node = opened(t, "iterating");
   const publisher = await node.publisher("iterated");
   const subscriber = node.subscribe("iterated");
@@ -46,7 +46,7 @@ test("a signal ends the loop", hasMaster, async (t) => {
   await node.close();
 });
 
-test("the latest message replaces those that nobody read", hasMaster, async (t) => {
+test("the latest message replaces unread ones", hasMaster, async (t) => {
   const node = opened(t, "latest");
   const publisher = await node.publisher("newest");
   const subscriber = await node.subscribe("newest", { keep: "latest" }).ready;
@@ -61,7 +61,7 @@ test("the latest message replaces those that nobody read", hasMaster, async (t) 
   await node.close();
 });
 
-test("a callback that throws is told as a warning and gets the next message", hasMaster, async (t) => {
+test("a throwing callback emits a warning and receives the next message", hasMaster, async (t) => {
   const node = opened(t, "throwing");
   const received = [];
   const subscriber = node.subscribe("thrown", (message) => {
@@ -79,7 +79,7 @@ test("a callback that throws is told as a warning and gets the next message", ha
   await node.close();
 });
 
-test("payloads that can't be encoded are counted and named", hasMaster, async (t) => {
+test("payloads that can't be encoded are counted and reported", hasMaster, async (t) => {
   const node = opened(t, "rejecting");
   const warnings = [];
   node.on("warning", (warning) => warnings.push(warning));
@@ -94,7 +94,7 @@ test("payloads that can't be encoded are counted and named", hasMaster, async (t
   assert.throws(() => node.subscribe("late"), nep.NepError);
 });
 
-test("calls are answered, refused and given up", hasMaster, async (t) => {
+test("calls are answered, refused and time out", hasMaster, async (t) => {
   const node = opened(t, "calling");
   await node.serve("/twice", async (n) => 2 * n);
   await node.serve("/slow", () => new Promise((resolve) => setTimeout(resolve, 200, "late")));
@@ -109,7 +109,7 @@ test("calls are answered, refused and given up", hasMaster, async (t) => {
   await assert.rejects(client.call(1), nep.ClosedError);
 });
 
-test("without a master, calls fail in time and programs are told", async (t) => {
+test("without a master, calls time out and a warning is emitted", async (t) => {
   const node = opened(t, "alone", { master: "127.0.0.1:1", masterWaitS: 0.05 });
   const warnings = [];
   node.on("warning", (warning) => warnings.push(warning));

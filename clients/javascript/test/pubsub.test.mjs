@@ -21,12 +21,12 @@ test("gaps, echoes and byes count as lost", () => {
   const sources = new Sources();
   for (const seq of [3n, 4n, 7n]) assert.ok(sources.arrived(ID, seq, false));
   assert.deepEqual([sources.received, sources.lost], [3, 2]);
-  assert.ok(!sources.arrived(ID, 7n, true), "a latched message that was heard");
+  assert.ok(!sources.arrived(ID, 7n, true), "a latched message that was received before");
   assert.ok(sources.reached(ID, 9n));
   assert.deepEqual([sources.received, sources.lost], [3, 4]);
 });
 
-test("what the master promised is lost a renewal later, and found when it comes after all", () => {
+test("missing messages of the last renewal are lost until they arrive", () => {
   const sources = new Sources();
   sources.arrived(ID, 1n, false);
   sources.promised(ID, 3n);
@@ -37,10 +37,10 @@ test("what the master promised is lost a renewal later, and found when it comes 
   sources.arrived(ID, 3n, false);
   assert.deepEqual([sources.received, sources.lost], [3, 0]);
   sources.promised(99n, 5n);
-  assert.equal(sources.lost, 0, "nobody knows where the numbers of a publisher begin that was never heard");
+  assert.equal(sources.lost, 0, "the first seq of an unknown publisher is unknown");
 });
 
-test("a leap of numbers is refused once and then taken as a new beginning", () => {
+test("a jump of seq is rejected once, then accepted as a restart", () => {
   const sources = new Sources();
   sources.arrived(ID, 1n, false);
   assert.throws(() => sources.arrived(ID, 2n ** 40n, false), { code: "seq-leap" });
@@ -48,13 +48,13 @@ test("a leap of numbers is refused once and then taken as a new beginning", () =
   assert.deepEqual([sources.received, sources.lost], [2, 0]);
 });
 
-test("publishers that no master lists are forgotten beyond a thousand", () => {
+test("unlisted publishers are forgotten beyond a thousand", () => {
   const sources = new Sources();
   for (let id = 1n; id <= 1500n; id++) sources.arrived(id, 1n, false);
   assert.equal(sources.byId.size, 1000);
 });
 
-test("a send window closes at its bound and opens with what was read", () => {
+test("a send window closes at its limit and opens after acknowledgements", () => {
   const window = new SendWindow();
   const size = 6 * 2 ** 20;
   let seq = 0;
@@ -102,7 +102,7 @@ test("a history is bounded in messages and bytes", () => {
   assert.equal(history.kept.length, 1);
 });
 
-test("the form of messages follows who subscribes", () => {
+test("the form of messages depends on the subscribers", () => {
   const refused = [];
   const subscriptions = new Subscriptions("t", ID, (reason) => refused.push(reason));
   const note = (isAdded, filter) => subscriptions.note(Buffer.concat([Buffer.from([isAdded ? 1 : 0]), filter]));
@@ -134,7 +134,7 @@ test("the form of messages follows who subscribes", () => {
   assert.ok(!subscriptions.isHeard);
 });
 
-test("messages that have to wait go together, and everybody gets them all", async (t) => {
+test("queued messages are batched and reach every subscriber", async (t) => {
   const spec = { id: ID, topic: "t", codecNumber: 1, latched: false, history: 0, batch: true };
   let greeted = 0;
   const transport = new XpubTransport(

@@ -13,7 +13,7 @@ const node = new Node("tester");
 after(() => node.close());
 let lastName = 0;
 
-/** A robot whose stop and actions end when a test lets them, and a publisher and subscriber on its topics. */
+/** Returns a robot whose stop and actions end when the test says so, with a publisher and subscriber on its topics. */
 async function bench(changes = {}) {
   const name = `Arm ${++lastName}`;
   const answers = [];
@@ -104,7 +104,7 @@ test("stop is answered when the stop function has returned", async () => {
   await closed;
 });
 
-test("stop that fails, or that an action survives, is answered with what may still move", async () => {
+test("a failed stop, or one that an action survives, is answered with a reason", async () => {
   const failing = await bench({
     stop() {
       throw new Failed("the brake is stuck");
@@ -184,7 +184,7 @@ test("no message ends the driver", async () => {
   await robot.close();
 });
 
-test("declarations that are wrong are refused", () => {
+test("invalid declarations are rejected", () => {
   const stop = { run() {} };
   const make = (action, more) =>
     new Robot({

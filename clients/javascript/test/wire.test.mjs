@@ -26,7 +26,7 @@ function described({ header, payload, extension }) {
   };
 }
 
-test("messages are read as the vectors say", () => {
+test("messages are decoded as in the vectors", () => {
   for (const { name, parts, means, error } of vectors("messages")) {
     const read = () => readParts(parts.map(bytes));
     if (error) {
@@ -40,7 +40,7 @@ test("messages are read as the vectors say", () => {
   }
 });
 
-test("messages are written as the vectors say", () => {
+test("messages are encoded as in the vectors", () => {
   for (const { name, parts, means } of vectors("messages")) {
     if (!means) continue;
     const { topic, codec, seq, stamp_ns, publisher, extension, size = 0 } = means;
@@ -60,7 +60,7 @@ test("messages are written as the vectors say", () => {
   }
 });
 
-test("batches are read and written as the vectors say", () => {
+test("batches are decoded and encoded as in the vectors", () => {
   for (const { name, part, means, error } of vectors("batches")) {
     const read = () => readParts([bytes(part)]);
     if (error) {
@@ -85,7 +85,7 @@ test("each of the malformed messages is refused with its code", () => {
   }
 });
 
-test("filters are read and written as the vectors say", () => {
+test("filters are decoded and encoded as in the vectors", () => {
   for (const { name, filter, means, error } of vectors("filters")) {
     const part = bytes(filter);
     const hello = parseHello(part);
@@ -107,7 +107,7 @@ test("filters are read and written as the vectors say", () => {
   }
 });
 
-test("notices are read and written as the vectors say", () => {
+test("notices are decoded and encoded as in the vectors", () => {
   for (const { name, parts, means } of vectors("notices")) {
     const [first, head, payload] = parts.map(bytes);
     assert.equal(String(parseHello(first).subscriber), means.subscriber, name);
@@ -125,14 +125,14 @@ test("notices are read and written as the vectors say", () => {
   }
 });
 
-test("ids come from the node's key as the vectors say", () => {
+test("ids are derived from the node's key as in the vectors", () => {
   for (const { key, node_id, ids } of vectors("ids").nodes) {
     assert.equal(nodeIdFrom(key), node_id);
     for (const [number, id] of Object.entries(ids)) assert.equal(String(idFrom(key, BigInt(number))), id);
   }
 });
 
-test("answers and pushes of the master are read as the vectors say", () => {
+test("replies and pushes of the master are decoded as in the vectors", () => {
   const { asked, pushed } = vectors("master");
   for (const { name, answer, answer_means } of [...asked, ...pushed].filter((each) => each.answer)) {
     assert.deepEqual(integersAsText(unpack(bytes(answer))), answer_means, name);
@@ -146,7 +146,7 @@ test("answers and pushes of the master are read as the vectors say", () => {
   }
 });
 
-test("requests are written as the vectors say", () => {
+test("requests are encoded as in the vectors", () => {
   const toIntegers = (value) => {
     if (typeof value === "string" && /^-?\d+$/.test(value)) return BigInt(value);
     if (Array.isArray(value)) return value.map(toIntegers);
@@ -168,7 +168,7 @@ test("requests are written as the vectors say", () => {
   }
 });
 
-test("calls of services are read and written as the vectors say", () => {
+test("service calls are decoded and encoded as in the vectors", () => {
   for (const { name, parts, means, error } of vectors("services")) {
     if (!parts) continue; // plain TCP
     const kind = Number(bytes(parts[0])[1]) === CallKind.CALL ? "call" : "answer";
@@ -248,7 +248,7 @@ test("payloads survive their codec", () => {
   assert.deepEqual(unpack(pack(withWideIntegers({ id: 2 ** 53 - 1 }))), { id: 2n ** 53n - 1n });
 });
 
-test("what a codec can't carry is refused with a reason", () => {
+test("payloads that a codec can't encode are rejected with a reason", () => {
   let deep = [];
   for (let level = 0; level < 64; level++) deep = [deep];
   for (const [type, payload] of [
@@ -269,7 +269,7 @@ test("what a codec can't carry is refused with a reason", () => {
   assert.throws(() => codecFor("string").decode(Buffer.from([0xff]), {}), { name: "DecodeError" });
 });
 
-test("hostile msgpack is refused without taking memory", () => {
+test("hostile msgpack is rejected without allocating memory", () => {
   const codec = codecFor("msgpack");
   const huge = Buffer.from("dd01ffffff".repeat(200), "hex");
   const deep = Buffer.concat([Buffer.alloc(65, 0x91), Buffer.from([0xc0])]);
@@ -302,7 +302,7 @@ test("hostile msgpack is refused without taking memory", () => {
   assert.equal(decoded.date.getTime(), 1234567890123);
 });
 
-test("images keep their bytes and tell their shape", () => {
+test("images keep their bytes and shape", () => {
   const codec = codecFor("image");
   const raw = { data: Buffer.from([1, 2, 3, 4, 5, 6]), encoding: "rgb8", shape: [1, 2, 3] };
   const { data, extension } = codec.encode(raw);

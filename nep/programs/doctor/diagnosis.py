@@ -130,8 +130,8 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
             "package:nep-js",
             "warning",
             _(
-                "JavaScript programs in this folder import nep-js {version} of another project from {folder}, "
-                "which hides NEP Studio's in {hidden}."
+                "JavaScript programs in this folder import nep-js {version} of another project from "
+                "{folder}, which hides NEP Studio's in {hidden}."
             ).format(version=imported.version, folder=imported.place, hidden=ours.place),
             _("Uninstall the other package, or start programs of the original NEP in a folder of their own."),
             command=f'npm uninstall --prefix "{Path(imported.place).parent.parent}" nep-js',

@@ -206,7 +206,7 @@ def test_it_sends_what_is_no_json(session: Session, liar: Liar, tried: Invocatio
 
 
 MOST_CALLS_A_TICK = 64 * MESSAGES_PER_TOPIC
-"""A full topic's answers, each taken in with some 48 calls; how long they take depends on what else runs."""
+"""Limit of function calls for the answers of a full topic, about 48 each; independent of the load."""
 
 
 def calls_of(function: Callable[[], object]) -> int:

@@ -258,14 +258,14 @@ def test_a_publisher_that_has_another_port_is_followed(context: zmq.Context[zmq.
 
 
 def test_message_behind_a_rejected_batch_is_read_at_once(context: zmq.Context[zmq.Socket[bytes]]) -> None:
-    """Whoever gets nothing waits for the descriptor, which does not tell again of what is there already."""
+    """The descriptor is edge-triggered: it does not signal messages that are already in the queue."""
     spec = SubscriberSpec(5, "t", "bytes", Hybrid("x", "many2many"), None)
     socket, there = context.socket(zmq.SUB), context.socket(zmq.XPUB)
     sub = SubSocket(socket, spec)
     there.bind("inproc://there")
     socket.connect("inproc://there")
     assert there.recv() == b"\1t\0"
-    batch = wire.Header(3, wire.BATCH, 1, 1, 7, 4).pack() + bytes(4)  # it tells of no message
+    batch = wire.Header(3, wire.BATCH, 1, 1, 7, 4).pack() + bytes(4)  # a batch of 0 messages
     for _number in range(3):
         there.send(b"t\0" + batch)
     there.send_multipart(wire.join("t", wire.Header(3, 0, 1, 1, 7), b"good"))

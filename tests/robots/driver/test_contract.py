@@ -54,7 +54,7 @@ def kinds_in(path: Path) -> list[Kind]:
 
 
 def kinds(drivers: Sequence[str], commands: Sequence[str]) -> Iterator[Kind | ProgramKind]:
-    """The robots of those files and commands; without any those of Studio, and of the files in examples/."""
+    """Return the robots of these files and commands; by default those of Studio and of examples/."""
     if drivers or commands:
         for driver in drivers:
             yield from kinds_in(Path(driver).resolve())

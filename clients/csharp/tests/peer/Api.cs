@@ -4,7 +4,7 @@ using System.Threading;
 using System.Threading.Tasks;
 using Nep;
 
-/// <summary>Checks the public calls that other tests do not use; prints "ok" or what went wrong.</summary>
+/// <summary>Tests public members that other tests do not use; prints "ok" or the failed expectation.</summary>
 internal static class Api
 {
     private static int Main()

@@ -3,7 +3,7 @@ using System.Text;
 using System.Threading;
 using Nep;
 
-/// <summary>Publishes on a topic and ends, or prints so many messages of each topic, with the calls of listings 9 and 10.</summary>
+/// <summary>Publishes on a topic and exits, or prints a number of messages of each topic, with the calls of listings 9 and 10.</summary>
 internal static class Directions
 {
     private static readonly object Output = new object();

@@ -3,7 +3,7 @@ using System.Collections.Generic;
 using System.Threading;
 using Nep;
 
-/// <summary>A program with the names of the original library 0.0.0.5: answers each message on "ask".</summary>
+/// <summary>Program with the names of the original library 0.0.0.5: answers each message of the topic "ask".</summary>
 internal static class OldNames
 {
     private static void Main()

@@ -2,7 +2,7 @@ using System;
 using System.Threading;
 using Nep;
 
-/// <summary>Reads one message in ten milliseconds; tells its counters for each line on stdin.</summary>
+/// <summary>Reads one message every ten milliseconds; prints its counters for each line on stdin.</summary>
 internal static class SlowReader
 {
     private static void Main()

@@ -4,7 +4,7 @@ using System.Globalization;
 using Nep.Wire;
 using Newtonsoft.Json.Linq;
 
-/// <summary>Reads and writes the shared vectors, a line for each. See tests/clients/test_csharp_vectors.py.</summary>
+/// <summary>Decodes and encodes the shared vectors, one per line. See tests/clients/test_csharp_vectors.py.</summary>
 internal static class WirePeer
 {
     private static int Main()

@@ -5,7 +5,7 @@ using System.Text;
 using System.Threading;
 using Nep.Zmtp;
 
-/// <summary>The three sockets behind stdin and stdout, for tests against libzmq. See tests/clients/test_csharp_zmtp.py.</summary>
+/// <summary>Drives the three sockets by lines on stdin, for tests against libzmq. See tests/clients/test_csharp_zmtp.py.</summary>
 internal static class ZmtpPeer
 {
     private static readonly object Output = new object();
@@ -67,7 +67,7 @@ internal static class ZmtpPeer
         return text.ToString();
     }
 
-    /// <summary>Short parts in hex, long ones as size and sum.</summary>
+    /// <summary>Formats short parts as hexadecimal digits, long ones as size and checksum.</summary>
     internal static string Show(byte[][] parts)
     {
         var shown = new List<string>();

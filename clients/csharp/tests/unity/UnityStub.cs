@@ -1,6 +1,6 @@
 using System;
 
-// Just enough of Unity's names to compile the package and its samples with Mono. See tests/clients/test_csharp_unity.py.
+// Stubs of Unity's classes to compile the package and its samples with Mono. See tests/clients/test_csharp_unity.py.
 namespace UnityEngine
 {
     public class Object

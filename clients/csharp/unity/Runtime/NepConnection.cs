@@ -3,7 +3,7 @@ using UnityEngine;
 
 namespace Nep.Unity
 {
-    /// <summary>A NEP node that lives as long as its component is enabled and runs callbacks in the main thread.</summary>
+    /// <summary>NEP node that exists while this component is enabled and runs callbacks in the main thread.</summary>
     /// <remarks>
     /// Create publishers and subscriptions in <c>Start</c> of other components, with <see cref="Node"/>. Subscriptions with
     /// <see cref="CallbackMode.Update"/> are called in <c>Update</c>.
@@ -23,7 +23,7 @@ namespace Nep.Unity
 
         private Node _node;
 
-        /// <summary>The node; created when it is first asked for.</summary>
+        /// <summary>Node of this component, created on first access.</summary>
         /// <exception cref="InvalidOperationException">The component is disabled.</exception>
         public Node Node
         {

@@ -8,7 +8,7 @@ namespace Nep.Unity
         [RuntimeInitializeOnLoadMethod(RuntimeInitializeLoadType.SubsystemRegistration)]
         private static void Begin()
         {
-            Node.CloseAll(); // nodes of an earlier play that a program kept in statics
+            Node.CloseAll(); // nodes of an earlier play mode in static fields
             Application.quitting -= Node.CloseAll;
             Application.quitting += Node.CloseAll;
 #if UNITY_EDITOR

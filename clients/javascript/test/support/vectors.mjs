@@ -1,4 +1,4 @@
-// The test vectors that all languages share: tests/data/wire of the repository.
+// Test vectors shared by all languages: tests/data/wire of the repository.
 import { readFileSync } from "node:fs";
 
 const FOLDER = new URL("../../../../tests/data/wire/", import.meta.url);
@@ -11,7 +11,7 @@ export function bytes(hexadecimal) {
   return Buffer.from(hexadecimal, "hex");
 }
 
-/** Integers as text, as the vectors have them. */
+/** Converts integers to text, as in the vectors. */
 export function integersAsText(value) {
   if (typeof value === "bigint" || Number.isInteger(value)) return String(value);
   if (Array.isArray(value)) return value.map(integersAsText);
@@ -19,7 +19,7 @@ export function integersAsText(value) {
   return Object.fromEntries(Object.entries(value).map(([key, each]) => [key, integersAsText(each)]));
 }
 
-/** The code of the error that `action` throws; undefined when it throws none. */
+/** Returns the code of the error thrown by `action`, or undefined. */
 export function codeOf(action) {
   try {
     action();

@@ -2,7 +2,7 @@ using Nep;
 using Nep.Unity;
 using UnityEngine;
 
-/// <summary>Publishes what a camera sees as JPEG images.</summary>
+/// <summary>Publishes the picture of a camera as JPEG images.</summary>
 [RequireComponent(typeof(Camera))]
 public sealed class CameraPublisher : MonoBehaviour
 {

@@ -2,7 +2,7 @@ using Nep;
 using Nep.Unity;
 using UnityEngine;
 
-/// <summary>Publishes the pose of this game object in ROS coordinates, some times a second.</summary>
+/// <summary>Publishes the pose of this game object in ROS coordinates at a fixed rate.</summary>
 public sealed class PosePublisher : MonoBehaviour
 {
     [SerializeField] private NepConnection connection;

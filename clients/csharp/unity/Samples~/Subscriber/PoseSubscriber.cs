@@ -21,7 +21,7 @@ public sealed class PoseSubscriber : MonoBehaviour
         transform.rotation = RosConversions.ToUnity(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w);
     }
 
-    // Fields have the names of the message.
+    // The fields have the names of the JSON message.
     private struct Pose
     {
         public Vector position;
