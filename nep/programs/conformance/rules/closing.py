@@ -6,7 +6,7 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_subscriber
+from nep.programs.conformance.rules.messages import connected_publisher
 from nep.programs.conformance.verdict import broken, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
@@ -32,9 +32,7 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
     _SECTION,
 )
 def _bye(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    topic, pub, subscriber = connected_publisher(bench)
     bench.ask("publish", pub=pub, value={"a": 1}, count=5)
     number = bench.adapter.begin("close_publisher", pub=pub)
     bench.forget()
@@ -51,9 +49,7 @@ def _bye(bench: Bench) -> None:
 
 @rule("bye-again", lazy("A publisher repeats its bye until no hello remains, and then closes."), _SECTION)
 def _bye_again(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    _topic, pub, subscriber = connected_publisher(bench)
     number = bench.adapter.begin("close_publisher", pub=pub)
     bench.forget()
     bench.need(lambda: len(subscriber.byes) >= 3, "bye again")
@@ -129,9 +125,7 @@ def _subscriber_closes(bench: Bench) -> None:
     is_last=True,
 )
 def _leave(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    _topic, pub, subscriber = connected_publisher(bench)
     bench.ask("publish", pub=pub, value={"a": 1}, count=4)
     count = len(bench.master.received)
     number = bench.adapter.begin("close")

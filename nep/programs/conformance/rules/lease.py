@@ -9,7 +9,7 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_subscriber, messages_of
+from nep.programs.conformance.rules.messages import connected_publisher, messages_of
 from nep.programs.conformance.scripted_master import ReceivedRequest
 from nep.programs.conformance.verdict import broken, expect
 
@@ -51,9 +51,7 @@ def _renew(bench: Bench) -> None:
     "statistics",
 )
 def _statistics(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    topic, pub, subscriber = connected_publisher(bench)
     bench.ask("publish", pub=pub, value={"a": 1}, count=6)
     bench.need(lambda: len(messages_of(subscriber)) == 6, "message")
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
@@ -118,9 +116,7 @@ def _again(bench: Bench) -> None:
     _SECTION,
 )
 def _restart(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    _topic, pub, subscriber = connected_publisher(bench)
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     bench.master.stop()
     bench.ask("publish", pub=pub, value={"a": 1}, count=10)

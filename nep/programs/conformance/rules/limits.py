@@ -11,7 +11,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.malformed import malformed_parts
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.rules.messages import connected_subscriber, messages_of
+from nep.programs.conformance.rules.messages import connected_publisher, connected_subscriber, messages_of
 from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.wire import Header, topic_part
 
@@ -109,9 +109,7 @@ def _large(bench: Bench) -> None:
     "bounds",
 )
 def _unknown_filters(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    good = connected_subscriber(bench, topic, 3)
+    topic, pub, good = connected_publisher(bench)
     bad = connected_subscriber(bench, topic, None)
     for what in (
         b"\xff",

@@ -40,6 +40,15 @@ def connected_subscriber(
     return subscriber
 
 
+def connected_publisher(
+    bench: Bench, level: int | None = 3, msg_type: str = "json"
+) -> tuple[str, int, ScriptedSubscriber]:
+    """Return a new topic, the number of the adapter's publisher of it, and a connected subscriber."""
+    topic = bench.new_topic()
+    pub = bench.new_pub(topic, msg_type)
+    return topic, pub, connected_subscriber(bench, topic, level, msg_type)
+
+
 def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
     """Return all received messages. A malformed one breaks the rule."""
     try:
@@ -66,9 +75,7 @@ def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
     "messages",
 )
 def _three_parts(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    other = connected_subscriber(bench, topic, 3)
+    topic, pub, other = connected_publisher(bench)
     subscriber = _plain_subscriber(bench, topic, pub)
     count = len(subscriber.received)
     bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
@@ -86,9 +93,7 @@ def _three_parts(bench: Bench) -> None:
     "batches",
 )
 def _batches_to_readers(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 1)
+    topic, pub, subscriber = connected_publisher(bench, 1)
     connected_subscriber(bench, topic, 3)
     bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
     bench.need(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
@@ -108,9 +113,7 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
 )
 def _forms(bench: Bench) -> None:
     for level in (0, 1, 2, 3):
-        topic = bench.new_topic()
-        pub = bench.new_pub(topic)
-        subscriber = connected_subscriber(bench, topic, level)
+        _topic, pub, subscriber = connected_publisher(bench, level)
         bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
         bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
@@ -128,9 +131,7 @@ def _forms(bench: Bench) -> None:
 )
 def _header(bench: Bench) -> None:
     for msg_type, (members, _payload) in _SENT.items():
-        topic = bench.new_topic()
-        pub = bench.new_pub(topic, msg_type)
-        subscriber = connected_subscriber(bench, topic, 0, msg_type)
+        topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
         bench.ask("publish", pub=pub, **members)
         bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         found = messages_of(subscriber)[0].header
@@ -147,9 +148,7 @@ def _header(bench: Bench) -> None:
 )
 def _payload(bench: Bench) -> None:
     for msg_type, (members, wanted) in _SENT.items():
-        topic = bench.new_topic()
-        pub = bench.new_pub(topic, msg_type)
-        subscriber = connected_subscriber(bench, topic, 0, msg_type)
+        _topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
         bench.ask("publish", pub=pub, **members)
         bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         data = bytes(read_parts(subscriber.raw[0])[0].payload)
@@ -187,9 +186,7 @@ def _seq_unheard(bench: Bench) -> None:
     "messages",
 )
 def _stamp(bench: Bench) -> None:
-    topic = bench.new_topic()
-    pub = bench.new_pub(topic)
-    subscriber = connected_subscriber(bench, topic, 3)
+    _topic, pub, subscriber = connected_publisher(bench)
     bench.ask("publish", pub=pub, value={"a": 1}, count=20)
     bench.need(lambda: len(messages_of(subscriber)) >= 20, "message")
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
