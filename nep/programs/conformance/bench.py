@@ -13,7 +13,7 @@ from nep.i18n import _
 from nep.masters.graph import Outgoing
 from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStreams
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
-from nep.programs.conformance.scripted_master import ReceivedRequest, ScriptedMaster
+from nep.programs.conformance.scripted_master import RecordedRequest, ScriptedMaster
 from nep.programs.conformance.verdict import broken
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
 
@@ -162,11 +162,11 @@ class Bench:
 
     # ---- requests to the master
 
-    def requests(self, do: str) -> list[ReceivedRequest]:
+    def requests(self, do: str) -> list[RecordedRequest]:
         """Return all requests of this name."""
         return [each for each in self.master.received if each.do == do]
 
-    def request(self, do: str, field: str, id: object) -> ReceivedRequest:
+    def request(self, do: str, field: str, id: object) -> RecordedRequest:
         """Wait for the request of this name whose ``field`` is ``id``, and return it."""
         self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.what.get(field) == id)
@@ -188,7 +188,7 @@ class Bench:
                 return str(node.get("id"))
         raise broken(_("no '{what}' was received").format(what="node"))
 
-    def renewal(self, after: int, timeout_s: float = 5.0) -> ReceivedRequest:
+    def renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
         """Wait for a renewal after the first ``after`` requests, and return it."""
         self.need(
             lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s

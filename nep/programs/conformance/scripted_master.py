@@ -29,14 +29,14 @@ from nep.protocol.requests import (
     Request,
 )
 
-__all__ = ["ReceivedRequest", "ScriptedMaster"]
+__all__ = ["RecordedRequest", "ScriptedMaster"]
 
 PEER = "peer"
 """Route of the nodes that the tester registers."""
 
 
 @dataclass(frozen=True)
-class ReceivedRequest:
+class RecordedRequest:
     """Received request. ``problem`` describes a malformed one, in terms of the wire."""
 
     at: float
@@ -47,7 +47,7 @@ class ReceivedRequest:
     problem: str = ""
 
 
-Change = Callable[[ReceivedRequest, dict[str, Any]], "dict[str, Any] | None"]
+Change = Callable[[RecordedRequest, dict[str, Any]], "dict[str, Any] | None"]
 """Returns the reply to send in place of the given one, or None to send nothing."""
 
 
@@ -58,7 +58,7 @@ class ScriptedMaster:
         self._context = context
         self._on_push = on_push
         self._encoder = AnswerEncoder()
-        self.received: list[ReceivedRequest] = []
+        self.received: list[RecordedRequest] = []
         self.change: Change = lambda _request, reply: reply
         self.port = 0
         self._socket: zmq.Socket[bytes] | None = None
@@ -142,7 +142,7 @@ class ScriptedMaster:
             else:
                 self._reply(request, each)
 
-    def _reply(self, request: ReceivedRequest, each: Outgoing) -> None:
+    def _reply(self, request: RecordedRequest, each: Outgoing) -> None:
         encoded = self._encoder.encode(each.answer, each.call or 0)
         reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
@@ -164,19 +164,19 @@ class ScriptedMaster:
             self._socket.send_multipart([route.encode("utf-8", "surrogateescape"), body])
 
 
-def _read(sender: str, parts: list[bytes]) -> ReceivedRequest:
+def _read(sender: str, parts: list[bytes]) -> RecordedRequest:
     now = time.monotonic()
     if len(parts) != 1:
-        return ReceivedRequest(now, sender, problem=f"{len(parts)} parts")
+        return RecordedRequest(now, sender, problem=f"{len(parts)} parts")
     try:
         body = msgpack.unpackb(parts[0], strict_map_key=False)
     except ValueError:
-        return ReceivedRequest(now, sender, problem="not msgpack")
+        return RecordedRequest(now, sender, problem="not msgpack")
     if not isinstance(body, dict):
-        return ReceivedRequest(now, sender, problem="not a map")
+        return RecordedRequest(now, sender, problem="not a map")
     do, call, what = body.get("do"), body.get("call"), body.get("what", {})
     if not isinstance(do, str) or not isinstance(what, dict):
-        return ReceivedRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
+        return RecordedRequest(now, sender, problem=f"do: {type(do).__name__}, what: {type(what).__name__}")
     if type(call) is not int or call < 1:
-        return ReceivedRequest(now, sender, do, 0, what, f"call: {call!r}")
-    return ReceivedRequest(now, sender, do, call, what)
+        return RecordedRequest(now, sender, do, 0, what, f"call: {call!r}")
+    return RecordedRequest(now, sender, do, call, what)

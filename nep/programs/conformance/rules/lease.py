@@ -10,13 +10,13 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_publisher, messages_of
-from nep.programs.conformance.scripted_master import ReceivedRequest
+from nep.programs.conformance.scripted_master import RecordedRequest
 from nep.programs.conformance.verdict import broken, expect
 
 _SECTION = "leases-and-a-master-that-starts-again"
 
 
-def _ids(request: ReceivedRequest, kind: str) -> set[Any]:
+def _ids(request: RecordedRequest, kind: str) -> set[Any]:
     return {each.get("id") for each in request.what.get(kind, ()) if isinstance(each, dict)}
 
 
