@@ -1,4 +1,4 @@
-"""What a person tries with robots: each try is begun, watched over, and ends with one result."""
+"""Invocations of actions by the user: sent, monitored, and ended with one result."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from nep.i18n import _, number
 from nep.text import bounded_str
 
 FIRST_ANSWER_S = 3.0
-"""How long a robot may take to say anything to a command."""
+"""Timeout of the first answer to a command."""
 GRACE_S = 0.5
-"""The robot itself ends what took too long; this much later Studio does."""
+"""Delay after the time limit of an action, which the robot enforces itself, before Studio ends it."""
 BEATS_MISSED = 4
 SHORTEST_SILENCE_S = 2.0
 
 
 class Tries:
-    """Begins tries and follows them. One thread uses it (the window's)."""
+    """Invocations of the user. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -31,11 +31,11 @@ class Tries:
         clock: Callable[[], float],
         wall: Callable[[], float] = time.time,
     ) -> None:
-        """``send`` gives a command to a robot; ``rest`` is called with its name when it has nothing to do."""
+        """``send`` sends a command to a robot; ``rest`` is called with its name once it is idle."""
         self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
 
     def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
-        """Send it; a robot that can't be reached fails it at once."""
+        """Send an invocation; it fails immediately if the robot can't be reached."""
         made = Invocation(
             uuid.uuid4().hex,
             action.name,
@@ -58,13 +58,13 @@ class Tries:
         return made
 
     def cancel(self, link: RobotLink, action: str) -> None:
-        """Cancel the try of an action; nothing happens when it has ended."""
+        """Cancel the invocation of an action, unless it has ended."""
         made = link.invocations.get(action)
         if made is not None and made.running:
             self._send_cancel(link, made)
 
     def answer(self, link: RobotLink, answer: Payload) -> None:
-        """Take over one of the robot's answers; those to others only say that it lives."""
+        """Take an answer of the robot; answers to other programs only show that it is alive."""
         link.heard_s = link.answered_s = self._clock()
         link.mute = False
         for made in link.running:
@@ -94,7 +94,7 @@ class Tries:
             made.begun_s = self._clock()
 
     def look(self, links: Iterable[RobotLink]) -> None:
-        """End the tries of robots that fell silent, and those that took too long."""
+        """End invocations of robots that stopped answering, and those beyond their time limit."""
         now = self._clock()
         for link in links:
             for made in link.running:
@@ -130,11 +130,11 @@ class Tries:
 
     def _mute(self, link: RobotLink, made: Invocation, sentence: str) -> None:
         link.mute = True
-        self._send_cancel(link, made)  # should it wake up again, it is not to go on
+        self._send_cancel(link, made)  # a robot that resumes must not continue
         self._end(link, made, "failed", sentence)
 
     def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
-        """Everything that runs there has ended so."""
+        """End all invocations of a robot with this state."""
         for made in link.running:
             self._end(link, made, state, error)
 
@@ -149,7 +149,7 @@ class Tries:
 
 
 def command_of(robot: Robot, made: Invocation, input: Payload) -> Payload:
-    """The message that asks a robot to do it."""
+    """Return the command of an invocation."""
     if robot.dialect == "rize":
         return rize.to_command(robot, made.action, input, made.id)
     return {"id": made.id, "op": "invoke", "from": SENDER, "action": made.action, "input": dict(input)}

@@ -1,9 +1,9 @@
-"""Robots that were told to move and have not proven since that they stand still.
+"""Robots that received a command to move and have not proven to stand still since.
 
-`MovedRobots` is the one source for which robots a Stop must name. A robot enters when something that moves it
-is sent, by whatever sent it. It leaves when its own program answered a Stop as still, when the end of the
-motion was seen in the robot's own final answer, or when a person confirms that it stands still. Freezing,
-dying, leaving the graph and coming back as another program do not remove it (docs/adr/0030-moved-robots.md).
+`MovedRobots` decides which robots a Stop must name. A robot is entered before any message that moves it is
+sent. It is removed when its own program confirms a Stop, when its own final answer ends the motion, or when
+the user confirms that it stands still. Freezing, crashing, leaving the graph and returning as another program
+do not remove it (docs/adr/0030-moved-robots.md).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
 OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
-"""Called with the robots that a message moves, and what sends it, before it is sent."""
+"""Called before a message is sent, with the robots that it moves and the kind of its sender."""
 UNKNOWN: tuple[str, str] = ("action", "stop")
-"""Not what moved a robot: it says itself that it could not end an action, or it did not prove a Stop."""
+"""Entries without a known sender: an action that the robot could not end, or an unproven Stop."""
 MAX_MOTIONS = 64
-"""Motions of one robot that are told apart by their ids; further ones end only with a Stop."""
+"""Limit of motions of one robot that are tracked by id; further ones end only with a Stop."""
 
 _SENTENCES = {
     "form": lazy("{robot} got a command from a form and has not answered since"),
@@ -37,20 +37,20 @@ _SENTENCES = {
     "action": lazy("{robot} could not end an action and has not answered since"),
     "stop": lazy("{robot} has not answered Stop"),
 }
-"""By what moved it; anything else is `_OTHER`."""
+"""Sentences by kind of sender; `_OTHER` for unknown kinds."""
 _OTHER = lazy("{robot} got a command and has not answered since")
 
 
 def ignore_moved(_names: Sequence[str], _by: str) -> None:
-    """Default `OnMoved`: nothing keeps the motion."""
+    """Ignore the motion; the default `OnMoved`."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnprovenMotion:
-    """Something that a robot was told to do and that nobody has seen to end.
+    """Command to a robot whose end has not been observed.
 
     ``number`` counts all motions, ``since_s`` is monotonic, ``program`` is the robot's program at that time.
-    ``id`` is that of the invocation; "" when its end can't be seen.
+    ``id`` is the id of the invocation, or empty if its end can't be observed.
     """
 
     number: int
@@ -62,17 +62,17 @@ class UnprovenMotion:
 
     @property
     def is_known(self) -> bool:
-        """Whether it is known what moved the robot."""
+        """Whether the sender of the command is known."""
         return self.by not in UNKNOWN
 
     @property
     def sentence(self) -> str:
-        """Why nobody knows that the robot stands still, without a full stop."""
+        """Reason why the robot may still move, without a full stop."""
         return _(_SENTENCES.get(self.by, _OTHER)).format(robot=self.robot)
 
 
 class MovedRobots:
-    """Ledger of robots that may move. One thread uses it (the window's)."""
+    """Ledger of robots that may move. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -81,13 +81,13 @@ class MovedRobots:
         clock: Callable[[], float] = time.monotonic,
         others_of: Callable[[str], Iterable[Identity]] = lambda _name: (),
     ) -> None:
-        """Nothing has moved yet.
+        """Start with an empty ledger.
 
         Args:
-            program_of: Returns the program that a robot is now.
-            has_ended: Whether it is certain that a program does not run any more.
-            clock: Monotonic seconds.
-            others_of: Returns other programs that hear a robot's commands now and answer them.
+            program_of: Returns the current program of a robot.
+            has_ended: Returns whether a program has certainly ended.
+            clock: Returns monotonic seconds.
+            others_of: Returns other programs that receive a robot's commands and publish its answers.
         """
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
         self._others_of = others_of
@@ -105,12 +105,12 @@ class MovedRobots:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The robots that may move, in the order in which they were told to."""
+        """Names of robots that may move, in the order of their commands."""
         return tuple(self._motions)
 
     @property
     def mark(self) -> int:
-        """Number of the newest motion. A Stop that begins now proves nothing about later ones."""
+        """Number of the newest motion. A Stop that begins now does not apply to later ones."""
         return self._count
 
     @property
@@ -119,16 +119,16 @@ class MovedRobots:
         return tuple(self._sent)
 
     def motion(self, name: str) -> UnprovenMotion | None:
-        """The newest motion of a robot whose cause is known, or None when it is not in the ledger.
+        """Return the newest motion of a robot, or None if the robot is not in the ledger.
 
-        That an action or a Stop did not end is told only when nothing else is known.
+        Motions with a known sender take precedence over unfinished actions and unproven Stops.
         """
         found = self._motions.get(name, [])
         known = [motion for motion in found if motion.is_known] or found
         return known[-1] if known else None
 
     def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:
-        """Programs besides the ``current`` one under which a robot was moved and that may still run."""
+        """Return programs other than ``current`` that received commands of a robot and may still run."""
         others = {
             motion.program.node_id: motion.program
             for motion in self._motions.get(name, ())
@@ -139,20 +139,20 @@ class MovedRobots:
         return tuple(others.values())
 
     def note(self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None) -> None:
-        """Enter robots that are told to move; call this before the message is sent.
+        """Enter robots into the ledger; call this before the command is sent.
 
         Args:
-            names: The robots.
-            by: What moves them: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
-            id: Of the invocation, when the robot's final answer to it ends the motion.
-            program: The robot's program, when it is not the one that it is now.
+            names: Names of the robots.
+            by: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
+            id: Id of the invocation whose final answer ends the motion; empty if there is none.
+            program: Program of the robot; the current one by default.
         """
         for name in names:
             self._count += 1
             meant = program if program is not None else self._program_of(name)
             motion = UnprovenMotion(self._count, name, by, self._clock(), meant, id)
             found = self._motions.setdefault(name, [])
-            if not id or len(found) >= MAX_MOTIONS:  # the newest of several that end together stands for them
+            if not id or len(found) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
                 motion = replace(motion, id="")
                 found[:] = [
                     each for each in found if each.id or (each.by, each.program) != (by, motion.program)
@@ -163,7 +163,7 @@ class MovedRobots:
                 self._note_others(name, by, found)
 
     def _note_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
-        """Enter other programs of the robot's name: one that is frozen may obey when it goes on."""
+        # Other programs of the same robot received the command, too: a frozen one may obey when it resumes.
         known = {motion.program for motion in found if not motion.id}
         for other in self._others_of(name):
             if other not in known and len(found) < MAX_MOTIONS:
@@ -192,7 +192,7 @@ class MovedRobots:
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def ended(self, name: str, id: str, program: Identity | None = None) -> None:
-        """Take over the final answer of a robot's program to an invocation: for this program it has ended."""
+        """Take a final answer of a robot's program, which ends the motion for this program."""
 
         def stays(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
@@ -203,9 +203,9 @@ class MovedRobots:
             self._keep(name, stays)
 
     def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
-        """Programs of a robot, by node id, proved a Stop that began at ``mark``: it stands still.
+        """End the motions of programs, by node id, that confirmed a Stop which began at ``mark``.
 
-        What a program was told that has not answered, and may still run, remains.
+        Motions of other programs that may still run remain.
         """
         self._proven |= dict.fromkeys(programs, mark)
         self._keep(
@@ -221,7 +221,7 @@ class MovedRobots:
         )
 
     def take(self, report: StopReport, mark: int) -> None:
-        """Take over what a Stop that began at ``mark`` proved, and which robots it did not prove still."""
+        """Take the report of a Stop that began at ``mark``: proven and unproven robots."""
         self.note((name for name in report.silent if name not in self), "stop")
         for name in report.still:
             self.stood_still(name, report.programs(name), mark)
@@ -229,19 +229,19 @@ class MovedRobots:
             self.told(name, mark)
 
     def told(self, name: str, mark: int) -> None:
-        """A robot that can't confirm (RIZE) was told to stop at ``mark``; nothing more can be known."""
+        """End the motions of a robot that can't confirm (RIZE) and received a stop at ``mark``."""
         self._keep(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:
             del self._sent[name]
 
     def confirm(self, names: Iterable[str]) -> None:
-        """A person says that these robots stand still."""
+        """Remove robots that the user has confirmed to stand still."""
         for name in names:
             self._motions.pop(name, None)
             self._sent.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
-        """Forget what ended programs were told: a virtual robot is its program, and moves no more."""
+        """Remove motions of ended programs: a virtual robot stands still once its program has ended."""
         self._keep(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
     def _keep(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:

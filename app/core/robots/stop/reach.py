@@ -1,4 +1,4 @@
-"""Whom a Stop reaches: robots that are there, may move, were there, or are not shown. No sockets.
+"""Targets of a Stop: robots that are connected, may move, were connected, or are not shown. No sockets.
 
 Not shown are robots beyond the limit of the list and those whose description can't be used: they are reached
 at the command topics that the graph knows.
@@ -16,9 +16,9 @@ from app.robots.identity import hearing, identity_of, publishing
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
-"""So many have a way that Stop can use; further ones are named by it as not told."""
+"""Limit of robots with a connection for Stop; further ones are named as not reached."""
 MAX_ABSENT = 64
-"""Robots that went away after they had answered, and are told in case that they still hear."""
+"""Limit of disconnected robots that had answered; they receive a stop in case they are still subscribed."""
 _COMMAND, _ANSWER = "robot/command", "robot/answer"
 _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
 
@@ -26,7 +26,7 @@ _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, con
 def targets_of(
     links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
-    """Return where robots are told to stop; nobody waits for those that went away and do not move."""
+    """Return the targets of a stop; answers of disconnected robots that do not move are not awaited."""
     here, absent = [], []
     for link in links:
         is_expected = link.connected or link.name in moved
@@ -43,7 +43,7 @@ def targets_of(
 
 
 def _unknown(topic: str) -> StopTarget:
-    """Return a target for a command topic by which a robot was moved of which nothing else is known."""
+    """Return a target for a command topic that moved a robot without a description."""
     home = topic.rpartition("/")[0]
     return StopTarget(_bare(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
 
@@ -55,7 +55,7 @@ def _bare(name: str, topics: RobotTopics) -> Robot:
 def unlisted_targets(
     view: GraphView, topics: Iterable[str], *, is_expected: bool = True
 ) -> tuple[StopTarget, ...]:
-    """Return where the robots of these description topics are told to stop.
+    """Return the targets of the robots with these description topics.
 
     Those whose commands nobody hears are left out: nothing could be stopped.
     """
@@ -86,7 +86,7 @@ def _name_of(topic: str) -> str:
 
 
 def _by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
-    """The topics of a type that each node hears (commands) or publishes (answers)."""
+    """Return the topics of a type that each node subscribes to (commands) or publishes (answers)."""
     found: dict[str, list[str]] = {}
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:

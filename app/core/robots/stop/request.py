@@ -1,4 +1,4 @@
-"""A stop of one robot that is under way: who must answer, and who did. No sockets."""
+"""Pending stop of one robot: the programs that must answer, and their answers. No sockets."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from nep.errors import NepError
 from nep.messages.message import Message
 
 MAX_ANSWER_BYTES = 65_536
-"""A longer message is no answer to a stop."""
+"""Longer messages are not answers to a stop."""
 SHOWN_WAIT_MS = 20.0
-"""A shorter wait for the connection is not told."""
+"""Shorter waits for the connection are not reported."""
 
 
 @dataclass
 class StopRequest:
-    """What is known of each program that serves a robot, by node.
+    """State of a stop: the programs that serve a robot and their answers, by node.
 
-    ``serving`` is empty until it is known who they are. ``unknown`` are answers of publishers that no master
-    has told of yet, ``foreign`` those of programs that do not serve the robot, by node; nothing of them is
-    decoded before it is known whose they are. ``delivered`` are the ways on which the command went out while
-    the robot was connected, since ``delivered_s`` at the earliest.
+    ``serving`` is empty until the programs are known. ``unknown`` has answers of publishers that the graph
+    does not list yet, ``foreign`` those of programs that do not serve the robot; they are decoded only once
+    their sender is known. ``delivered`` are the ways on which the command was sent while the robot was
+    connected, the first at ``delivered_s``.
     """
 
     line: StopLine
@@ -44,33 +44,33 @@ class StopRequest:
 
     @property
     def is_settled(self) -> bool:
-        """Whether nobody is waited for any more."""
+        """Whether no answer is awaited."""
         return bool(self.error) or self.is_answered
 
     @property
     def is_answered(self) -> bool:
-        """Whether all who must answer have said something."""
+        """Whether all programs have answered."""
         return bool(self.serving) and None not in self.serving.values()
 
     @property
     def is_proven(self) -> bool:
-        """Whether all who must answer said that the robot stands still: nothing more can come of it."""
+        """Whether all programs have confirmed that the robot stands still."""
         return bool(self.serving) and all(each and each.answered for each in self.serving.values())
 
     def sent(self, way: RobotTopics, now: float) -> None:
-        """The command went out on this way, on which the robot is connected."""
+        """Note that the command was sent on a connected way."""
         self.delivered.add(way)
         if self.delivered_s is None:
             self.delivered_s = now
 
     def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
-        """What has been said and was not told on yet, by node."""
+        """Return the answers that are not in ``told``, by node."""
         found, waits = self.serving.items(), None in self.serving.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
         return [(node, replace(each, waits=waits)) for node, each in said]
 
     def results(self) -> list[RobotStop]:
-        """A line for each program; those that have said nothing did not answer."""
+        """Return a result for each program; programs without an answer are unproven."""
         unconnected = self.line.unconnected
         silent = RobotStop(
             self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
@@ -83,7 +83,7 @@ class StopRequest:
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
-        """Take a message of a program that must answer; whether it changed what is known of it.
+        """Take a message of a program that must answer; return whether it changed the result.
 
         A refusal may be followed by the word that it stands still after all; nothing else is taken back.
         ``words`` makes the sentence of a refusal from the robot's error.
@@ -109,7 +109,7 @@ class StopRequest:
         return True
 
     def impostors(self) -> list[str]:
-        """The programs, by node, that answered this stop without serving the robot."""
+        """Return the nodes that answered this stop without serving the robot."""
         return [
             node
             for node, held in self.foreign.items()
@@ -120,7 +120,7 @@ class StopRequest:
 
 
 def answer_in(message: Message) -> Mapping[str, object] | None:
-    """Return the answer to a stop in a message, or None when it is none."""
+    """Return the answer to a stop in a message, or None if it has none."""
     if message.size_bytes > MAX_ANSWER_BYTES:
         return None
     try:

@@ -1,7 +1,7 @@
-"""Stop is proven: every robot is told to stop, and its own program answers, or it is named.
+"""Proven Stop: every robot receives the command, and its own program confirms it or the robot is named.
 
-The publishers exist before anything runs, because a connection that is made in the moment of need may be
-late. One that could not be made is tried again, and its robot is named until it can.
+Publishers are opened before anything runs, because connecting at the moment of a Stop may take too long.
+A connection that failed is retried, and its robot is named until then.
 """
 
 from __future__ import annotations
@@ -38,33 +38,34 @@ _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_S = 120.0
-"""How long an answer that comes too late is still taken."""
+"""Late answers are accepted for this long."""
 LATE_KEPT = 64
 MOST_SERVING = 32
-"""So many programs that serve one robot are waited for, and so many that only listen are named:"""
+"""Limit of programs of one robot whose answers are awaited."""
 MOST_LISTENING = 4
+"""Limit of named programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
-"""How often it is looked whether a robot is connected at last."""
+"""Interval of checks for a connection."""
 LOOK_S = 0.1
-"""How often the master is asked at most while an answer of an unknown publisher waits."""
+"""Minimum interval of requests to the master while the publisher of an answer is unknown."""
 GRAPH_S = 0.3
 _NOBODY = "nobody"
-"""Stands for the program of a robot while no master has told which it is."""
+"""Placeholder for the program of a robot until a graph lists it."""
 
 STOP_TIMEOUT_S = 1.0
-"""How long a robot may take to answer a stop, if its description does not say that it needs longer."""
+"""Timeout of a stop, unless the robot's description requires a longer one."""
 MARGIN_S = 0.5
 LONGEST_STOP_S = 10.0
 
 
 def patience_s(robots: Iterable[Robot], longest_s: float = LONGEST_STOP_S) -> float:
-    """How long these robots are waited for: longer than their drivers wait for what they stop."""
+    """Return the timeout for these robots, which is longer than that of their drivers."""
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
 
 
 class RobotStopper:
-    """Keeps a way to each robot and stops them. Its methods may be called from any thread."""
+    """Keep connections to all robots and stop them. Thread-safe."""
 
     def __init__(
         self,
@@ -72,23 +73,23 @@ class RobotStopper:
         clock: Callable[[], float] = time.monotonic,
         longest_s: float = LONGEST_STOP_S,
     ) -> None:
-        """No robots yet: `set_robots`. Their answers are waited for ``longest_s`` at most."""
+        """Start without robots; see `set_robots`. ``longest_s`` limits the wait for answers."""
         self._longest_s = longest_s
         self._node = node
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
         self._changed = threading.Condition()
-        self._making = threading.Lock()  # one thread at a time makes ways
+        self._making = threading.Lock()  # held while opening ways
         self._makers: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
         self._asked: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
-        self._hearers: dict[str, frozenset[str]] = {}  # by command topic, of this view
+        self._hearers: dict[str, frozenset[str]] = {}  # subscribed nodes by command topic, of this view
         self._looked_s = 0.0
         self._senders = Senders()
 
     def see(self, view: GraphView) -> None:
-        """Who is there now: whose answer counts, and who serves a robot's commands."""
+        """Take a new graph, which decides whose answers count and which programs serve a robot."""
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
@@ -99,18 +100,18 @@ class RobotStopper:
             tell(said)
 
     def expect(self, targets: Iterable[StopTarget]) -> None:
-        """These are the robots now; it takes no time, and `set_robots` does the rest.
+        """Announce the current robots without connecting; `set_robots` connects.
 
-        A stop from here on waits for their connections instead of not knowing them.
+        Later stops wait for their connections.
         """
         with self._changed:
             for target in targets:
                 self._lines.setdefault(target.robot.name, StopLine(target)).target = target
 
     def set_robots(self, robots: Iterable[Robot | StopTarget]) -> None:
-        """Keep a way to exactly these robots; connects to new ones, lets go of others.
+        """Connect to exactly these robots; disconnect from others.
 
-        Why one can't be reached is in `problems`; said again, it is tried again.
+        Failures are listed in `problems` and retried by the next call.
         """
         made = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
         wanted = {target.robot.name: target for target in made}
@@ -135,22 +136,22 @@ class RobotStopper:
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of the robots that can be stopped."""
+        """Names of robots with a connection."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.target.is_expected and line.is_whole]
             return tuple(line.name for line in lines)
 
     def reaches(self, name: str) -> bool:
-        """Return whether a stop would arrive now: the way exists, and the robot's program is connected."""
+        """Return whether the robot's program is connected, so that a stop would arrive now."""
         with self._changed:
             line = self._lines.get(name)
             way = None if line is None else line.ways.get(line.target.robot.topics)
             return line is not None and way is not None and self._is_connected(line, way)
 
     def deliver(self) -> None:
-        """Send stops again to robots that were not connected when they were sent, and are now.
+        """Send pending stops to robots that have connected since. Call it with each tick.
 
-        Called with each tick: a stop is delivered however late the connection comes, within `LATE_S`.
+        Stops stay pending for `LATE_S`.
         """
         with self._changed:
             now = self._clock()
@@ -159,7 +160,7 @@ class RobotStopper:
             self._deliver(each)
 
     def forget_late(self, names: Iterable[str]) -> None:
-        """Deliver no stop to these robots any more: a person says that they stand still."""
+        """Drop pending stops of robots that the user has confirmed to stand still."""
         known = set(names)
         with self._changed:
             for id in [id for id, each in self._asked.items() if each.is_over and each.line.name in known]:
@@ -167,16 +168,16 @@ class RobotStopper:
 
     @property
     def problems(self) -> Mapping[str, str]:
-        """Why robots can't be told to stop, by their names."""
+        """Reasons why robots can't be stopped, by name."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.error and line.target.is_expected]
             return {line.name: line.error for line in lines}
 
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
-        """Tell the robots to stop and do not wait.
+        """Send a stop without waiting for answers.
 
-        `ends` is the key of a program (`app.robots.identity`): robots refuse what it still sends. A robot
-        that can't (RIZE) must be told again when the program is gone.
+        ``ends`` is the key of a program (`app.robots.identity`), whose further commands robots refuse. Robots
+        that don't support it (RIZE) need another stop after the end of the program.
         """
         for line in self._chosen(names):
             self._tell(line, _id(), ends)
@@ -242,17 +243,17 @@ class RobotStopper:
                 return reported
 
     def close(self) -> None:
-        """Let go of all robots; they are not told."""
+        """Disconnect from all robots without a stop."""
         self.set_robots(())
         for maker in self._makers:
             maker.join(timeout=5)
         with self._changed:
             self._asked.clear()
 
-    # ---- inside
+    # ---- connections
 
     def _make(self, line: StopLine) -> None:
-        """Make the ways of a line that are missing; what goes wrong is its error. Under `_making`."""
+        # Opens missing ways; a failure becomes the line's error. Call with `_making` held.
         error = ""
         for topics in line.target.ways:
             with self._changed:
@@ -285,7 +286,7 @@ class RobotStopper:
             raise
 
     def _make_missing(self, asked: Sequence[StopRequest]) -> None:
-        """Try once more, beside the stop, to reach those that could not be reached."""
+        # Retries failed connections in a thread, so that the stop of other robots is not delayed.
         missing = [each for each in asked if not each.line.is_whole]
         if not missing:
             return
@@ -333,7 +334,7 @@ class RobotStopper:
             return [line for line in self._lines.values() if not line.target.is_expected]
 
     def _is_connected(self, line: StopLine, way: StopWay) -> bool:
-        """With the lock held."""
+        # Call with `_changed` held.
         hearers = self._hearers.get(way.topic)
         if hearers is None:
             hearers = frozenset(hearing(self._view or GraphView(0, 0), way.topic))
@@ -341,7 +342,7 @@ class RobotStopper:
         return way.is_connected(line.target, hearers)
 
     def _deliver(self, asked: StopRequest) -> bool:
-        """Send the command on ways that have become connected; whether nothing is left to deliver."""
+        # Sends the command on newly connected ways; returns whether nothing is left to deliver.
         with self._changed:
             if asked.is_answered or asked.line.target.robot.dialect == RIZE:
                 return True
@@ -360,7 +361,7 @@ class RobotStopper:
     def _tell(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
     ) -> str:
-        """Send a stop on every topic of a robot; the sentence when it went out on none, or nothing."""
+        # Returns the reason if the stop could be sent on no way, else an empty string.
         robot = line.target.robot
         stop = robot.safe_stop.action
         if robot.dialect == RIZE:
@@ -380,16 +381,15 @@ class RobotStopper:
                 error = _("{robot} can't be told: {why}").format(robot=robot.name, why=failed)
         return "" if sent else error
 
-    # ---- who must answer, and who did
+    # ---- answers
 
     def _is_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
-        """Whether there is something to tell, or to ask the master for."""
         if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
             return True
         return any(each.unknown for each in asked) and self._clock() - self._looked_s >= LOOK_S
 
     def _look_for(self, asked: Sequence[StopRequest]) -> None:
-        """Find out who serves the robots, and ask the master who answered when that is not known."""
+        # Requests the graph while the programs of a robot or the publisher of an answer are unknown.
         with self._changed:
             waits = self._view is None or any(each.unknown for each in asked)
             now = self._clock()
@@ -402,10 +402,10 @@ class RobotStopper:
             for each in asked:
                 if not each.serving:
                     each.serving |= self._serving(each)
-                    self._judge_again(each)  # none of it is late: they are asked just now
+                    self._judge_again(each)  # not late: the stop was sent just now
 
     def _add_newcomers(self, asked: Sequence[StopRequest]) -> None:
-        """Wait also for programs that came since the last graph: they were told as well."""
+        # Programs newer than the last graph received the stop, too.
         self._refresh_view()
         with self._changed:
             for each in asked:
@@ -413,18 +413,18 @@ class RobotStopper:
                 each.serving = self._serving(each) | known
 
     def _refresh_view(self) -> None:
-        """Ask the master who is there; without an answer, what was known before counts."""
+        # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
             self.see(self._node.graph(GRAPH_S))
 
     def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
-        """Who must answer: the robot's own program first, then whoever else serves its commands, by node.
+        """Return the programs that must answer, by node: the robot's own, then others that serve it.
 
-        Programs that hear its commands and could not answer are named.
+        Programs that receive its commands but can't answer are named.
         """
         target, view = asked.line.target, self._view or GraphView(0, 0)
         if target.robot.dialect == RIZE:
-            # It never answers; one that could not even be told is none of those.
+            # RIZE never answers; a robot that could not be reached is not among them.
             return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
         identity = target.identity or first_to_announce(view, target.robot.topics.description)
         own = identity.node_id if identity is not None else _NOBODY
@@ -450,7 +450,7 @@ class RobotStopper:
         return found
 
     def _answers(self, messages: Sequence[Message]) -> None:
-        """Judge by the sender first: only what comes from a program that must answer is decoded."""
+        # Checks the sender first: only messages of programs that must answer are decoded.
         late: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
         with self._changed:
             for message in messages:
@@ -463,7 +463,7 @@ class RobotStopper:
             tell(said)
 
     def _judge_again(self, asked: StopRequest) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        """Look again at answers whose publishers were not known; what comes too late, and whom to tell.
+        """Process held answers whose publishers are known now; return late ones with their callbacks.
 
         The lock is held here: whoever is told may need it. What is still unknown is let go of: its publisher
         has not registered, or there is no master, and then nothing can be proven anyway.
@@ -475,7 +475,7 @@ class RobotStopper:
     def _judge(
         self, asked: StopRequest, node: str | None, message: Message
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        """Take an answer if it is of a program that must give one; whom to tell when it comes too late."""
+        """Take an answer of a program that must answer; return the callback if it is late."""
         if node is None or not asked.serving:
             asked.unknown.put(message)
             return []
@@ -519,7 +519,7 @@ class RobotStopper:
         return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(strangers)))
 
     def _forget_old(self) -> None:
-        """Let go of stops that are long over: nothing late is taken of them any more."""
+        # Drops stops whose late answers are no longer accepted.
         now = self._clock()
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
@@ -541,14 +541,14 @@ def report_of(
     ends: str | None = None,
     is_for_all: bool = False,
 ) -> StopReport:
-    """Stop these robots. There is a report whatever happens: without one the run would stay "stopping"."""
+    """Stop these robots. Always returns a report: without one the run would stay "stopping"."""
     why = _(NO_NETWORK)
     if stopper is not None:
         try:
             return stopper.stop_all(
                 names, on_answer=on_answer, ends=ends, on_late=on_late, is_for_all=is_for_all
             )
-        except Exception as error:  # noqa: BLE001  whatever it is: these robots are not proven to stand still
+        except Exception as error:  # noqa: BLE001 - reported as unproven for these robots
             _log.exception("can't stop the robots")
             why = error_words(error)
     return StopReport((), 0.0).with_asked(names, why)
