@@ -25,7 +25,11 @@ _SWITCH = "switch"
 _NET = "10.88.0"
 _FIRST = "mount -t tmpfs tmpfs /dev/shm; ip link set lo up; hostname {name}; echo; exec cat"
 """Memory and abstract sockets are shared on one computer only."""
-_ANNOUNCE = "echo 1 > /proc/sys/net/ipv4/conf/eth0/arp_notify; ip link set eth0 address {number}"
+_ANNOUNCE = (
+    "sleep {wait_s}; echo 1 > /proc/sys/net/ipv4/conf/eth0/arp_notify; ip link set eth0 address {number}"
+)
+_ARP_LOCK_S = 1.1
+"""Hosts ignore an announcement of an address that they learned within the last second (`locktime`)."""
 _ESTABLISHED = "01"
 _RANDOM, _EVER = 0xFFFFF038, 2**32 - 1
 _PROGRAM = "4,32 0 0 {random},37 1 0 {below},6 0 0 2,6 0 0 {pass_on},"
@@ -143,10 +147,10 @@ class Network:
         self._switch.run("ip", "link", "set", port, "master", _SWITCH, "up")
         made.run("ip", "addr", "add", f"{made.address}/24", "dev", "eth0")
         made.run("ip", "link", "set", "eth0", "up")
-        # As a computer's network service does, it tells all that the address is its own now: others may know
-        # it as another computer's, and would ask again within a minute only. That the kernel does so with a
-        # new number of the card.
-        made.run("sh", "-c", _ANNOUNCE.format(number=number))
+        # Announces its address as network services do; otherwise hosts that know the address by another
+        # card keep sending there for up to a minute. The kernel announces it when the card's number changes.
+        wait_s = _ARP_LOCK_S if address else 0
+        made.run("sh", "-c", _ANNOUNCE.format(number=number, wait_s=wait_s))
         return made
 
     def cable(self, host: Host, *, is_in: bool) -> None:
