@@ -371,7 +371,7 @@ class Graph:
     def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
         check_record(request.publisher)
         member = self._meet(request.node, now, sender)
-        self._place(member, request.publisher, out)
+        self._place(member, request.publisher, out, is_new=request.publisher.id not in member.publishers)
         expected: list[Expected] = []
         hung: list[Expected] = []
         for other, subscriber in self._registry.hearing(request.publisher.topic):
@@ -409,7 +409,7 @@ class Graph:
         for subscriber in request.subscribers:
             self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
-            self._place(member, publisher, out)
+            self._place(member, publisher, out, is_new=False)
         topics = self._registry.topics_heard_by(member)
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
@@ -480,10 +480,12 @@ class Graph:
 
     # ---- telling subscribers
 
-    def _place(self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing]) -> None:
+    def _place(
+        self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing], *, is_new: bool
+    ) -> None:
         if self._registry.add_publisher(member, record) and record.endpoints:
             remote = self._registry.remote(member, record)
-            self._tell(record, PublisherCame(self.epoch, self.revision, remote), out)
+            self._tell(record, PublisherCame(self.epoch, self.revision, remote, is_new), out)
 
     def _forget(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
         publishers = list(member.publishers.values())

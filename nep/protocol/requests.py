@@ -377,9 +377,13 @@ Reply = Done | Added | Found | Renewed | Seen | Refused
 
 @dataclass(frozen=True)
 class PublisherCame(_FromMaster):
-    """A topic that the node subscribes to has a new publisher."""
+    """A topic that the node subscribes to has one more publisher, or one with other endpoints.
+
+    `is_new`: it has just been created, so it has sent nothing before; it did not rejoin or move.
+    """
 
     publisher: RemotePublisher
+    is_new: bool = False
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,10 @@ _UNKNOWN = kind_of("", "", "")
 
 @dataclass
 class HeardPublisher:
-    """One publisher. `last` is the newest message heard of it, None before the first.
+    """One publisher.
+
+    `last` is the number of its newest message that was received or counted as lost; None while unknown, 0 if
+    all of its messages are still to come.
 
     `form` is that of the header of its last message, and `kind` goes with it; 0 when there was none.
     """
@@ -80,6 +83,12 @@ class HeardPublishers:
             if len(self._unlisted) > UNLISTED_MAX:
                 self.pop(next(iter(self._unlisted)))
         return source
+
+    def expect_all_of(self, publisher: int) -> None:
+        """Count losses from the first message of a new publisher. Has no effect once it was heard."""
+        source = self.get(publisher)
+        if source.last is None:
+            source.last = 0
 
     def listed(self, remote: RemotePublisher) -> HeardPublisher:
         """The source of a publisher that the master lists, made when it is new."""
@@ -152,7 +161,7 @@ class HeardPublishers:
         does not greet that is over in a moment.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.has_echoed or source.last is not None or source.remote is None:
+        if source is None or source.has_echoed or source.last or source.remote is None:
             return False
         if source.remote.publisher.history <= 1:
             return False

@@ -384,6 +384,8 @@ class MasterSession:
             self._pace.due_at = now
         if isinstance(answer, PublisherCame):
             for subscriber in self._subscribers_of(answer.publisher.publisher.topic):
+                if answer.is_new and isinstance(subscriber, NativeSubscriber):
+                    subscriber.expect_all_of(answer.publisher.publisher.id)
                 subscriber.connect(self._in_reach((answer.publisher,)))
         elif isinstance(answer, PublisherGone):
             self._publisher_gone(answer)

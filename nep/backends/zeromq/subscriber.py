@@ -510,6 +510,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             closed, self._closed_early = self._closed_early or set(), None
             self._connect(each for each in remotes if each.publisher.id not in closed)
 
+    def expect_all_of(self, publisher: int) -> None:
+        """Count losses from the first message of a publisher that was created after this subscriber."""
+        with self._turn():
+            is_registered = self._closed_early is None
+            if is_registered and not self.is_closed:
+                self._readable.sources.expect_all_of(publisher)
+
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to these publishers; twice is once."""
         with self._turn():

@@ -76,6 +76,15 @@ def test_a_publisher_is_told_whom_to_expect_after_they_are_told(graph: Graph) ->
     assert (reply.answer.epoch, reply.answer.expected) == (7, (Expected(1, "s", "S"),))
 
 
+def test_only_the_first_notice_of_a_publisher_says_that_it_is_new(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    moved = publisher(2, at="tcp://127.0.0.1:6")
+    rejoined = Join(node("p"), 3, (moved, publisher(3)), ())
+    requests = [AddPublisher(node("p"), publisher(2)), AddPublisher(node("p"), moved), rejoined]
+    notices = [each.answer for request in requests for each in ask(graph, request)]
+    assert [each.is_new for each in notices if isinstance(each, PublisherCame)] == [True, False, False]
+
+
 def test_a_node_with_two_subscribers_is_told_once(graph: Graph) -> None:
     for id in (1, 2):
         ask(graph, AddSubscriber(node("s"), subscriber(id)))

@@ -1,0 +1,144 @@
+"""Losses of publishers that a subscriber has not heard yet: counted from the first message of a new one."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+import nep
+from nep.backends.zeromq.loss import GAP_MAX, HeardPublishers
+from nep.masters.master import Master
+from nep.protocol.requests import (
+    Added,
+    AddPublisher,
+    NodeRecord,
+    PublisherCount,
+    PublisherRecord,
+    RemotePublisher,
+    RemovePublisher,
+    Renew,
+    id_from,
+    node_id_from,
+)
+from tests.nep.masters.test_attacks import Attacker, attacker_at
+from tests.nep.programs import eventually
+
+KEY = "a publisher behind a closed port"
+
+
+def new_publisher(history: int = 0) -> HeardPublishers:
+    """Losses of a subscriber that was registered when publisher 5 was created."""
+    sources = HeardPublishers()
+    sources.expect_all_of(5)
+    sources.listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
+    return sources
+
+
+def test_messages_before_the_first_received_one_are_lost() -> None:
+    sources = new_publisher()
+    assert sources.arrived(5, 8, is_alone=False)
+    assert (sources.received, sources.lost) == (1, 7)
+
+
+def test_messages_before_the_echo_are_lost() -> None:
+    sources = new_publisher()
+    assert sources.reached(5, 21975)
+    assert sources.lost == 21975
+
+
+def test_no_message_is_lost_if_the_first_one_arrives() -> None:
+    sources = new_publisher()
+    assert sources.reached(5, 0)
+    assert sources.arrived(5, 1, is_alone=False)
+    assert (sources.received, sources.lost) == (1, 0)
+
+
+def test_losses_grow_with_each_renewal_while_the_publisher_is_not_reached() -> None:
+    sources = new_publisher()
+    sources.promised(5, 100)
+    assert sources.lost == 0
+    sources.promised(5, 250)
+    assert sources.lost == 100
+    sources.settle(5)
+    assert sources.lost == 250
+
+
+def test_a_message_that_was_counted_as_lost_and_comes_late_is_counted_as_received() -> None:
+    sources = new_publisher()
+    sources.promised(5, 2)
+    sources.promised(5, 2)
+    assert sources.lost == 2
+    assert sources.arrived(5, 2, is_alone=False)
+    assert (sources.received, sources.lost) == (1, 1)
+
+
+def test_messages_older_than_the_history_are_lost() -> None:
+    sources = new_publisher(history=3)
+    assert sources.is_early(5), "its history brings this message again"
+    for seq in (8, 9, 10):
+        assert sources.arrived(5, seq, is_alone=True)
+    assert sources.reached(5, 10)
+    assert (sources.received, sources.lost) == (3, 7)
+
+
+def test_a_publisher_that_was_there_before_counts_from_its_first_received_message() -> None:
+    sources = HeardPublishers()
+    sources.promised(5, 100)
+    sources.promised(5, 100)
+    assert sources.arrived(5, 101, is_alone=False)
+    sources.expect_all_of(5)
+    assert (sources.received, sources.lost) == (1, 0)
+
+
+def test_an_impossible_first_number_is_rejected_and_counts_nothing() -> None:
+    sources = new_publisher()
+    assert not sources.reached(5, GAP_MAX + 1)
+    assert sources.lost == 0
+
+
+@pytest.fixture
+def closed_port() -> Iterator[str]:
+    """An endpoint that rejects connections and stays reserved."""
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{held.getsockname()[1]}"
+
+
+class UnreachablePublisher:
+    """A publisher whose messages reach nobody."""
+
+    def __init__(self, master: Attacker, endpoint: str) -> None:
+        self._master = master
+        self.node = NodeRecord(node_id_from(KEY), "publisher", "host", 1, key=KEY)
+        self.record = PublisherRecord(id_from(KEY, 1), "t", "json", "json", (endpoint,), number=1)
+        self._epoch = 0
+
+    def register(self) -> None:
+        answer = self._master.ask(AddPublisher(self.node, self.record))
+        assert isinstance(answer, Added)
+        self._epoch = answer.epoch
+
+    def renew(self, last_seq: int) -> None:
+        counts = (PublisherCount(self.record.id, last_seq, 0, last_seq),)
+        self._master.ask(Renew(self.node.id, self._epoch, 0, counts))
+
+    def close(self, last_seq: int) -> None:
+        self._master.ask(RemovePublisher(self.node.id, self.record.id, last_seq))
+
+
+@pytest.mark.parametrize("topic", ["t", "*"])
+def test_all_messages_of_a_new_publisher_that_cannot_be_reached_are_lost(
+    closed_port: str, topic: str
+) -> None:
+    with Master("127.0.0.1:0") as master, nep.node("s", master=master.address) as node:
+        subscriber = node.new_sub(topic)
+        with attacker_at(master) as connection:
+            publisher = UnreachablePublisher(connection, closed_port)
+            publisher.register()
+            publisher.renew(100)
+            eventually(lambda: subscriber.lost == 100)
+            publisher.close(130)
+            eventually(lambda: subscriber.lost == 130)
+        assert subscriber.received == 0
