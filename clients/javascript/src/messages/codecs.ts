@@ -2,6 +2,7 @@
 import { DecodeError, EncodeError } from "../errors.js";
 import type { Extension } from "../wire/extension.js";
 import { decodeUtf8 } from "../wire/utf8.js";
+import { copied } from "./copying.js";
 import { decodeImage, encodeImage } from "./image.js";
 import { countNonFinite, isTooDeep, MAX_LEVELS } from "./nesting.js";
 import { pack, unpack, withWideIntegers } from "./packing.js";
@@ -121,9 +122,8 @@ export function codecNumbered(number: number): Codec | undefined {
 /** Return a copy: the caller may go on writing into its own bytes while the message is queued. */
 export function copyOf(payload: unknown): Buffer {
   if (ArrayBuffer.isView(payload))
-    return Buffer.from(Buffer.from(payload.buffer, payload.byteOffset, payload.byteLength));
-  if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer)
-    return Buffer.from(new Uint8Array(payload));
+    return copied(new Uint8Array(payload.buffer, payload.byteOffset, payload.byteLength));
+  if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer) return copied(new Uint8Array(payload));
   throw new EncodeError(
     `A topic of type "bytes" takes a Buffer, typed array or ArrayBuffer, not "${typeof payload}".`,
   );

@@ -1,5 +1,6 @@
 /** Pictures: JPEG or PNG files and raw pixels with their shape. The bytes are neither encoded nor decoded here. */
 import { DecodeError, EncodeError } from "../errors.js";
+import { copied } from "./copying.js";
 import type { Extension } from "../wire/extension.js";
 
 /** A picture as it is published and received on topics of type `image`. */
@@ -55,7 +56,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
       'A topic of type "image" takes the bytes of a JPEG or PNG file, or {data, encoding, shape}.',
     );
   }
-  const data = Buffer.from(image.data);
+  const data = copied(image.data);
   const kind = fileKind(data);
   if (kind) {
     const shape = image.shape ?? (kind === "png" ? pngShape(data) : jpegShape(data));

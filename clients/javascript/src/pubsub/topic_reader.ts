@@ -5,7 +5,7 @@ import type { ReachablePublisher } from "../session/master_session.js";
 import { SubSocket, type Hold } from "../sockets/socket.js";
 import { Flag, type Header, readHeaderPart } from "../wire/header.js";
 import { helloPart, readPart } from "../wire/notices.js";
-import { readRest, splitParts, topicPart, type WireMessage } from "../wire/parts.js";
+import { readOnePart, readRest, splitParts, topicPart, type WireMessage } from "../wire/parts.js";
 import { WINDOW_BYTES } from "./byte_window.js";
 import { Sources, type Source } from "./loss.js";
 
@@ -132,6 +132,11 @@ export class TopicReader {
   }
 
   private parse(parts: Buffer[]): void {
+    const message = parts.length === 1 ? readOnePart(this.topicPart, parts[0]!) : undefined;
+    if (message) {
+      this.message(message, false);
+      return;
+    }
     if (parts.length === 2 && parts[0]!.equals(this.hello)) {
       this.notice(readHeaderPart(parts[1]!));
       return;

@@ -94,6 +94,9 @@ class Sender<T> {
   private unsent: Buffer[] | undefined;
   private last: Promise<void> = Promise.resolve();
   private isInFlight = false;
+  private readonly onSent = (): void => {
+    this.isInFlight = false;
+  };
   private waiting: Promise<void> | undefined;
 
   constructor(
@@ -147,12 +150,7 @@ class Sender<T> {
     try {
       // A ROUTER's EHOSTUNREACH, and a socket that is being closed: there is no peer any more.
       this.isInFlight = true;
-      this.last = (this.socket as XPublisher)
-        .send(parts)
-        .catch(() => undefined)
-        .then(() => {
-          this.isInFlight = false;
-        });
+      this.last = (this.socket as XPublisher).send(parts).then(this.onSent, this.onSent);
       return true;
     } catch (error) {
       if ((error as NodeJS.ErrnoException).code === "EBUSY") return false;

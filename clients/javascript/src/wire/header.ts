@@ -34,15 +34,20 @@ export interface Header {
   readonly size: number;
 }
 
+// Buffer's methods for 64-bit numbers go byte by byte through several bigints; DataView's compile to one store or load.
+const scratch = new Uint8Array(HEADER_BYTES);
+const scratchView = new DataView(scratch.buffer);
+
 /** Write a header into `buffer` at `offset`. A size beyond 32 bits is written as 0 ("unknown"). */
 export function writeHeader(buffer: Buffer, offset: number, header: Header): void {
-  buffer[offset] = VERSION;
-  buffer[offset + 1] = header.codec;
-  buffer.writeUInt16LE(header.flags, offset + 2);
-  buffer.writeUInt32LE(header.size <= MAX_SIZE ? header.size : 0, offset + 4);
-  buffer.writeBigUInt64LE(header.seq, offset + 8);
-  buffer.writeBigUInt64LE(header.stampNs, offset + 16);
-  buffer.writeBigUInt64LE(header.publisher, offset + 24);
+  scratch[0] = VERSION;
+  scratch[1] = header.codec;
+  scratchView.setUint16(2, header.flags, true);
+  scratchView.setUint32(4, header.size <= MAX_SIZE ? header.size : 0, true);
+  scratchView.setBigUint64(8, header.seq, true);
+  scratchView.setBigUint64(16, header.stampNs, true);
+  scratchView.setBigUint64(24, header.publisher, true);
+  for (let index = 0; index < HEADER_BYTES; index++) buffer[offset + index] = scratch[index]!;
 }
 
 /** Return the 32 bytes of a header. */
@@ -64,12 +69,18 @@ export function readHeaderPart(part: Buffer): Header {
       `The message has version ${version}; this nep-js reads version ${VERSION}. Update nep-js.`,
     );
   }
+  return readHeaderAt(part, 0);
+}
+
+/** Read the header at `offset`, whose size and version were checked. */
+export function readHeaderAt(part: Buffer, offset: number): Header {
+  for (let index = 0; index < HEADER_BYTES; index++) scratch[index] = part[offset + index]!;
   return {
-    codec: part[1]!,
-    flags: part.readUInt16LE(2),
-    size: part.readUInt32LE(4),
-    seq: part.readBigUInt64LE(8),
-    stampNs: part.readBigUInt64LE(16),
-    publisher: part.readBigUInt64LE(24),
+    codec: scratch[1]!,
+    flags: scratchView.getUint16(2, true),
+    size: scratchView.getUint32(4, true),
+    seq: scratchView.getBigUint64(8, true),
+    stampNs: scratchView.getBigUint64(16, true),
+    publisher: scratchView.getBigUint64(24, true),
   };
 }

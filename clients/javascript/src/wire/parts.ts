@@ -5,7 +5,16 @@ import { isMap, pack, unpackWithTextKeys } from "../messages/packing.js";
 import { readBatchBody } from "./batch.js";
 import type { Extension } from "./extension.js";
 import { decodeUtf8 } from "./utf8.js";
-import { Flag, HEADER_BYTES, type Header, packHeader, readHeaderPart, writeHeader } from "./header.js";
+import {
+  Flag,
+  HEADER_BYTES,
+  type Header,
+  packHeader,
+  readHeaderAt,
+  readHeaderPart,
+  VERSION,
+  writeHeader,
+} from "./header.js";
 import { checkTopic } from "./names.js";
 
 export const NO_EXTENSION: Extension = Object.freeze({});
@@ -58,6 +67,23 @@ export function onePart(topic: Buffer, header: Header, payload: Buffer): Buffer 
   writeHeader(part, topic.length, header);
   payload.copy(part, topic.length + HEADER_BYTES);
   return part;
+}
+
+/**
+ * Read one message in one part without slicing it into three; undefined for whatever is not the plain case, which
+ * {@link splitParts} and {@link readRest} then read or refuse.
+ *
+ * @param topic The topic part.
+ */
+export function readOnePart(topic: Buffer, part: Buffer): WireMessage | undefined {
+  const at = topic.length;
+  const start = at + HEADER_BYTES;
+  if (part.length < start || part[at] !== VERSION) return undefined;
+  for (let index = 0; index < at; index++) if (part[index] !== topic[index]) return undefined;
+  const header = readHeaderAt(part, at);
+  if (header.flags & (Flag.EXTENSION | Flag.BATCH) || !codecNumbered(header.codec)) return undefined;
+  if (header.size !== 0 && header.size !== part.length - start) return undefined;
+  return { header, payload: part.subarray(start), extension: NO_EXTENSION };
 }
 
 /** Split the parts of a message into the first one and the rest; one part counts as three. @throws {WireError} `part-count` */
