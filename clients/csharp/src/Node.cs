@@ -17,6 +17,7 @@ namespace Nep
     {
         private const int HandshakeMs = 500;
         private const int LeaveMs = 300;
+        private const int ExitMs = 1000;
         internal const string ServicePrefix = "nep.service:";
         private static readonly HashSet<Node> Open = new HashSet<Node>();
         private static bool _closesAtExit;
@@ -448,6 +449,7 @@ namespace Nep
         private static void OnExit(object sender, EventArgs arguments)
         {
             CloseAll();
+            BackgroundThread.JoinAll(ExitMs);
         }
 
         /// <summary>Close all nodes of this process.</summary>

@@ -19,7 +19,7 @@ namespace Nep
             _answer = answer;
             for (int i = 0; i < threads; i++)
             {
-                new Thread(Run) { IsBackground = true, Name = "nep server " + Service }.Start();
+                BackgroundThread.Start("server " + Service, Run, 0);
             }
         }
 

@@ -18,7 +18,7 @@ namespace Nep
             _hasThread = mode == CallbackMode.Thread;
             if (_hasThread)
             {
-                new Thread(Run) { IsBackground = true, Name = "nep callback " + subscriber.Topic }.Start();
+                BackgroundThread.Start("callback " + subscriber.Topic, Run, 0);
             }
         }
 

@@ -56,7 +56,6 @@ namespace Nep.Session
         private readonly HashSet<ulong> _confirmed = new HashSet<ulong>();
         private readonly MasterCalls _calls;
         private readonly Stopwatch _clock = Stopwatch.StartNew();
-        private readonly Thread _thread;
         private List<string> _served = new List<string>();
         private string _ownHost = MasterAddress.Loopback;
         private ulong _epoch;
@@ -75,8 +74,7 @@ namespace Nep.Session
             _socket = new DealerSocket(address.Endpoint, this, limits, NullMechanism.Create);
             _calls = new MasterCalls(address.ToString(), _socket);
             _socket.Start();
-            _thread = new Thread(Run, 256 * 1024) { IsBackground = true, Name = "nep node" };
-            _thread.Start();
+            BackgroundThread.Start("node", Run, BackgroundThread.SmallStackBytes);
         }
 
         /// <summary>Addresses of this computer at which publishers are to be reached.</summary>

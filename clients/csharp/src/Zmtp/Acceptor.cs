@@ -181,8 +181,7 @@ namespace Nep.Zmtp
                 }
                 _pending.Add(connection);
             }
-            var thread = new Thread(() => Serve(connection), 256 * 1024) { IsBackground = true, Name = "nep " + _socketType.ToLowerInvariant() };
-            thread.Start();
+            BackgroundThread.Start(_socketType.ToLowerInvariant(), () => Serve(connection), BackgroundThread.SmallStackBytes);
         }
 
         private void Serve(Connection connection)
@@ -259,7 +258,7 @@ namespace Nep.Zmtp
 
             public void Start()
             {
-                new Thread(Run, 128 * 1024) { IsBackground = true, Name = "nep listener" }.Start();
+                BackgroundThread.Start("listener", Run, BackgroundThread.SmallStackBytes);
             }
 
             public void Close()

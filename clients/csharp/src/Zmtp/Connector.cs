@@ -28,7 +28,7 @@ namespace Nep.Zmtp
         private readonly CloseCounter _refused;
         private readonly ManualResetEvent _stop = new ManualResetEvent(false);
         private readonly Random _random;
-        private readonly Thread _thread;
+        private Thread _thread;
         private volatile Connection _connection;
         private int _waitMs;
 
@@ -43,7 +43,6 @@ namespace Nep.Zmtp
             _refused = refused;
             _random = new Random(unchecked(Environment.TickCount * 31 + endpoint.Port));
             _waitMs = limits.MinReconnectMs;
-            _thread = new Thread(Run, 256 * 1024) { IsBackground = true, Name = "nep " + socketType.ToLowerInvariant() };
         }
 
         /// <summary>Data of the owner.</summary>
@@ -57,7 +56,7 @@ namespace Nep.Zmtp
 
         public void Start()
         {
-            _thread.Start();
+            _thread = BackgroundThread.Start(_socketType.ToLowerInvariant(), Run, BackgroundThread.SmallStackBytes);
         }
 
         /// <summary>Queue a message; false when there is no connection or its queue is full.</summary>
@@ -81,7 +80,7 @@ namespace Nep.Zmtp
         /// <summary>Wait for the thread, unless it is the caller's.</summary>
         public void Join(int timeoutMs)
         {
-            if (Thread.CurrentThread != _thread)
+            if (_thread != null && Thread.CurrentThread != _thread)
             {
                 _thread.Join(timeoutMs);
             }

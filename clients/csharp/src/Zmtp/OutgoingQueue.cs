@@ -247,8 +247,7 @@ namespace Nep.Zmtp
                 if (!_hasThread)
                 {
                     _hasThread = true;
-                    var thread = new Thread(WriteInThread, 128 * 1024) { IsBackground = true, Name = "nep writer" };
-                    thread.Start();
+                    BackgroundThread.Start("writer", WriteInThread, BackgroundThread.SmallStackBytes);
                 }
                 Monitor.PulseAll(_lock);
             }

@@ -1,0 +1,51 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.Threading;
+
+namespace Nep
+{
+    /// <summary>Starts the background threads of the library and waits for them when the process exits.</summary>
+    /// <remarks>
+    /// Mono 6.8 aborts the process when a background thread throws an exception while the runtime shuts down: a reader whose
+    /// socket has just been closed does that.
+    /// </remarks>
+    internal static class BackgroundThread
+    {
+        /// <summary>Stack of threads that run only code of the library.</summary>
+        public const int SmallStackBytes = 256 * 1024;
+
+        private static readonly List<Thread> Running = new List<Thread>();
+
+        /// <summary>Start a thread; <paramref name="stackBytes"/> 0 is the platform's default.</summary>
+        public static Thread Start(string name, ThreadStart run, int stackBytes)
+        {
+            var thread = new Thread(run, stackBytes) { IsBackground = true, Name = "nep " + name };
+            lock (Running)
+            {
+                Running.RemoveAll(each => !each.IsAlive);
+                Running.Add(thread);
+                thread.Start();
+            }
+            return thread;
+        }
+
+        /// <summary>Wait until all threads have ended; false when the time is over first.</summary>
+        public static bool JoinAll(int timeoutMs)
+        {
+            Stopwatch watch = Stopwatch.StartNew();
+            Thread[] threads;
+            lock (Running)
+            {
+                threads = Running.ToArray();
+            }
+            bool allEnded = true;
+            foreach (Thread each in threads)
+            {
+                bool isOwn = each == Thread.CurrentThread; // a callback may end the process
+                allEnded &= isOwn || each.Join(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+            }
+            return allEnded;
+        }
+    }
+}
