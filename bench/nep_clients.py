@@ -1,13 +1,14 @@
 """Round trips between Python and other languages, as a ratio to Python and Python in the same run.
 
-    python bench/nep_clients.py [--trips 100] [--blocks 6] [--starts 8] [--kinds json string bytes] [--sizes 1000]
+    python bench/nep_clients.py [--trips 100] [--blocks 6] [--starts 8] [--kinds json] [--sizes 1000]
 
 A Python program publishes and listens, the other program decodes each message and publishes it again;
 both are ends of `paper.py` (`paper_ends.py`, `pong.cjs`, `Pong.cs`). `json` is a map with a list of
 numbers. All rows use TCP: Unix sockets and shared memory, which only Python has, are switched off
 (--local leaves them on). Rows are interleaved in random order within each block, and all programs are
-restarted several times: two runs of one program differ by up to 40 % at 1 kB. "Python again" is the A/A row, Python against itself: a size counts only if it is within 5 %. The goal is 1.3 for `string` and
-`bytes` up to 1 MB, for `json` up to 64 kB.
+restarted several times: two runs of one program differ by up to 40 % at 1 kB. "Python again" is the A/A
+row, Python against itself: a size counts only if it is within 5 %. The goal is 1.3 for `string` and `bytes`
+up to 1 MB, for `json` up to 64 kB.
 
 JavaScript needs `npm ci && npm run build` in clients/javascript, C# needs Debian's mono-mcs, mono-runtime and
 libnewtonsoft-json5.0-cil.
