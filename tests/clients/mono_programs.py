@@ -86,6 +86,10 @@ class MonoProgram:
         """Return the next line of its output."""
         return self._lines.get(timeout=timeout_s)
 
+    def is_silent(self) -> bool:
+        """Return whether no line waits to be read."""
+        return self._lines.empty()
+
     def say(self, text: str) -> None:
         """Write a line to its input."""
         assert self.process.stdin is not None

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import zmq
 
 import nep
 from nep.masters.master import Master
@@ -129,6 +130,50 @@ def test_names_of_version_0_0_0_5_work(node: Node) -> None:
         ask.publish({"say": "the end"})
         assert json.loads(listen(subscriber)["heard"]) == {"say": "the end"}
         assert old.process.wait(LONG_S) == 0
+
+
+def test_direct_connections_and_the_client_of_version_0_0_0_5_work_without_a_master() -> None:
+    context = zmq.Context.instance()
+    with (
+        context.socket(zmq.REP) as server,
+        context.socket(zmq.SUB) as subscriber,
+        context.socket(zmq.PUB) as publisher,
+    ):
+        with context.socket(zmq.PUB) as freed:
+            free = freed.bind_to_random_port("tcp://127.0.0.1")
+        ports = (
+            free,
+            publisher.bind_to_random_port("tcp://127.0.0.1"),
+            server.bind_to_random_port("tcp://127.0.0.1"),
+        )
+        with running(peer("DirectNames"), *map(str, ports)) as direct:
+            assert direct.line() == "ready"
+            subscriber.connect(f"tcp://127.0.0.1:{free}")
+            subscriber.subscribe("out")
+            direct.say("again")
+
+            def heard_by_csharp() -> bool:
+                publisher.send_string("into nothing")  # has the filter as a prefix and is another topic
+                publisher.send_string('in {"a":"b c"}')
+                return not direct.is_silent()
+
+            eventually(heard_by_csharp)
+
+            def heard_from_csharp() -> bool:
+                direct.say("again")
+                return bool(subscriber.poll(10))
+
+            eventually(heard_from_csharp)
+            assert subscriber.recv_string() == 'out {"a":"b c"}'
+            direct.say("go on")
+            for number in (1, 2):
+                assert server.recv_json() == {"n": number}
+                server.send_json({"twice": 2 * number})
+            while (line := direct.line()) == "sent":
+                pass
+            assert [json.loads(line), json.loads(direct.line())] == [{"twice": 2}, {"twice": 4}]
+            assert direct.line() == "refused"
+            assert direct.end() == 0
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,10 @@
 using System;
 using System.Collections.Generic;
 using System.ComponentModel;
+using System.Globalization;
 using System.IO;
 using System.Threading;
+using Nep.Session;
 
 namespace Nep
 {
@@ -12,6 +14,7 @@ namespace Nep
     {
         private readonly Node _node;
         private readonly List<NepCallback> _callbacks = new List<NepCallback>();
+        private readonly List<IDisposable> _direct = new List<IDisposable>();
 
         /// <summary>Create a node.</summary>
         /// <param name="name">Name in the graph.</param>
@@ -34,9 +37,45 @@ namespace Nep
             return new NepConfiguration(masterIp);
         }
 
+        /// <summary>Configuration for a connection without a master: the publisher binds, subscribers connect.</summary>
+        /// <param name="ip">Address of the publisher.</param>
+        /// <param name="port">Its port.</param>
+        /// <param name="mode"><c>one2many</c>.</param>
+        /// <exception cref="NotSupportedException">The mode is another one.</exception>
+        public NepConfiguration Direct(string ip = "127.0.0.1", string port = "9000", string mode = "one2many")
+        {
+            if (mode != "one2many")
+            {
+                throw new NotSupportedException("Direct connections of the C# client have the mode 'one2many', not '" + mode + "'.");
+            }
+            return new NepConfiguration(ip, int.Parse(port, CultureInfo.InvariantCulture));
+        }
+
+        /// <summary>Same as <see cref="Direct(string, string, string)"/>.</summary>
+        public NepConfiguration Direct(string ip, int port, string mode = "one2many")
+        {
+            return Direct(ip, port.ToString(CultureInfo.InvariantCulture), mode);
+        }
+
+        /// <summary>Same as <see cref="Direct(string, string, string)"/>.</summary>
+        public NepConfiguration Manual(string ip = "127.0.0.1", string port = "9000", string mode = "one2many")
+        {
+            return Direct(ip, port, mode);
+        }
+
+        /// <summary>Same as <see cref="Direct(string, string, string)"/>.</summary>
+        public NepConfiguration Manual(string ip, int port, string mode = "one2many")
+        {
+            return Direct(ip, port, mode);
+        }
+
         /// <summary>Create a publisher.</summary>
         public NepPublisher NewPub(string topic, string msgType, NepConfiguration configuration = null)
         {
+            if (configuration != null && configuration.Port > 0)
+            {
+                return Keep(new NepPublisher(new DirectPublisher(topic, configuration.Host, configuration.Port), msgType));
+            }
             var options = new PublisherOptions { Master = NepConfiguration.MasterOf(configuration) };
             return new NepPublisher(_node.CreatePublisher(topic, msgType, options));
         }
@@ -44,8 +83,14 @@ namespace Nep
         /// <summary>Create a subscriber.</summary>
         public NepSubscriber NewSub(string topic, string msgType, NepConfiguration configuration = null)
         {
+            if (configuration != null && configuration.Port > 0)
+            {
+                var direct = new DirectSubscriber(topic, configuration.Host, configuration.Port);
+                return Keep(new NepSubscriber(direct.Inbox, direct.Close));
+            }
             var options = new SubscriberOptions { Master = NepConfiguration.MasterOf(configuration) };
-            return new NepSubscriber(_node.CreateSubscriber(topic, msgType, options));
+            Subscriber subscriber = _node.CreateSubscriber(topic, msgType, options);
+            return new NepSubscriber(subscriber.Socket.Inbox, subscriber.Close);
         }
 
         /// <summary>Call a function with the text of each message, in <see cref="Update"/>.</summary>
@@ -74,6 +119,13 @@ namespace Nep
         /// <summary>Close with all publishers, subscribers and callbacks.</summary>
         public void Close()
         {
+            List<IDisposable> direct;
+            lock (_direct)
+            {
+                direct = new List<IDisposable>(_direct);
+                _direct.Clear();
+            }
+            direct.ForEach(each => each.Dispose());
             _node.Close();
         }
 
@@ -82,9 +134,18 @@ namespace Nep
         {
             Close();
         }
+
+        private T Keep<T>(T made) where T : IDisposable
+        {
+            lock (_direct)
+            {
+                _direct.Add(made);
+            }
+            return made;
+        }
     }
 
-    /// <summary>Which master a publisher or subscriber registers with.</summary>
+    /// <summary>Which master a publisher or subscriber registers with, or its port without a master.</summary>
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepConfiguration
     {
@@ -94,6 +155,17 @@ namespace Nep
         {
             _master = master;
         }
+
+        internal NepConfiguration(string host, int port)
+        {
+            Host = host;
+            Port = port;
+        }
+
+        internal string Host { get; private set; }
+
+        /// <summary>Port of a direct connection; 0 with a master.</summary>
+        internal int Port { get; private set; }
 
         internal static string MasterOf(NepConfiguration configuration)
         {
@@ -105,23 +177,49 @@ namespace Nep
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepPublisher : IDisposable
     {
+        private const int LingerMs = 2000;
+
         private readonly Publisher _publisher;
+        private readonly DirectPublisher _direct;
+        private readonly string _type;
 
         internal NepPublisher(Publisher publisher)
         {
             _publisher = publisher;
+            _type = publisher.Type;
+        }
+
+        internal NepPublisher(DirectPublisher direct, string type)
+        {
+            _direct = direct;
+            _type = type;
         }
 
         /// <summary>Publish an object.</summary>
         public void Publish(object message)
         {
-            _publisher.Publish(message);
+            if (_direct == null)
+            {
+                _publisher.Publish(message);
+            }
+            else if (_type == "string")
+            {
+                _direct.Send((string)message);
+            }
+            else
+            {
+                _direct.Send(Json.Serializer.Serialize(message));
+            }
         }
 
         /// <summary>Publish text, or JSON text on a topic of type <c>json</c>.</summary>
         public void SendString(string message)
         {
-            if (_publisher.Type == "string")
+            if (_direct != null)
+            {
+                _direct.Send(message);
+            }
+            else if (_type == "string")
             {
                 _publisher.Publish(message);
             }
@@ -134,19 +232,33 @@ namespace Nep
         /// <summary>Publish a JPEG or PNG file on a topic of type <c>image</c>.</summary>
         public void SendImage(MemoryStream image)
         {
-            _publisher.PublishImage(image.ToArray());
+            SendImageBytes(image.ToArray());
         }
 
         /// <summary>Publish a JPEG or PNG file on a topic of type <c>image</c>.</summary>
         public void SendImageBytes(byte[] image)
         {
-            _publisher.PublishImage(image);
+            if (_direct == null)
+            {
+                _publisher.PublishImage(image);
+            }
+            else
+            {
+                _direct.Send(Convert.ToBase64String(image));
+            }
         }
 
         /// <summary>Close.</summary>
         public void Dispose()
         {
-            _publisher.Close();
+            if (_direct == null)
+            {
+                _publisher.Close();
+            }
+            else
+            {
+                _direct.Close(LingerMs);
+            }
         }
     }
 
@@ -154,30 +266,34 @@ namespace Nep
     [EditorBrowsable(EditorBrowsableState.Never)]
     public sealed class NepSubscriber : IDisposable
     {
-        private readonly Subscriber _subscriber;
+        private readonly Inbox _inbox;
+        private readonly Action _close;
 
-        internal NepSubscriber(Subscriber subscriber)
+        internal NepSubscriber(Inbox inbox, Action close)
         {
-            _subscriber = subscriber;
+            _inbox = inbox;
+            _close = close;
         }
 
         /// <summary>Return whether a message is there, and its JSON or text (empty when there is none).</summary>
         public bool Listen(out string message)
         {
-            message = "";
-            return _subscriber.listenNB(ref message);
+            Message received = _inbox.Take(0, CancellationToken.None);
+            message = received == null ? "" : received.Text;
+            return received != null;
         }
 
         /// <summary>Wait for the next message and return its JSON or text.</summary>
         public string BlockingListen()
         {
-            return _subscriber.listen();
+            Message received = _inbox.Take(-1, CancellationToken.None);
+            return received == null ? "" : received.Text;
         }
 
         /// <summary>Close; a waiting <see cref="BlockingListen"/> returns an empty text.</summary>
         public void Dispose()
         {
-            _subscriber.Close();
+            _close();
         }
     }
 

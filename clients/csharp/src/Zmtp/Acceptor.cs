@@ -56,12 +56,7 @@ namespace Nep.Zmtp
         /// <exception cref="SocketException">The address cannot be bound.</exception>
         public int Bind(string host, Predicate<int> isAllowed)
         {
-            ZmtpEndpoint endpoint;
-            if (!ZmtpEndpoint.TryParse(ZmtpEndpoint.Format(host, 1), out endpoint))
-            {
-                throw new SocketException((int)SocketError.HostNotFound);
-            }
-            IPAddress address = endpoint.Resolve()[0];
+            IPAddress address = AddressOf(host);
             var rejected = new List<Socket>();
             try
             {
@@ -91,6 +86,25 @@ namespace Nep.Zmtp
                     each.Close();
                 }
             }
+        }
+
+        /// <summary>Bind at a port of an address.</summary>
+        /// <exception cref="SocketException">It cannot be bound.</exception>
+        public void Bind(string host, int port)
+        {
+            IPAddress address = AddressOf(host);
+            var socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp);
+            try
+            {
+                socket.Bind(new IPEndPoint(address, port));
+                socket.Listen(128);
+            }
+            catch
+            {
+                socket.Close();
+                throw;
+            }
+            Listen(host, socket);
         }
 
         /// <summary>Accept no further connections at an address. Present ones stay.</summary>
@@ -138,6 +152,16 @@ namespace Nep.Zmtp
             {
                 each.Close();
             }
+        }
+
+        private static IPAddress AddressOf(string host)
+        {
+            ZmtpEndpoint endpoint;
+            if (!ZmtpEndpoint.TryParse(ZmtpEndpoint.Format(host, 1), out endpoint))
+            {
+                throw new SocketException((int)SocketError.HostNotFound);
+            }
+            return endpoint.Resolve()[0];
         }
 
         private void Listen(string host, Socket socket)

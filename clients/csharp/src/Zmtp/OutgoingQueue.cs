@@ -41,7 +41,7 @@ namespace Nep.Zmtp
             if (IsMono)
             {
                 // Mono (6.8, also Unity's) spins in Send on a non-blocking socket until all is sent. A writable socket has a third of
-                // its buffer free, so what is an eighth of it never meets a full one.
+                // its buffer free, so what is an eighth of it never meets a full one: docs/adr/0033-sending-under-mono.md.
                 socket.SendBufferSize = SendBufferBytes;
                 _maxChunk = Math.Max(2048, socket.SendBufferSize / 8);
             }
