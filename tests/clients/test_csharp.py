@@ -129,6 +129,11 @@ def test_names_of_version_0_0_0_5_work(node: Node) -> None:
         assert listen(subscriber) == {"a": "b c"}
         ask.publish({"say": "the end"})
         assert json.loads(listen(subscriber)["heard"]) == {"say": "the end"}
+        still = {"x": 0, "y": 0, "z": 0}
+        assert listen(subscriber) == {"linear": {**still, "x": 0.5}, "angular": still}
+        seen = listen(subscriber)
+        assert seen.pop("header") == {"seq": 0, "stamp": {"secs": 0, "nsecs": 0}, "frame_id": "front"}
+        assert seen == {"radiation_type": 0, "field_of_view": 0, "min_range": 0, "max_range": 4, "range": 0}
         assert old.process.wait(LONG_S) == 0
 
 

@@ -23,6 +23,8 @@ internal static class OldNames
                 if (subscriber.Listen(out text))
                 {
                     publisher.Publish(new Dictionary<string, string> { { "heard", text } });
+                    publisher.Publish(new NepGeometryMsgs.NepTwist { linear = new NepGeometryMsgs.NepVector3 { x = 0.5 } });
+                    publisher.Publish(new NepSensorMsgs.Range { max_range = 4, header = new NepSensorMsgs.Header { frame_id = "front" } });
                     isOver = text.Contains("end");
                 }
                 Thread.Sleep(1);
