@@ -7,10 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import msgpack
+import numpy as np
 import pytest
 
+from nep.messages import image_codec
 from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
+from tests.nep import bad_pictures as bad
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
 DATA = Path(__file__).parents[1] / "data" / "wire"
@@ -111,3 +115,19 @@ def test_filters_and_notices_are_read_and_written_as_in_the_vectors(wire: MonoPr
         assert header["header"] == vector["parts"][1]
         for field in ("seq", "stamp_ns", "publisher"):
             assert header[field] == vector["means"][field], vector["name"]
+
+
+@pytest.mark.parametrize("order", [">", "<"])
+def test_shapes_of_pictures_are_those_that_python_tells(wire: MonoProgram, order: str) -> None:
+    picture = np.zeros((3, 5, 3), np.uint8)
+    jpeg, png = (cv2.imencode(f".{kind}", picture)[1].tobytes() for kind in ("jpeg", "png"))
+    for orientation in range(10):
+        told = bad.exif(orientation, order)
+        turned_jpeg = jpeg[:2] + bad.segment(0xE1, told) + jpeg[2:]
+        turned_png = png[:33] + bad.chunk(b"eXIf", told[6:]) + png[33:]
+        for file in (turned_jpeg, turned_png):
+            assert json.loads(wire.ask(f"image {file.hex()}")) == image_codec.picture_info(file)
+    for end in range(20, len(turned_jpeg), 7):
+        cut = json.loads(wire.ask(f"image {turned_jpeg[:end].hex()}"))
+        assert "error" in cut or cut["encoding"] == "jpeg"
+        assert json.loads(wire.ask(f"image {turned_png[:end].ljust(26).hex()}"))["encoding"] == "png"

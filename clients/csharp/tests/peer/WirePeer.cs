@@ -23,6 +23,11 @@ internal static class WirePeer
                 answer = new JObject();
                 answer["error"] = exception.Code;
             }
+            catch (Nep.PayloadException exception)
+            {
+                answer = new JObject();
+                answer["error"] = exception.Message;
+            }
             Console.Out.WriteLine(answer.ToString(Newtonsoft.Json.Formatting.None));
             Console.Out.Flush();
         }
@@ -52,6 +57,8 @@ internal static class WirePeer
             case "id":
                 string key = words[1] == "e9" ? "\u00e9" : words[1];
                 return words.Length == 2 ? Ids.NodeId(key) : Ids.Id(key, long.Parse(words[2], CultureInfo.InvariantCulture)).ToString(CultureInfo.InvariantCulture);
+            case "image":
+                return JToken.FromObject(Nep.ImageHeader.Describe(FromHex(words[1])));
             default:
                 throw new WireException("malformed");
         }
