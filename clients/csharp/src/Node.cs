@@ -126,11 +126,7 @@ namespace Nep
                 session.ReportMissing(record.Id, missing.ConvertAll(each => each.Id));
             }
             var made = new Publisher(this, socket, codec, missing.ConvertAll(each => each.NodeName));
-            lock (_lock)
-            {
-                _publishers[made] = session;
-            }
-            return made;
+            return Keep(_publishers, made, session);
         }
 
         /// <summary>Create a subscriber. It receives the next message of every publisher that is registered.</summary>
@@ -169,11 +165,7 @@ namespace Nep
             }
             socket.WaitForEchoes(HandshakeMs);
             var made = new Subscriber(this, socket);
-            lock (_lock)
-            {
-                _subscribers[made] = session;
-            }
-            return made;
+            return Keep(_subscribers, made, session);
         }
 
         /// <summary>Call a function with each message of a topic.</summary>
@@ -236,11 +228,7 @@ namespace Nep
                 throw;
             }
             var made = new Server(this, socket, (payload, codec) => Answer(callback, payload, codec), threads);
-            lock (_lock)
-            {
-                _servers[made] = session;
-            }
-            return made;
+            return Keep(_servers, made, session);
         }
 
         /// <summary>Create a client of a service. Its server need not be there yet.</summary>
@@ -258,11 +246,7 @@ namespace Nep
             var socket = new ClientSocket(record, service);
             session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
             var made = new Client(this, socket, Codec.For(type));
-            lock (_lock)
-            {
-                _clients[made] = session;
-            }
-            return made;
+            return Keep(_clients, made, session);
         }
 
         /// <summary>Run waiting callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
@@ -348,13 +332,9 @@ namespace Nep
         internal void Close(Publisher publisher)
         {
             MasterSession session;
-            lock (_lock)
+            if (!TryRemove(_publishers, publisher, out session))
             {
-                if (_isClosed || !_publishers.TryGetValue(publisher, out session))
-                {
-                    return;
-                }
-                _publishers.Remove(publisher);
+                return;
             }
             session.RemovePublisher(publisher.Socket.Record.Id, publisher.Socket.Count);
             publisher.Socket.SayBye();
@@ -364,13 +344,9 @@ namespace Nep
         internal void Close(Subscriber subscriber)
         {
             MasterSession session;
-            lock (_lock)
+            if (!TryRemove(_subscribers, subscriber, out session))
             {
-                if (_isClosed || !_subscribers.TryGetValue(subscriber, out session))
-                {
-                    return;
-                }
-                _subscribers.Remove(subscriber);
+                return;
             }
             session.RemoveSubscriber(subscriber.Socket.Record.Id);
             subscriber.Socket.Close();
@@ -379,13 +355,9 @@ namespace Nep
         internal void Close(Server server)
         {
             MasterSession session;
-            lock (_lock)
+            if (!TryRemove(_servers, server, out session))
             {
-                if (_isClosed || !_servers.TryGetValue(server, out session))
-                {
-                    return;
-                }
-                _servers.Remove(server);
+                return;
             }
             session.RemovePublisher(server.Socket.Record.Id, (ulong)server.Socket.Calls);
             server.Socket.BeginClose();
@@ -395,13 +367,9 @@ namespace Nep
         internal void Close(Client client)
         {
             MasterSession session;
-            lock (_lock)
+            if (!TryRemove(_clients, client, out session))
             {
-                if (_isClosed || !_clients.TryGetValue(client, out session))
-                {
-                    return;
-                }
-                _clients.Remove(client);
+                return;
             }
             session.RemoveSubscriber(client.Socket.Record.Id);
             client.Socket.Close();
@@ -497,6 +465,25 @@ namespace Nep
             catch (Exception) // IL2CPP has no processes
             {
                 return null;
+            }
+        }
+
+        private T Keep<T>(Dictionary<T, MasterSession> owned, T made, MasterSession session)
+        {
+            lock (_lock)
+            {
+                owned[made] = session;
+            }
+            return made;
+        }
+
+        /// <summary>Forget what is to be closed; false when the node or somebody else closes it already.</summary>
+        private bool TryRemove<T>(Dictionary<T, MasterSession> owned, T closing, out MasterSession session)
+        {
+            lock (_lock)
+            {
+                session = null;
+                return !_isClosed && owned.TryGetValue(closing, out session) && owned.Remove(closing);
             }
         }
 
