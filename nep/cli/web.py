@@ -19,6 +19,7 @@ from nep.i18n import _, ngettext
 from nep.masters.master import is_running
 from nep.programs.web.access import Access, checked_origin, new_token
 from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
+from nep.recordings.formats.live import LiveChannels
 from nep.system.addresses import ANY, checked_host, master_address, own_addresses
 from nep.system.descriptors import allow_many
 from nep.system.terminal import Terminal, log_to
@@ -66,6 +67,13 @@ TokenOption = Annotated[
         show_default=False,
     ),
 ]
+FoxgloveOption = Annotated[
+    bool,
+    typer.Option(
+        "--foxglove",
+        help=_("Serve live topics to Foxglove and Lichtblick by Foxglove's WebSocket protocol, too."),
+    ),
+]
 
 
 def web(
@@ -74,6 +82,7 @@ def web(
     origin: OriginOption = None,
     token: TokenOption = None,
     allow_moving: AllowMovingOption = None,
+    foxglove: FoxgloveOption = False,
     master: MasterOption = None,
 ) -> None:
     """Serve web pages and programs with roslib, roslibpy or Foxglove. Ctrl+C ends it.
@@ -92,6 +101,7 @@ def web(
         access=Access(origins, secret),
         allow_moving=frozenset(allow_moving or ()),
         master=master,
+        foxglove=LiveChannels() if foxglove else None,
     )
     allow_many()
     with Terminal(sys.stderr) as terminal:

@@ -7,7 +7,7 @@ import errno
 import logging
 import socket
 import threading
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -21,6 +21,7 @@ from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host
 from nep.programs.web.context import WebCounts
+from nep.programs.web.foxglove_page import SUBPROTOCOLS, ChannelFormat, FoxglovePage
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
 from nep.system.addresses import ANY
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
+    from websockets.typing import Subprotocol
 
 __all__ = ["DEFAULT_PORT", "WebServer", "WebSettings"]
 
@@ -65,6 +67,8 @@ class WebSettings:
     allow_moving: Collection[str] = ()
     master: str | None = None
     transport: str = "zeromq"
+    foxglove: ChannelFormat | None = None
+    """Encodes topics for clients of Foxglove's WebSocket protocol, which only read; None: serve none."""
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -90,7 +94,7 @@ class WebServer:
         self.settings = settings
         self.counts = WebCounts()
         self.port = settings.port
-        self._pages: set[Page] = set()
+        self._pages: set[Page | FoxglovePage] = set()
         self._locked = 0
         self._auth = AuthCheck(settings.access.token)
         self._started = threading.Event()
@@ -174,6 +178,7 @@ class WebServer:
                     self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                     self.settings.port,
                     process_request=self._refusal,
+                    select_subprotocol=self._subprotocol,
                     compression=None,
                     open_timeout=_OPEN_TIMEOUT_S,
                     close_timeout=_CLOSE_TIMEOUT_S,
@@ -249,6 +254,14 @@ class WebServer:
         self._turn_away(connection, said)
         return connection.respond(status, said + "\n")
 
+    def _subprotocol(
+        self, _connection: ServerConnection, offered: Sequence[Subprotocol]
+    ) -> Subprotocol | None:
+        """Choose Foxglove's protocol where a client offers it; rosbridge has none."""
+        if self.settings.foxglove is None:
+            return None
+        return next((each for each in offered if each in SUBPROTOCOLS), None)
+
     def _turn_away(self, connection: ServerConnection, said: str) -> None:
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
@@ -256,12 +269,16 @@ class WebServer:
             _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
 
     async def _page(self, connection: ServerConnection) -> None:
-        page = None
+        page: Page | FoxglovePage | None = None
         try:
             if not getattr(connection, "is_unlocked", True) and not await self._is_authenticated(connection):
                 return
             name = node_name(_origin_of(connection), _address_of(connection))
-            page = Page(connection, name, self._new_node, self._guard, self.counts)
+            channels = self.settings.foxglove
+            if channels is not None and connection.subprotocol in SUBPROTOCOLS:
+                page = FoxglovePage(connection, name, self._new_node, channels, self.counts)
+            else:
+                page = Page(connection, name, self._new_node, self._guard, self.counts)
             self._pages.add(page)
             self.counts.opened += 1
             await page.run()
