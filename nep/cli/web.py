@@ -19,7 +19,7 @@ from nep.i18n import _, ngettext
 from nep.masters.master import is_running
 from nep.programs.web.access import Access, checked_origin, new_token
 from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
-from nep.recordings.formats.live import LiveChannels
+from nep.recordings.formats.channels import LiveChannels
 from nep.system.addresses import ANY, checked_host, master_address, own_addresses
 from nep.system.descriptors import allow_many
 from nep.system.terminal import Terminal, log_to

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Protocol
 import orjson
 
 from nep.errors import NepError
-from nep.i18n import _
+from nep.i18n import _, ngettext
 from nep.messages.message import Message
 from nep.messages.nesting import json_is_too_deep
 from nep.nodes.loop_wait import give_way
@@ -54,7 +54,7 @@ _MESSAGE_DATA = struct.Struct("<BIQ")
 """Opcode 1, subscription id, log time in nanoseconds."""
 
 
-class ChannelDefinition(Protocol):
+class ChannelSchema(Protocol):
     """A channel and its schema, as `nep.recordings.formats.channels` has them."""
 
     @property
@@ -70,12 +70,12 @@ class ChannelDefinition(Protocol):
 
 
 class ChannelFormat(Protocol):
-    """Encodes messages for channels: `nep.recordings.formats.live`, which may not be imported from here."""
+    """Encodes messages for channels: `nep.recordings.formats.channels.LiveChannels`."""
 
-    def expected(self, topic: str, msg_type: str) -> ChannelDefinition:
+    def expected(self, topic: str, msg_type: str) -> ChannelSchema:
         """Return the most likely channel of a topic that has had no message yet."""
 
-    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
+    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
         """Return the channel of a message, and its bytes in that channel."""
 
 
@@ -83,7 +83,7 @@ class ChannelFormat(Protocol):
 class _Channel:
     id: int
     msg_type: str
-    definition: ChannelDefinition
+    definition: ChannelSchema
 
 
 @dataclass
@@ -116,6 +116,7 @@ class FoxglovePage:
         self._channels: dict[str, _Channel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._last_id = 0
+        self._is_gone = asyncio.Event()
         self._closing: asyncio.Task[None] | None = None
 
     async def run(self) -> None:
@@ -135,6 +136,7 @@ class FoxglovePage:
         except ws_exceptions.ConnectionClosed:
             return
         finally:
+            self._is_gone.set()
             for task in (*tasks, *(each.reader for each in self._subscriptions.values())):
                 task.cancel()
             self._thread.submit(self._node.close, _NODE_CLOSE_S)
@@ -152,7 +154,7 @@ class FoxglovePage:
     async def _watch_topics(self) -> None:
         """Advertise topics as they come to the graph and go."""
         loop = asyncio.get_running_loop()
-        while True:
+        while not self._is_gone.is_set():
             with suppress(NepError):  # the master is away: nothing is known to have changed
                 view = await loop.run_in_executor(self._thread, self._node.graph, _GRAPH_TIMEOUT_S)
                 found = {
@@ -161,7 +163,8 @@ class FoxglovePage:
                     if info.publishers and info.msg_type != "*"
                 }
                 await self._update(found)
-            await asyncio.sleep(_REFRESH_S)
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._is_gone.wait(), _REFRESH_S)
 
     async def _update(self, found: Mapping[str, str]) -> None:
         for topic, channel in list(self._channels.items()):
@@ -172,7 +175,7 @@ class FoxglovePage:
             if topic not in self._channels:
                 self._advertise(topic, msg_type, self._format.expected(topic, msg_type))
 
-    def _advertise(self, topic: str, msg_type: str, definition: ChannelDefinition) -> None:
+    def _advertise(self, topic: str, msg_type: str, definition: ChannelSchema) -> None:
         self._last_id += 1
         self._channels[topic] = _Channel(self._last_id, msg_type, definition)
         data = definition.schema_data
@@ -258,9 +261,19 @@ class FoxglovePage:
             _logger.exception("the page '%s' is closed because of an error", self.name)
             await self._connection.close(1011, "internal error")
 
+    def _tell_dropped(self, feed: Feed) -> None:
+        count, feed.dropped_count = feed.dropped_count, 0
+        self._counts.dropped += count
+        said = ngettext(
+            "this page is too slow: {count} message of '{topic}' was dropped",
+            "this page is too slow: {count} messages of '{topic}' were dropped",
+            count,
+        )
+        self._tell(op="status", level=1, message=said.format(count=count, topic=feed.topic))
+
     async def _frame_of(self, queued: Queued) -> Frame | None:
-        self._counts.dropped += queued.feed.dropped_count
-        queued.feed.dropped_count = 0
+        if queued.feed.dropped_count:
+            self._tell_dropped(queued.feed)
         message = queued.message
         known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
         if known is None:
@@ -279,5 +292,5 @@ def _items(value: object) -> list[object]:
     return value if isinstance(value, list) else []
 
 
-def _shape(definition: ChannelDefinition) -> tuple[str, str]:
+def _shape(definition: ChannelSchema) -> tuple[str, str]:
     return definition.message_encoding, definition.schema_name

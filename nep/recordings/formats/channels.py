@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import orjson
 
 from nep.errors import DecodeError
+from nep.messages.codecs import codec_for
 from nep.messages.image_codec import picture_info, raw_layout
 from nep.messages.message import NOTHING, Message, MessageKind, arrived, kind_of
 from nep.messages.packing import pack, unpack
@@ -37,6 +38,7 @@ __all__ = [
     "ChannelDecoder",
     "ChannelDefinition",
     "Encoding",
+    "LiveChannels",
     "Role",
     "definition_of",
     "encoding_of",
@@ -226,6 +228,26 @@ def own_channel(role: Role) -> ChannelDefinition:
     return ChannelDefinition(
         topic, "json", f"nep/{role}", "jsonschema", b'{"type":"object"}', (("nep.role", role),)
     )
+
+
+class LiveChannels:
+    """Channels of live topics, without a file, for clients that read them (`nep web --foxglove`)."""
+
+    _FORMS: ClassVar[Mapping[str, str]] = {
+        "json": "json", "msgpack": "msgpack", "string": "text", "image": "picture",
+    }  # fmt: skip
+
+    def expected(self, topic: str, msg_type: str) -> ChannelDefinition:
+        """Return the most likely channel of a topic that has had no message yet."""
+        codec = codec_for(msg_type).name
+        message = arrived(kind_of(topic, codec, msg_type), b"", None, 0, 0)
+        form = self._FORMS.get(codec, "wrapped")
+        return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
+
+    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
+        """Return the channel of a message that arrived at `log_ns`, and its bytes in that channel."""
+        encoding = encoding_of(message, log_ns)
+        return definition_of(message, encoding), b"".join((encoding.before, message.raw))
 
 
 # ---- and back

@@ -16,7 +16,7 @@ from websockets.sync.client import ClientConnection, connect
 import nep
 from nep.masters.master import Master
 from nep.programs.web import WebServer, WebSettings
-from nep.recordings.formats.live import LiveChannels
+from nep.recordings.formats.channels import LiveChannels
 from tests.nep.programs import eventually
 
 
