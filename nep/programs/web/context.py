@@ -14,10 +14,40 @@ from nep.programs.web.operations import LEVELS, Level, OperationId
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
 
-__all__ = ["PageContext", "WebCounts"]
+__all__ = ["ConnectedPage", "PageContext", "Refusal", "WebCounts"]
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectedPage:
+    """A page or program that is connected: its node, address, origin, and topics.
+
+    `id` is given to `WebServer.disconnect`; `origin` is "" for programs; `since_s` is in seconds of `time.time`.
+    """
+
+    id: int
+    name: str
+    address: str
+    origin: str
+    since_s: float
+    subscribed: tuple[str, ...] = ()
+    published: tuple[str, ...] = ()
+    dropped_count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A connection or an operation that was refused.
+
+    `who` is the page's origin, or its address; `origin` is not "" where allowing that origin would help.
+    """
+
+    time_s: float
+    who: str
+    reason: str
+    origin: str = ""
 
 
 @dataclass

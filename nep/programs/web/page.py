@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
+import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -15,7 +17,7 @@ from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web import operations as op
 from nep.programs.web.access import AuthCheck
-from nep.programs.web.context import PageContext, WebCounts
+from nep.programs.web.context import ConnectedPage, PageContext, WebCounts
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
 from nep.programs.web.outgoing import Frame, publish_frames
@@ -37,6 +39,7 @@ __all__ = ["Page", "authenticate"]
 _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008
 _NODE_CLOSE_S = 2.0
+_ids = itertools.count(1)
 
 
 class Page:
@@ -51,6 +54,9 @@ class Page:
         counts: WebCounts,
     ) -> None:
         self.name = name
+        self.id = next(_ids)
+        self._since_s = time.time()
+        self._dropped = 0
         self._connection = connection
         self._counts = counts
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
@@ -78,6 +84,25 @@ class Page:
         }
 
     # ---- the connection
+
+    @property
+    def snapshot(self) -> ConnectedPage:
+        """What is known of the page now. Thread-safe."""
+        address, request = self._connection.remote_address, self._connection.request
+        return ConnectedPage(
+            self.id,
+            self.name,
+            str(address[0]) if isinstance(address, tuple) else str(address),
+            ("" if request is None else request.headers.get("Origin")) or "",
+            self._since_s,
+            self._topics.subscribed,
+            self._topics.published,
+            self._dropped,
+        )
+
+    async def close(self) -> None:
+        """Close the connection; `run` then ends."""
+        await self._connection.close(_POLICY_VIOLATION, "disconnected by the user of the server")
 
     async def run(self) -> None:
         """Serve the page until it goes; then close its node."""
@@ -135,6 +160,7 @@ class Page:
 
     def _tell_dropped(self, topic: str, count: int) -> None:
         self._counts.dropped += count
+        self._dropped += count
         said = ngettext(
             "this page is too slow: {count} message of '{topic}' was dropped",
             "this page is too slow: {count} messages of '{topic}' were dropped",

@@ -57,6 +57,16 @@ class PageTopics:
         self._publications: dict[str, _Publication] = {}
         self._subscriptions: dict[str, _Subscription] = {}
 
+    @property
+    def published(self) -> tuple[str, ...]:
+        """Topics that the page publishes. Thread-safe."""
+        return tuple(self._publications)
+
+    @property
+    def subscribed(self) -> tuple[str, ...]:
+        """Topics that the page subscribes to. Thread-safe."""
+        return tuple(self._subscriptions)
+
     # ---- publishing
 
     async def advertise(self, operation: Advertise) -> None:

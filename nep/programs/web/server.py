@@ -7,6 +7,8 @@ import errno
 import logging
 import socket
 import threading
+import time
+from collections import deque
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -20,7 +22,7 @@ from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host
-from nep.programs.web.context import WebCounts
+from nep.programs.web.context import ConnectedPage, Refusal, WebCounts
 from nep.programs.web.foxglove_page import SUBPROTOCOLS, ChannelFormat, FoxglovePage
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
@@ -49,6 +51,7 @@ _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
+_MAX_REFUSALS = 50
 _MAX_LOCKED = 16
 """Connections without a token that may still send an ``auth``."""
 
@@ -96,6 +99,7 @@ class WebServer:
         self.port = settings.port
         self._pages: set[Page | FoxglovePage] = set()
         self._locked = 0
+        self._refusals: deque[Refusal] = deque(maxlen=_MAX_REFUSALS)
         self._auth = AuthCheck(settings.access.token)
         self._started = threading.Event()
         self._problem: Exception | None = None
@@ -112,6 +116,23 @@ class WebServer:
     def page_names(self) -> tuple[str, ...]:
         """Names of the nodes of connected pages."""
         return tuple(sorted(each.name for each in tuple(self._pages)))
+
+    @property
+    def pages(self) -> tuple[ConnectedPage, ...]:
+        """Connected pages and programs, the first that came first. Thread-safe."""
+        return tuple(each.snapshot for each in sorted(self._pages.copy(), key=lambda page: page.id))
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """The newest connections that were refused, the last one last. Thread-safe."""
+        return tuple(self._refusals)
+
+    def disconnect(self, page_id: int) -> None:
+        """Close the connection of a page; it may connect again. Thread-safe, returns at once."""
+        page = next((each for each in tuple(self._pages) if each.id == page_id), None)
+        if page is not None and self._loop is not None:
+            with suppress(RuntimeError):  # it has ended
+                asyncio.run_coroutine_threadsafe(page.close(), self._loop)
 
     def start(self) -> Self:
         """Listen; return once pages can connect."""
@@ -231,7 +252,7 @@ class WebServer:
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a handshake that is refused; None lets it go on."""
-        said = ""
+        said, is_foreign = "", False
         status = HTTPStatus.FORBIDDEN
         origins = request.headers.get_all("Origin")
         access = self.settings.access
@@ -241,6 +262,7 @@ class WebServer:
             status, said = HTTPStatus.SERVICE_UNAVAILABLE, _("there are too many connections")
         else:
             said = access.origin_refusal(origins[0] if origins else None)
+            is_foreign = bool(said)
         if not said and access.token:
             authorizations = request.headers.get_all("Authorization")
             is_given = access.is_given(request.path, authorizations[0] if authorizations else None)
@@ -251,7 +273,7 @@ class WebServer:
             connection.is_unlocked = is_given is True  # type: ignore[attr-defined]
         if not said:
             return None
-        self._turn_away(connection, said)
+        self._turn_away(connection, said, origins[0] if origins and is_foreign else "")
         return connection.respond(status, said + "\n")
 
     def _subprotocol(
@@ -262,7 +284,9 @@ class WebServer:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
 
-    def _turn_away(self, connection: ServerConnection, said: str) -> None:
+    def _turn_away(self, connection: ServerConnection, said: str, origin: str = "") -> None:
+        who = origin or _address_of(connection).rpartition(":")[0]
+        self._refusals.append(Refusal(time.time(), escaped(who[:200]), said, origin[:200]))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             where = _address_of(connection)

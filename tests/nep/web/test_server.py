@@ -293,3 +293,26 @@ def test_server_sends_close_frames_and_releases_its_port(master: Master) -> None
     with WebServer(WebSettings(port=server.port, master=master.address)):
         pass
     server.close()
+
+
+def test_connected_pages_are_listed_with_their_topics_and_can_be_disconnected(
+    server: WebServer, open_page: Open
+) -> None:
+    page = open_page(origin="http://localhost:8000")
+    page.send("advertise", topic="/buttons", type="nep/Json")
+    page.send("subscribe", topic="/odom", type="nep/Json")
+    eventually(
+        lambda: [(each.published, each.subscribed) for each in server.pages] == [(("/buttons",), ("/odom",))]
+    )
+    (listed,) = server.pages
+    assert (listed.address, listed.origin) == ("127.0.0.1", "http://localhost:8000")
+    server.disconnect(listed.id)
+    eventually(lambda: server.pages == ())
+
+
+def test_refused_connection_is_listed_with_the_origin_that_would_let_it_in(
+    server: WebServer, open_page: Open
+) -> None:
+    with pytest.raises(InvalidStatus):
+        open_page(origin="http://192.168.1.77:5173")
+    assert [each.origin for each in server.refusals] == ["http://192.168.1.77:5173"]
