@@ -43,6 +43,7 @@ from app.core.network.source import (
 from app.core.network.topics import Topic, Topics, split_key
 from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
+from app.core.network.web_pages import WebPages, WebServerStarted
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
@@ -157,6 +158,7 @@ class Session:
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, post_event)
+        self.web_pages = WebPages(self.address, self._mailbox.post_event)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self._learning = MasterChange()
 
@@ -354,6 +356,7 @@ class Session:
         with self.guarded(lazy("keep the alarms")):
             self.alarms.check()
             self.acting.check()
+        self.web_pages.check()
         with self.guarded(lazy("look after the recorder")):
             self.recordings.check()
         with self.guarded(lazy("keep which tabs are open")):
@@ -404,6 +407,7 @@ class Session:
             ("end setting parameters", self.parameters.close),
             ("end what was started here", self.launcher.close),
             ("end the reach", self.remote_access.close),
+            ("end the web server", self.web_pages.close),
         ]
         for what, end in ends:
             with log_errors(what):
@@ -507,7 +511,9 @@ class Session:
                     _("{topic} can't be read.").format(topic=event.topic),
                     event.sentence,
                 )
-            case RemoteAccessChanged() | NetworkEvent() | RecorderSaid() | RecorderGone():
+            case (
+                RemoteAccessChanged() | NetworkEvent() | RecorderSaid() | RecorderGone() | WebServerStarted()
+            ):
                 self._on_part(event, now)
             case JobFailed() if event.what:
                 self.console.add("error", "studio", _(event.what).format(error=event.sentence))
@@ -515,12 +521,16 @@ class Session:
                 pass
 
     def _on_part(
-        self, event: RemoteAccessChanged | NetworkEvent | RecorderSaid | RecorderGone, now: float
+        self,
+        event: RemoteAccessChanged | NetworkEvent | RecorderSaid | RecorderGone | WebServerStarted,
+        now: float,
     ) -> None:
         if isinstance(event, NetworkEvent):
             self.live.networks.on_event(event, now)
         elif isinstance(event, RemoteAccessChanged):
             self.remote_access.changed(event)
+        elif isinstance(event, WebServerStarted):
+            self.web_pages.started(event)
         else:
             self.recordings.on_event(event)
 

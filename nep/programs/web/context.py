@@ -24,7 +24,7 @@ _T = TypeVar("_T")
 class ConnectedPage:
     """A page or program that is connected: its node, address, origin, and topics.
 
-    `id` is given to `WebServer.disconnect`; `origin` is "" for programs; `since_s` is in seconds of `time.time`.
+    `id` is given to `WebServer.disconnect`; `origin` is "" for programs; `since_s` is by `time.time`.
     """
 
     id: int

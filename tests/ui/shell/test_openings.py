@@ -39,7 +39,7 @@ PANELS = [
 ]  # fmt: skip
 COMMANDS = [
     "file.earlier", "settings.open", "palette.open", "layout.keep", "help.shortcuts", "help.about",
-    "network.others", "network.look", "help.report",
+    "network.others", "network.look", "network.web", "help.report",
 ]  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from app.errors import SettingsError
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.dialogs.other_networks import OtherNetworksSheet
+from app.ui.shell.dialogs.web_pages import WebPagesSheet
 from app.ui.shell.documents import DocumentController
 from nep.i18n import _
 
@@ -48,6 +49,7 @@ class RobotCommands:
         self._shell, self._session, self._files, self._undo = shell, session, files, undo
         self._network_access: NetworkAccessSheet | None = None
         self._other_networks: OtherNetworksSheet | None = None
+        self._web_pages: WebPagesSheet | None = None
 
     # -- virtual robots ---------------------------------------------------------------------------
 
@@ -170,6 +172,17 @@ class RobotCommands:
                 self._shell.theme, self._shell.surface, self._session.live.networks
             )
         self._other_networks.open()
+
+    def show_web_pages(self) -> None:
+        """Show the web server: its switch, who may connect, and which pages are connected."""
+        if self._web_pages is None:
+            self._web_pages = WebPagesSheet(
+                self._shell.theme, self._shell.surface, self._session.web_pages, self._robot_names
+            )
+        self._web_pages.open()
+
+    def _robot_names(self) -> tuple[str, ...]:
+        return tuple(link.name for link in self._session.fleet.connected)
 
 
 def _model(kind: object) -> str | None:

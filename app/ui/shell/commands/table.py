@@ -325,6 +325,8 @@ COMMANDS: tuple[C, ...] = (
       "Robots", icon="wifi", above=True),
     C("network.look", lazy("Look at other networks"), lambda do: do.robots.choose_networks(), "Robots",
       icon="waypoints"),
+    C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.show_web_pages(), "Robots",
+      icon="wifi"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
       why_not=_no_panels),
     C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
