@@ -86,6 +86,7 @@ class WebPages:
         self._master, self._post_event, self._start = master, post_event, start
         self.addresses = addresses
         self._server: RunningServer | None = None
+        self._last_started: RunningServer | None = None
         self._thread: threading.Thread | None = None
         self._number = 0
         self.port, self.host, self.token = DEFAULT_PORT, "", ""
@@ -172,6 +173,8 @@ class WebPages:
         self.switch_off()
         if self._thread is not None:
             self._thread.join(END_WAIT_S)
+        if self._last_started is not None:  # its event may not have been taken over
+            self._last_started.close()
 
     def _begin(self) -> None:
         self._number += 1
@@ -199,6 +202,7 @@ class WebPages:
                 if number != self._number:  # switched off meanwhile
                     running.close()
                     return
+                self._last_started = running
                 self._post_event(WebServerStarted(number, running))
 
         self._in_thread(work)

@@ -201,7 +201,10 @@ class WebPagesSheet(Overlay):
         names = ", ".join(self._robots())
         said = _("Pages can read topics and publish their own. Moving a robot needs its name here.")
         if names:
-            said += " " + _("Connected: {robots}.").format(robots=names)
+            said = _(
+                "Pages can read topics and publish their own. Moving a robot needs its name here. "
+                "Connected: {robots}."
+            ).format(robots=names)
         self.robots_state.setText(said)
 
     def _show_pages(self) -> None:
