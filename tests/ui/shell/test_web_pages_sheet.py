@@ -111,6 +111,6 @@ def test_its_words_are_translated_and_fit(
     sheet.origins.setText("wrong")
     sheet.origins.editingFinished.emit()
     qtbot.wait(50)  # Qt lays out later
-    data = ("http://192.168.1.20:8080", "ws://127.0.0.1:0", "wrong")
+    data = ("http://192.168.1.20:8080", "ws://127.0.0.1:0", "wrong", "Turtle")
     assert [text for _where, text in said_by(sheet) if untranslated(text, *data)] == []
     assert clipped(sheet) == []
