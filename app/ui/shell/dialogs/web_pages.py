@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QLineEdit,
+    QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -31,6 +32,7 @@ from nep.errors import NepError
 from nep.i18n import _, ngettext
 
 WIDE, HIGH = 640, 620
+_SIDE, _SCROLL_BAR, _MIN_LIST_HIGH = 19, 10, 120
 REFRESH_MS = 300
 _NO_PORT = 65535
 _ID = Qt.ItemDataRole.UserRole
@@ -85,6 +87,7 @@ class WebPagesSheet(Overlay):
         tree.setProperty("raised", "true")
         tree.setFrameShape(QFrame.Shape.NoFrame)
         tree.setUniformRowHeights(True)
+        tree.setMinimumHeight(_MIN_LIST_HIGH)
         tree.setHeaderLabels([_("Page and topics"), _("Address"), _("Since"), _("Dropped")])
         tree.header().setHighlightSections(False)
         tree.header().setStretchLastSection(False)
@@ -109,10 +112,11 @@ class WebPagesSheet(Overlay):
             form.addLayout(_row(*widgets), 2 * number, 1)
             if said is not None:
                 form.addWidget(said, 2 * number + 1, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(20, 14, 20, 16)
+        inside = QWidget()
+        inside.setProperty("bare", "true")
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(_SIDE, 0, _SIDE, 0)
         column.setSpacing(10)
-        column.addLayout(self.head(label(_("Web pages and tablets"), "heading")))
         column.addWidget(self.switch)
         column.addLayout(_row(self.state, self.other_port))
         column.addLayout(form)
@@ -120,6 +124,20 @@ class WebPagesSheet(Overlay):
         column.addWidget(self.list, 1)
         column.addWidget(self.empty, 1)
         column.addLayout(_row(self.refused, self.allow))
+        self._inside_column = column
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(inside)
+        head = self.head(label(_("Web pages and tablets"), "heading"))
+        head.setContentsMargins(_SIDE, 0, _SIDE, 0)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(1, 14, 1, 16)
+        whole.setSpacing(10)
+        whole.addLayout(head)
+        whole.addWidget(self._area, 1)
 
     def _connect(self) -> None:
         web = self._web
@@ -140,7 +158,8 @@ class WebPagesSheet(Overlay):
 
     def wanted_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        wide = max(round(scaled(WIDE)), self.minimumSizeHint().width())
+        least = self._inside_column.minimumSize().width() + _SCROLL_BAR
+        wide = max(round(scaled(WIDE)), least)
         return QSize(min(room.width(), wide), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
