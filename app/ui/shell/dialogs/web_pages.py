@@ -31,7 +31,7 @@ from app.ui.widgets.menus import EditMenu
 from nep.errors import NepError
 from nep.i18n import _, ngettext
 
-WIDE, HIGH = 640, 620
+WIDE, HIGH = 640, 664
 _SIDE, _SCROLL_BAR, _MIN_LIST_HIGH = 19, 10, 120
 REFRESH_MS = 300
 _NO_PORT = 65535
