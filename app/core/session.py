@@ -151,14 +151,15 @@ class Session:
         self.images = Images(self.watch, self._clock)
         self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_room)
         post_event = self._mailbox.post_event
-        sinks = [self._checks.look, self._mailbox.post, self._offer, self._warn]
+        warn: Sink = lambda topic, messages: self.alarms.take(topic, messages)
+        sinks = [self._checks.look, self._mailbox.post, self._offer, warn]
         self.source: Source = make_source(self.address, sinks, post_event)
         self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
         self.parameters = ParameterSetter(self.source.submit)
         self.graph: GraphView | None = None
         self.master = MasterState("searching", self.address)
         self.remote_access = RemoteAccess(self.address, self.settings, self.alerts, post_event)
-        self.web_pages = WebPages(self.address, self._mailbox.post_event)
+        self.web_pages = WebPages(self.address, post_event)
         self.doctor = doctor_of(self.address, self.settings.path.parent)
         self._learning = MasterChange()
 
@@ -175,14 +176,9 @@ class Session:
     def _add_programs(self, journal_folder: Path | None) -> None:
         self.documents = Documents(lambda: Document(lambda: Journal(journal_folder)))
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
+        alerts, console, post_event, clock = self.alerts, self.console, self._mailbox.post_event, self._clock
         self.runs = Runs(
-            self.documents,
-            self.fleet,
-            self,
-            alerts=self.alerts,
-            console=self.console,
-            post_event=self._mailbox.post_event,
-            clock=self._clock,
+            self.documents, self.fleet, self, alerts=alerts, console=console, post_event=post_event, clock=clock
         )
 
     def _connect_parts(self) -> None:
@@ -194,9 +190,6 @@ class Session:
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live
         (self.images if live is None else live.images).offer(messages, topic)
-
-    def _warn(self, topic: str, messages: Sequence[Message]) -> None:
-        self.alarms.take(topic, messages)
 
     # -- public ----------------------------------------------------------------------------------------------
 
@@ -298,8 +291,7 @@ class Session:
 
     def tick(self) -> None:
         """Apply the events and messages that threads posted since the last tick."""
-        began = self._clock()
-        now, now_ns = began, self._clock_ns()
+        now, now_ns = self._clock(), self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
             with self.guarded(lazy("take over {event}"), event=type(event).__name__):
@@ -334,7 +326,7 @@ class Session:
         if now >= self._next_check:
             self._next_check = now + CHECK_S
             self._check(now)
-        self.tick_ms = (self._clock() - began) * 1000
+        self.tick_ms = (self._clock() - now) * 1000
 
     def _tick_replay(self, replay: replay_module.Replay, now: float) -> None:
         was_open = replay.opened is not None
@@ -351,18 +343,17 @@ class Session:
         return self._faults.guarded(what, **holes)
 
     def _check(self, now: float) -> None:
-        # Called once per CHECK_S.
         self._faults.check()
         with self.guarded(lazy("keep the alarms")):
             self.alarms.check()
             self.acting.check()
-        self.web_pages.check()
         with self.guarded(lazy("look after the recorder")):
             self.recordings.check()
         with self.guarded(lazy("keep which tabs are open")):
             self.tabs.follow()
         with self.guarded(lazy("check what was started here")):
             self.launcher.check()
+            self.web_pages.check()
             self.last_robots.keep(self.launcher)
             if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()

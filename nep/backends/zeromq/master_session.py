@@ -58,7 +58,7 @@ from nep.protocol.requests import (
     SubscriberRecord,
 )
 from nep.protocol.topic_pattern import matches
-from nep.system.addresses import MasterName, is_loopback, look_up
+from nep.system.addresses import MasterName, is_endpoint, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
 __all__ = ["MasterSession", "Pace", "SessionPublisher", "SessionSubscriber"]
@@ -383,10 +383,7 @@ class MasterSession:
             self._served = answer.hosts
             self._pace.due_at = now
         if isinstance(answer, PublisherCame):
-            for subscriber in self._subscribers_of(answer.publisher.publisher.topic):
-                if answer.is_new and isinstance(subscriber, NativeSubscriber):
-                    subscriber.expect_all_of(answer.publisher.publisher.id)
-                subscriber.connect(self._in_reach((answer.publisher,)))
+            self._publisher_came(answer)
         elif isinstance(answer, PublisherGone):
             self._publisher_gone(answer)
         elif isinstance(answer, Renewed):
@@ -395,6 +392,14 @@ class MasterSession:
             self._epoch = answer.epoch
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
+
+    def _publisher_came(self, came: PublisherCame) -> None:
+        remotes = self._in_reach((came.publisher,))
+        can_be_heard = any(is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints)
+        for subscriber in self._subscribers_of(came.publisher.publisher.topic):
+            if came.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
+                subscriber.expect_all_of(came.publisher.publisher.id)
+            subscriber.connect(remotes)
 
     def _publisher_gone(self, gone: PublisherGone) -> None:
         if gone.is_closed:

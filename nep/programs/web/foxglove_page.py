@@ -28,7 +28,7 @@ from nep.messages.nesting import json_is_too_deep
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
-from nep.programs.web.context import WebCounts
+from nep.programs.web.context import CLOSED_BY_USER, PAGE_IDS, ConnectedPage, WebCounts, connected_page
 from nep.programs.web.limits import MAX_TOPICS
 from nep.programs.web.operations import Subscribe
 from nep.programs.web.outgoing import Frame
@@ -108,6 +108,9 @@ class FoxglovePage:
     ) -> None:
         self._format = channels
         self.name = name
+        self.id = next(PAGE_IDS)
+        self._since_s = time.time()
+        self._dropped = 0
         self._connection = connection
         self._counts = counts
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
@@ -118,6 +121,23 @@ class FoxglovePage:
         self._last_id = 0
         self._is_gone = asyncio.Event()
         self._closing: asyncio.Task[None] | None = None
+
+    @property
+    def snapshot(self) -> ConnectedPage:
+        """Topics and connection of the page. Thread-safe."""
+        subscribed = sorted({each.channel.definition.topic for each in self._subscriptions.copy().values()})
+        return connected_page(
+            self._connection,
+            id=self.id,
+            name=self.name,
+            since_s=self._since_s,
+            subscribed=tuple(subscribed),
+            dropped_count=self._dropped,
+        )
+
+    async def close(self) -> None:
+        """Close the connection; `run` then ends."""
+        await self._connection.close(_POLICY_VIOLATION, CLOSED_BY_USER)
 
     async def run(self) -> None:
         """Serve the client until it goes; then close its node."""
@@ -264,6 +284,7 @@ class FoxglovePage:
     def _tell_dropped(self, feed: Feed) -> None:
         count, feed.dropped_count = feed.dropped_count, 0
         self._counts.dropped += count
+        self._dropped += count
         said = ngettext(
             "this page is too slow: {count} message of '{topic}' was dropped",
             "this page is too slow: {count} messages of '{topic}' were dropped",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 import time
 from collections.abc import Awaitable, Callable
@@ -17,7 +16,14 @@ from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web import operations as op
 from nep.programs.web.access import AuthCheck
-from nep.programs.web.context import ConnectedPage, PageContext, WebCounts
+from nep.programs.web.context import (
+    CLOSED_BY_USER,
+    PAGE_IDS,
+    ConnectedPage,
+    PageContext,
+    WebCounts,
+    connected_page,
+)
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
 from nep.programs.web.outgoing import Frame, publish_frames
@@ -39,7 +45,6 @@ __all__ = ["Page", "authenticate"]
 _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008
 _NODE_CLOSE_S = 2.0
-_ids = itertools.count(1)
 
 
 class Page:
@@ -54,7 +59,7 @@ class Page:
         counts: WebCounts,
     ) -> None:
         self.name = name
-        self.id = next(_ids)
+        self.id = next(PAGE_IDS)
         self._since_s = time.time()
         self._dropped = 0
         self._connection = connection
@@ -87,22 +92,20 @@ class Page:
 
     @property
     def snapshot(self) -> ConnectedPage:
-        """What is known of the page now. Thread-safe."""
-        address, request = self._connection.remote_address, self._connection.request
-        return ConnectedPage(
-            self.id,
-            self.name,
-            str(address[0]) if isinstance(address, tuple) else str(address),
-            ("" if request is None else request.headers.get("Origin")) or "",
-            self._since_s,
-            self._topics.subscribed,
-            self._topics.published,
-            self._dropped,
+        """Topics and connection of the page. Thread-safe."""
+        return connected_page(
+            self._connection,
+            id=self.id,
+            name=self.name,
+            since_s=self._since_s,
+            subscribed=self._topics.subscribed,
+            published=self._topics.published,
+            dropped_count=self._dropped,
         )
 
     async def close(self) -> None:
         """Close the connection; `run` then ends."""
-        await self._connection.close(_POLICY_VIOLATION, "disconnected by the user of the server")
+        await self._connection.close(_POLICY_VIOLATION, CLOSED_BY_USER)
 
     async def run(self) -> None:
         """Serve the page until it goes; then close its node."""
