@@ -33,6 +33,9 @@ class Departed(Generic[P]):
         self._ends: dict[int, float] = {}
         """Until when each is kept, of those that `tick` has seen."""
 
+    def __contains__(self, publisher: int) -> bool:
+        return publisher in self._names
+
     def of(self, topic: str) -> dict[int, P]:
         """Those of a topic, or of wildcards, by id. Only to be looked at."""
         return self._heard_as.get(topic, {})

@@ -371,7 +371,10 @@ class Graph:
     def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
         check_record(request.publisher)
         member = self._meet(request.node, now, sender)
-        self._place(member, request.publisher, out, is_new=request.publisher.id not in member.publishers)
+        id = request.publisher.id
+        # One that was unlisted for its silence may say its new endpoints before it joins again.
+        is_new = id not in member.publishers and id not in self._registry.departed
+        self._place(member, request.publisher, out, is_new=is_new)
         expected: list[Expected] = []
         hung: list[Expected] = []
         for other, subscriber in self._registry.hearing(request.publisher.topic):

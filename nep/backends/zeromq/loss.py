@@ -49,6 +49,8 @@ class HeardPublisher:
     early_until: float | None = None
     """Until then at most, what comes before the echo is left out: see `HeardPublishers.is_early`."""
     last: int | None = None
+    is_heard: bool = False
+    """Whether a message, an echo or a bye has been received."""
     has_echoed: bool = False
     is_lapsed: bool = False
     ends_at: float | None = None
@@ -133,6 +135,7 @@ class HeardPublishers:
         there counts anew: nobody knows then how many are missing.
         """
         source = self.get(publisher)
+        source.is_heard = True
         last = source.last
         if last is not None and seq - last > GAP_MAX:
             if not source.leapt_to or source.leapt_to != seq - 1:
@@ -161,7 +164,7 @@ class HeardPublishers:
         does not greet that is over in a moment.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.has_echoed or source.last or source.remote is None:
+        if source is None or source.has_echoed or source.is_heard or source.remote is None:
             return False
         if source.remote.publisher.history <= 1:
             return False
@@ -176,6 +179,7 @@ class HeardPublishers:
         False when that cannot be, because more than `GAP_MAX` would be missing: nothing is counted then.
         """
         source = self.get(publisher)
+        source.is_heard = True
         if source.last is not None and seq - source.last > GAP_MAX:
             return False
         if source.last is not None and seq > source.last:

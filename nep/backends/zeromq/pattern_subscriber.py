@@ -144,7 +144,9 @@ class PatternSubscriber(WakingSubscriber):
                     _logger.warning("'%s' does not hear '%s': %s", self.spec.topic, topic, error)
                 return None
             self._lack = ""
-        member.begin(())
+            is_registered = self._closed_early is None
+        if is_registered:
+            member.begin(())
         self._io.add(member)
         return member
 
@@ -165,11 +167,14 @@ class PatternSubscriber(WakingSubscriber):
         """Connect to the publishers that there were when it was registered, and have not closed since."""
         with self._making:
             closed, self._closed_early = self._closed_early or set(), None
+            members = list(self._members.values())
+        for member in members:
+            member.begin(())
         for remote in remotes:
             if remote.publisher.id not in closed:
-                member = self.of_topic(remote.publisher.topic)
-                if member is not None:
-                    member.connect((remote,))
+                found = self.of_topic(remote.publisher.topic)
+                if found is not None:
+                    found.connect((remote,))
 
     def closed_early(self, publisher: int) -> None:
         """A publisher has closed; it may be one of those that `begin` is about to be told of."""

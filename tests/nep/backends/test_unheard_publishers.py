@@ -6,9 +6,15 @@ import socket
 from collections.abc import Iterator
 
 import pytest
+import zmq
 
 import nep
+from nep.backends.base import SubscriberSpec
+from nep.backends.connection import Hybrid
+from nep.backends.zeromq.io_thread import IoThread
 from nep.backends.zeromq.loss import GAP_MAX, HeardPublishers
+from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
+from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master
 from nep.protocol.requests import (
     Added,
@@ -81,6 +87,39 @@ def test_messages_older_than_the_history_are_lost() -> None:
         assert sources.arrived(5, seq, is_alone=True)
     assert sources.reached(5, 10)
     assert (sources.received, sources.lost) == (3, 7)
+
+
+def test_a_history_that_arrives_after_its_messages_were_promised_is_received() -> None:
+    sources = new_publisher(history=3)
+    sources.promised(5, 9)
+    sources.promised(5, 9)
+    assert sources.lost == 9
+    assert sources.is_early(5), "its history brings this message again"
+    for seq in (8, 9, 10):
+        assert sources.arrived(5, seq, is_alone=True)
+    assert (sources.received, sources.lost) == (3, 7)
+
+
+def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher() -> None:
+    sockets: list[SubSocket] = []
+
+    def new_readable(spec: SubscriberSpec) -> SubSocket:
+        sockets.append(SubSocket(context.socket(zmq.SUB), spec))
+        return sockets[-1]
+
+    spec = SubscriberSpec(1, "*", "json", Hybrid("127.0.0.1:0"), None, is_pattern=True)
+    io = IoThread("nep-io-test")
+    io.start()
+    with zmq.Context() as context:
+        pattern = PatternSubscriber(new_readable, io, spec, lambda _id: None)
+        member = pattern.of_topic("t")
+        assert member is not None
+        member.expect_all_of(5)
+        pattern.begin(())
+        member.expect_all_of(6)
+        assert [each for each, _source in sockets[0].sources.items()] == [6]
+        pattern.close()
+    io.close()
 
 
 def test_a_publisher_that_was_there_before_counts_from_its_first_received_message() -> None:

@@ -85,6 +85,15 @@ def test_only_the_first_notice_of_a_publisher_says_that_it_is_new(graph: Graph) 
     assert [each.is_new for each in notices if isinstance(each, PublisherCame)] == [True, False, False]
 
 
+def test_an_unlisted_publisher_that_comes_back_with_another_endpoint_is_not_new(graph: Graph) -> None:
+    ask(graph, AddSubscriber(node("s"), subscriber(1)))
+    ask(graph, AddPublisher(node("p"), publisher(2)))
+    graph.drop(["p"])
+    push, _reply = ask(graph, AddPublisher(node("p"), publisher(2, at="tcp://127.0.0.1:6")))
+    assert isinstance(push.answer, PublisherCame)
+    assert not push.answer.is_new
+
+
 def test_a_node_with_two_subscribers_is_told_once(graph: Graph) -> None:
     for id in (1, 2):
         ask(graph, AddSubscriber(node("s"), subscriber(id)))
