@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +25,7 @@ from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
 from app.core.network.doctor import doctor_of
 from app.core.network.graph_changes import arrivals
+from app.core.network.live_network import LiveNetwork
 from app.core.network.mailbox import Batch, Drained, Mailbox
 from app.core.network.master import MasterChange, MasterState
 from app.core.network.nodes import Nodes
@@ -81,18 +81,6 @@ CHECK_S = 1.0
 NO_WATCH = lazy("can't watch over the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """Topics of the Console."""
-
-
-@dataclass(slots=True)
-class LiveNetwork:
-    """State of the live network, also while a recording is shown; robots, Stop, alarms and health use it."""
-
-    topics: Topics
-    nodes: Nodes
-    networks: Networks
-    images: Images
-    series: SeriesFeed
-    graph: GraphView | None
 
 
 class Session:
@@ -151,8 +139,7 @@ class Session:
         self.images = Images(self.watch, self._clock)
         self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_room)
         post_event = self._mailbox.post_event
-        warn: Sink = lambda topic, messages: self.alarms.take(topic, messages)
-        sinks = [self._checks.look, self._mailbox.post, self._offer, warn]
+        sinks = [self._checks.look, self._mailbox.post, self._offer, self._warn]
         self.source: Source = make_source(self.address, sinks, post_event)
         self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
         self.parameters = ParameterSetter(self.source.submit)
@@ -178,7 +165,13 @@ class Session:
         self.tabs = KeptTabs(self.settings, self.documents, partial(self.console.add, "warn", "studio"))
         alerts, console, post_event, clock = self.alerts, self.console, self._mailbox.post_event, self._clock
         self.runs = Runs(
-            self.documents, self.fleet, self, alerts=alerts, console=console, post_event=post_event, clock=clock
+            self.documents,
+            self.fleet,
+            self,
+            alerts=alerts,
+            console=console,
+            post_event=post_event,
+            clock=clock,
         )
 
     def _connect_parts(self) -> None:
@@ -190,6 +183,9 @@ class Session:
     def _offer(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live
         (self.images if live is None else live.images).offer(messages, topic)
+
+    def _warn(self, topic: str, messages: Sequence[Message]) -> None:
+        self.alarms.take(topic, messages)
 
     # -- public ----------------------------------------------------------------------------------------------
 
