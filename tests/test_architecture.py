@@ -50,6 +50,7 @@ EARNED = {
     "app.ui.panels.plot.advice": "a line of its own: the plot panel is as long as may be",
     "app.core.run.edits_since_run": "pure, and tested alone",
     "app.core.run.run_warnings": "pure, and tested alone",
+    "app.core.networks.live_network": "elsewhere it would close a cycle of imports",
     "app.core.run.stop_job": "runs in threads without shared state, and is tested alone",
     "app.core.run.stop_news": "a line of its own: the run is as long as may be",
     "app.core.run.trial": "pure, and tested alone",

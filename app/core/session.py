@@ -25,7 +25,6 @@ from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
 from app.core.network.doctor import doctor_of
 from app.core.network.graph_changes import arrivals
-from app.core.network.live_network import LiveNetwork
 from app.core.network.mailbox import Batch, Drained, Mailbox
 from app.core.network.master import MasterChange, MasterState
 from app.core.network.nodes import Nodes
@@ -44,6 +43,7 @@ from app.core.network.topics import Topic, Topics, split_key
 from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.network.web_pages import WebPages, WebServerStarted
+from app.core.networks.live_network import LiveNetwork
 from app.core.networks.networks import NetworkEvent, Networks, by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
