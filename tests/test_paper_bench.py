@@ -260,7 +260,7 @@ def test_both_scenarios_are_measured_and_rows_that_are_missing_say_so(
     scenarios = {each["name"]: each for each in kept["scenarios"]}
     for name in {"local", "remote"} - set(kept["not_run"]):
         cells = {each["row"]: each for each in scenarios[name]["cells"]}
-        assert set(cells) == {"plain pyzmq", "plain again", "nep"}
+        assert set(cells) == {"plain pyzmq", "plain again", "nep"}, scenarios[name]["not_run"]
         assert all(0 < each["median_ms"] <= each["p95_ms"] for each in cells.values())
         assert "no server" in scenarios[name]["not_run"]["rosbridge"]
         assert "--python2" in scenarios[name]["not_run"]["nep 0.5.3.5"]

@@ -199,7 +199,7 @@ def test_invalid_operations_are_answered_and_the_page_stays_connected(
 def test_hostile_operations_close_neither_page_nor_server(
     server: WebServer, node: nep.Node, page: Peer
 ) -> None:
-    node.new_server("/s", lambda given: given, threads=1)
+    node.new_server("/echo", lambda given: given, threads=1)  # the examples advertise /s themselves
     node.new_pub("/t", "string")
     drain = threading.Thread(target=lambda: deque(page.connection, maxlen=0))
     drain.start()
@@ -213,7 +213,7 @@ def test_hostile_operations_close_neither_page_nor_server(
             page.connection.send(bytes(text))
     eventually(lambda: server.counts.rejected > 100)
     with connect(server.url) as other:
-        assert Peer(other).call("/s", x=1)["values"] == {"x": 1}
+        assert Peer(other).call("/echo", x=1)["values"] == {"x": 1}
     page.connection.close()
     drain.join()
 
