@@ -1,4 +1,4 @@
-"""The server of `nep web` in Studio: off at each start, switched by a person, and what it does."""
+"""Web server of Studio (`nep web`): off at each start, switched on and configured in its sheet."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
     from nep.programs.web import access, context, server
-else:  # most people never start it
+else:  # loaded with the first start of a server
     access = lazy_module("nep.programs.web.access")
     context = lazy_module("nep.programs.web.context")
     server = lazy_module("nep.programs.web.server")
@@ -25,7 +25,7 @@ WebState = Literal["off", "starting", "on"]
 
 
 class RunningServer(Protocol):
-    """What is needed of `nep.programs.web.WebServer`."""
+    """Interface of `nep.programs.web.WebServer` that Studio uses."""
 
     port: int
 
@@ -41,19 +41,19 @@ class RunningServer(Protocol):
         """Disconnect a page."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Whether it has ended within this time."""
+        """Wait for the server's end; return False after ``timeout_s`` seconds."""
 
     def close(self) -> None:
-        """Disconnect everybody and end."""
+        """Disconnect all pages and end the server."""
 
 
 StartServer = Callable[["server.WebSettings"], RunningServer]
-"""Starts a server; raises `NepError`. It may wait, and is called in a thread of its own."""
+"""Starts a server; may block, is called in a background thread, and raises `NepError`."""
 
 
 @dataclass(frozen=True, slots=True)
 class WebServerStarted:
-    """A start has ended: with a server, or with the sentence that says why there is none."""
+    """Result of a start: a server, or the sentence that explains why it failed."""
 
     number: int
     server: RunningServer | None
@@ -62,16 +62,16 @@ class WebServerStarted:
 
 
 def start_server(settings: server.WebSettings) -> RunningServer:
-    """A server in a thread of its own. See `StartServer`."""
+    """Start a `WebServer`; the default of `StartServer`."""
     return server.WebServer(settings).start()
 
 
 class WebPages:
-    """The switch, its choices and the running server. One thread uses it (the window's).
+    """The web server and its settings. Not thread-safe: use it from the window's thread.
 
-    `host`: the address of this computer at which others can connect, "" for none. `origins`: origins of pages
-    besides those of this computer. `robots`: names of the robots that pages may move. They count from the
-    next start on; `apply` restarts a running server with them. Nothing is kept for the next start of Studio.
+    `host` is the address of this computer that other computers connect to, or "". `origins` are allowed
+    origins of pages from other computers. `robots` are the names of robots that pages may move. New settings
+    apply at the next start; `apply` restarts a running server. Settings are not saved.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class WebPages:
         start: StartServer = start_server,
         addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
-        """`master` is the address of the master; nothing is started yet."""
+        """Create it switched off. ``master`` is the address of the master."""
         self._master, self._post_event, self._start = master, post_event, start
         self.addresses = addresses
         self._server: RunningServer | None = None
@@ -97,13 +97,13 @@ class WebPages:
 
     @property
     def url(self) -> str:
-        """Where pages connect, without the token."""
+        """Address of the server, without the token."""
         port = self.port if self._server is None else self._server.port
         return f"ws://{self.host or '127.0.0.1'}:{port}"
 
     @property
     def full_url(self) -> str:
-        """Where pages connect, with the token if one is needed."""
+        """Address of the server, with the token if it requires one."""
         return f"{self.url}/?token={self.token}" if self.token else self.url
 
     @property
@@ -117,44 +117,44 @@ class WebPages:
         return () if self._server is None else self._server.refusals
 
     def switch_on(self) -> None:
-        """Start the server with the choices; returns at once."""
+        """Start the server in the background."""
         if self.state == "off":
             self._begin()
 
     def switch_off(self) -> None:
-        """Disconnect everybody and end the server; returns at once."""
+        """Disconnect all pages and end the server in the background."""
         self._number += 1
         self.state, self.sentence, self.is_port_taken = "off", "", False
         ended, self._server = self._server, None
         self._in_thread(lambda: ended.close() if ended is not None else None)
 
     def apply(self) -> None:
-        """Restart a running server so that the choices count; everybody is disconnected."""
+        """Restart a running server with the current settings; disconnects all pages."""
         if self.state != "off":
             self.switch_off()
             self._begin()
 
     def new_token(self) -> None:
-        """Replace the token; everybody is disconnected."""
+        """Replace the token; disconnects all pages."""
         self.token = ""
         self.apply()
 
     def set_origins(self, text: str) -> None:
-        """Let pages of these origins, separated by spaces or commas, connect. Raises `NepError`."""
+        """Set `origins` from text separated by spaces or commas. Raises `NepError` for a malformed one."""
         given = text.replace(",", " ").split()
         self.origins = tuple(dict.fromkeys(map(access.checked_origin, given)))
 
     def set_robots(self, names: Sequence[str]) -> None:
-        """Let pages move the robots of these names, and no others."""
+        """Set `robots`, without duplicates."""
         self.robots = tuple(dict.fromkeys(names))
 
     def disconnect(self, page_id: int) -> None:
-        """Disconnect a page; it may connect again."""
+        """Disconnect a page; it can reconnect."""
         if self._server is not None:
             self._server.disconnect(page_id)
 
     def started(self, event: WebServerStarted) -> None:
-        """Take over the end of a start; a server that isn't wanted any more is closed."""
+        """Apply the result of a start; closes the server if the switch was changed meanwhile."""
         if event.number != self._number:
             if event.server is not None:
                 self._in_thread(event.server.close)
@@ -163,17 +163,17 @@ class WebPages:
         self.state = "off" if event.server is None else "on"
 
     def check(self) -> None:
-        """Notice a server that ended by itself (called once a second)."""
+        """Detect a server that ended by itself. Called once a second."""
         if self._server is not None and self._server.wait(0):
             self._server, self.state = None, "off"
             self.sentence = _("The web server ended because of an error. The log has the details.")
 
     def close(self) -> None:
-        """End the server and its threads."""
+        """End the server and its threads; waits at most `END_WAIT_S` seconds."""
         self.switch_off()
         if self._thread is not None:
             self._thread.join(END_WAIT_S)
-        if self._last_started is not None:  # its event may not have been taken over
+        if self._last_started is not None:  # its event may not have been applied
             self._last_started.close()
 
     def _begin(self) -> None:
@@ -208,7 +208,7 @@ class WebPages:
         self._in_thread(work)
 
     def _in_thread(self, work: Callable[[], None]) -> None:
-        """Call what waits in a thread, after what was called so before."""
+        # Runs one job after the other: a server ends before the next one binds its port.
         before = self._thread
 
         def run() -> None:

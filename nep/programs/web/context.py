@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.operations import LEVELS, Level, OperationId
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
-
-if TYPE_CHECKING:
-    from websockets.asyncio.server import ServerConnection
-
-PAGE_IDS = itertools.count(1)
-CLOSED_BY_USER = "disconnected by the user of the server"
 
 __all__ = ["ConnectedPage", "PageContext", "Refusal", "WebCounts"]
 
@@ -42,16 +35,6 @@ class ConnectedPage:
     subscribed: tuple[str, ...] = ()
     published: tuple[str, ...] = ()
     dropped_count: int = 0
-
-
-def connected_page(connection: ServerConnection, **about: Any) -> ConnectedPage:  # noqa: ANN401 - fields of several types
-    """Return a page at this connection; ``about`` are the other fields of `ConnectedPage`. Thread-safe."""
-    address, request = connection.remote_address, connection.request
-    return ConnectedPage(
-        address=str(address[0]) if isinstance(address, tuple) else str(address),
-        origin=("" if request is None else request.headers.get("Origin")) or "",
-        **about,
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,7 @@ import json
 import logging
 import struct
 import time
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -22,17 +21,18 @@ from typing import TYPE_CHECKING, Protocol
 import orjson
 
 from nep.errors import NepError
-from nep.i18n import _, ngettext
+from nep.i18n import _
 from nep.messages.message import Message
 from nep.messages.nesting import json_is_too_deep
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
-from nep.programs.web.context import CLOSED_BY_USER, PAGE_IDS, ConnectedPage, WebCounts, connected_page
+from nep.programs.web.connection import PageConnection
+from nep.programs.web.context import WebCounts
 from nep.programs.web.limits import MAX_TOPICS
 from nep.programs.web.operations import Subscribe
 from nep.programs.web.outgoing import Frame
-from nep.programs.web.send_queue import Feed, Queued, SendQueue
+from nep.programs.web.send_queue import Feed, Queued
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 _logger = logging.getLogger("nep.programs.web")
 _REFRESH_S = 1.0
 _GRAPH_TIMEOUT_S = 2.0
-_NODE_CLOSE_S = 2.0
-_POLICY_VIOLATION = 1008
+_ADVERTISED_TOGETHER = 100
+"""Channels in one message: each has its schema."""
 _MAX_ID = 2**32 - 1
 _MESSAGE_DATA = struct.Struct("<BIQ")
 """Opcode 1, subscription id, log time in nanoseconds."""
@@ -95,7 +95,7 @@ class _Subscription:
     reader: asyncio.Task[None]
 
 
-class FoxglovePage:
+class FoxglovePage(PageConnection):
     """See the module. `name` is that of its node. Lives in the server's event loop."""
 
     def __init__(
@@ -106,38 +106,21 @@ class FoxglovePage:
         channels: ChannelFormat,
         counts: WebCounts,
     ) -> None:
+        super().__init__(connection, name, new_node, counts)
         self._format = channels
-        self.name = name
-        self.id = next(PAGE_IDS)
-        self._since_s = time.time()
-        self._dropped = 0
-        self._connection = connection
-        self._counts = counts
-        self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
-        self._node = new_node(name)
-        self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
         self._channels: dict[str, _Channel] = {}
         self._subscriptions: dict[int, _Subscription] = {}
         self._last_id = 0
         self._is_gone = asyncio.Event()
-        self._closing: asyncio.Task[None] | None = None
 
     @property
-    def snapshot(self) -> ConnectedPage:
-        """Topics and connection of the page. Thread-safe."""
-        subscribed = sorted({each.channel.definition.topic for each in self._subscriptions.copy().values()})
-        return connected_page(
-            self._connection,
-            id=self.id,
-            name=self.name,
-            since_s=self._since_s,
-            subscribed=tuple(subscribed),
-            dropped_count=self._dropped,
-        )
+    def _subscribed(self) -> tuple[str, ...]:
+        topics = {each.channel.definition.topic for each in self._subscriptions.copy().values()}
+        return tuple(sorted(topics))
 
-    async def close(self) -> None:
-        """Close the connection; `run` then ends."""
-        await self._connection.close(_POLICY_VIOLATION, CLOSED_BY_USER)
+    @property
+    def _published(self) -> tuple[str, ...]:
+        return ()
 
     async def run(self) -> None:
         """Serve the client until it goes; then close its node."""
@@ -146,12 +129,7 @@ class FoxglovePage:
         try:
             while True:
                 data = await self._connection.recv(decode=False)
-                self._counts.operations += 1
-                try:
-                    await self._handle(bytes(data))
-                except NepError as error:
-                    self._counts.rejected += 1
-                    self._tell(op="status", level=2, message=str(error))
+                await self._handle(bytes(data))
                 await give_way()  # other pages have their turn
         except ws_exceptions.ConnectionClosed:
             return
@@ -159,15 +137,17 @@ class FoxglovePage:
             self._is_gone.set()
             for task in (*tasks, *(each.reader for each in self._subscriptions.values())):
                 task.cancel()
-            self._thread.submit(self._node.close, _NODE_CLOSE_S)
-            await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
+            await self._close_node()
 
     def _tell(self, **fields: object) -> None:
         self._queue.put([Frame(orjson.dumps(fields), is_text=True)])
 
-    def _end_slow(self) -> None:
-        said = "the client does not read its answers"
-        self._closing = asyncio.create_task(self._connection.close(_POLICY_VIOLATION, said))
+    def _warn(self, sentence: str) -> None:
+        self._tell(op="status", level=1, message=sentence)
+
+    def _reject(self, error: NepError) -> None:
+        self._counts.rejected += 1
+        self._tell(op="status", level=2, message=str(error))
 
     # ---- topics
 
@@ -175,7 +155,7 @@ class FoxglovePage:
         """Advertise topics as they come to the graph and go."""
         loop = asyncio.get_running_loop()
         while not self._is_gone.is_set():
-            with suppress(NepError):  # the master is away: nothing is known to have changed
+            try:
                 view = await loop.run_in_executor(self._thread, self._node.graph, _GRAPH_TIMEOUT_S)
                 found = {
                     topic: info.msg_type
@@ -183,6 +163,10 @@ class FoxglovePage:
                     if info.publishers and info.msg_type != "*"
                 }
                 await self._update(found)
+            except NepError as error:  # the master is away: nothing is known to have changed
+                _logger.debug("the page '%s' keeps its channels: %s", self.name, error)
+            except Exception:
+                _logger.exception("the channels of the page '%s' could not be updated", self.name)
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._is_gone.wait(), _REFRESH_S)
 
@@ -191,24 +175,32 @@ class FoxglovePage:
             if found.get(topic) != channel.msg_type:
                 del self._channels[topic]
                 await self._withdraw(channel)
-        for topic, msg_type in found.items():
-            if topic not in self._channels:
-                self._advertise(topic, msg_type, self._format.expected(topic, msg_type))
+        new = [(topic, msg_type) for topic, msg_type in found.items() if topic not in self._channels]
+        for begin in range(0, len(new), _ADVERTISED_TOGETHER):
+            self._advertise(
+                (topic, msg_type, self._format.expected(topic, msg_type))
+                for topic, msg_type in new[begin : begin + _ADVERTISED_TOGETHER]
+            )
+            await give_way()
 
-    def _advertise(self, topic: str, msg_type: str, definition: ChannelSchema) -> None:
-        self._last_id += 1
-        self._channels[topic] = _Channel(self._last_id, msg_type, definition)
-        data = definition.schema_data
-        is_binary = definition.schema_encoding == "protobuf"
-        channel = {
-            "id": self._last_id,
-            "topic": topic,
-            "encoding": definition.message_encoding,
-            "schemaName": definition.schema_name,
-            "schemaEncoding": definition.schema_encoding,
-            "schema": base64.b64encode(data).decode() if is_binary else data.decode(),
-        }
-        self._tell(op="advertise", channels=[channel])
+    def _advertise(self, topics: Iterable[tuple[str, str, ChannelSchema]]) -> None:
+        channels = []
+        for topic, msg_type, definition in topics:
+            self._last_id += 1
+            self._channels[topic] = _Channel(self._last_id, msg_type, definition)
+            data = definition.schema_data
+            is_binary = definition.schema_encoding == "protobuf"
+            channels.append(
+                {
+                    "id": self._last_id,
+                    "topic": topic,
+                    "encoding": definition.message_encoding,
+                    "schemaName": definition.schema_name,
+                    "schemaEncoding": definition.schema_encoding,
+                    "schema": base64.b64encode(data).decode() if is_binary else data.decode(),
+                }
+            )
+        self._tell(op="advertise", channels=channels)
 
     async def _withdraw(self, channel: _Channel) -> None:
         self._tell(op="unadvertise", channelIds=[channel.id])
@@ -218,6 +210,17 @@ class FoxglovePage:
     # ---- what the client asks
 
     async def _handle(self, data: bytes) -> None:
+        """Process one message of the client. Never raises because of its contents."""
+        self._counts.operations += 1
+        try:
+            await self._carry_out(data)
+        except NepError as error:
+            self._reject(error)
+        except Exception:
+            _logger.exception("an operation of the page '%s' failed", self.name)
+            self._reject(NepError(_("an operation failed because of an error in the server")))
+
+    async def _carry_out(self, data: bytes) -> None:
         fields = None
         if not json_is_too_deep(data):
             with suppress(json.JSONDecodeError):  # orjson's error is one, too
@@ -267,46 +270,19 @@ class FoxglovePage:
 
     # ---- sending
 
-    async def _write(self) -> None:
-        try:
-            while True:
-                next_up = await self._queue.take()
-                frame = next_up if isinstance(next_up, Frame) else await self._frame_of(next_up)
-                if frame is not None:
-                    await self._connection.send(frame.data, text=frame.is_text)
-                    self._counts.sent += 1
-        except ws_exceptions.ConnectionClosed:
-            return
-        except Exception:
-            _logger.exception("the page '%s' is closed because of an error", self.name)
-            await self._connection.close(1011, "internal error")
-
-    def _tell_dropped(self, feed: Feed) -> None:
-        count, feed.dropped_count = feed.dropped_count, 0
-        self._counts.dropped += count
-        self._dropped += count
-        said = ngettext(
-            "this page is too slow: {count} message of '{topic}' was dropped",
-            "this page is too slow: {count} messages of '{topic}' were dropped",
-            count,
-        )
-        self._tell(op="status", level=1, message=said.format(count=count, topic=feed.topic))
-
-    async def _frame_of(self, queued: Queued) -> Frame | None:
-        if queued.feed.dropped_count:
-            self._tell_dropped(queued.feed)
+    async def _frames_of(self, queued: Queued) -> list[Frame]:
         message = queued.message
         known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
         if known is None:
-            return None
+            return []
         log_ns = time.time_ns()
         definition, data = self._format.encoded(message, log_ns)
         if _shape(definition) != _shape(known.channel.definition):  # raw pixels, for example
             await self._withdraw(known.channel)
-            self._advertise(message.topic, known.channel.msg_type, definition)
-            return None
+            self._advertise([(message.topic, known.channel.msg_type, definition)])
+            return []
         header = _MESSAGE_DATA.pack(1, known.id, log_ns)
-        return Frame(header + data, is_text=False)
+        return [Frame(header + data, is_text=False)]
 
 
 def _items(value: object) -> list[object]:

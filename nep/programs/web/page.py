@@ -4,33 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Awaitable, Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from nep.errors import NepError
-from nep.i18n import _, ngettext
+from nep.i18n import _
 from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web import operations as op
 from nep.programs.web.access import AuthCheck
-from nep.programs.web.context import (
-    CLOSED_BY_USER,
-    PAGE_IDS,
-    ConnectedPage,
-    PageContext,
-    WebCounts,
-    connected_page,
-)
+from nep.programs.web.connection import PageConnection
+from nep.programs.web.context import PageContext, WebCounts
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
 from nep.programs.web.outgoing import Frame, publish_frames
 from nep.programs.web.page_services import PageServices
 from nep.programs.web.page_topics import PageTopics
 from nep.programs.web.png import text_in_png
-from nep.programs.web.send_queue import Queued, SendQueue
+from nep.programs.web.send_queue import Queued
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged
 
@@ -43,11 +35,9 @@ else:
 __all__ = ["Page", "authenticate"]
 
 _logger = logging.getLogger("nep.programs.web")
-_POLICY_VIOLATION = 1008
-_NODE_CLOSE_S = 2.0
 
 
-class Page:
+class Page(PageConnection):
     """See the module. `name` is that of its node. Lives in the server's event loop."""
 
     def __init__(
@@ -58,21 +48,12 @@ class Page:
         guard: MotionGuard,
         counts: WebCounts,
     ) -> None:
-        self.name = name
-        self.id = next(PAGE_IDS)
-        self._since_s = time.time()
-        self._dropped = 0
-        self._connection = connection
-        self._counts = counts
-        self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
-        self._node = new_node(name)
-        self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
+        super().__init__(connection, name, new_node, counts)
         self._context = PageContext(self._node, self._queue, self._thread, guard, counts)
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
         self._rejected = 0
-        self._closing: asyncio.Task[None] | None = None
         self._carriers: dict[type, Callable[[Any], Awaitable[None] | None]] = {
             op.Publish: self._topics.publish,
             op.Advertise: self._topics.advertise,
@@ -91,21 +72,12 @@ class Page:
     # ---- the connection
 
     @property
-    def snapshot(self) -> ConnectedPage:
-        """Topics and connection of the page. Thread-safe."""
-        return connected_page(
-            self._connection,
-            id=self.id,
-            name=self.name,
-            since_s=self._since_s,
-            subscribed=self._topics.subscribed,
-            published=self._topics.published,
-            dropped_count=self._dropped,
-        )
+    def _subscribed(self) -> tuple[str, ...]:
+        return self._topics.subscribed
 
-    async def close(self) -> None:
-        """Close the connection; `run` then ends."""
-        await self._connection.close(_POLICY_VIOLATION, CLOSED_BY_USER)
+    @property
+    def _published(self) -> tuple[str, ...]:
+        return self._topics.published
 
     async def run(self) -> None:
         """Serve the page until it goes; then close its node."""
@@ -122,54 +94,21 @@ class Page:
             writer.cancel()
             self._topics.cancel()
             self._services.cancel()
-            self._thread.submit(self._node.close, _NODE_CLOSE_S)
-            await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
-
-    def _end_slow(self) -> None:
-        _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
-        self._closing = asyncio.create_task(
-            self._connection.close(_POLICY_VIOLATION, "the page does not read its answers")
-        )
+            await self._close_node()
 
     def _announce(self) -> None:
         """In the page's thread: a node is in the graph once it has something, if only its log."""
         self._node.log.info("the page connected from %s", self._connection.remote_address)
 
-    async def _write(self) -> None:
-        """Send what waits, as fast as the page takes it."""
+    async def _frames_of(self, queued: Queued) -> list[Frame]:
+        topic = queued.feed.topic
         try:
-            while True:
-                next_up = await self._queue.take()
-                frames = [next_up] if isinstance(next_up, Frame) else self._frames_of(next_up)
-                for frame in frames:
-                    await self._connection.send(frame.data, text=frame.is_text)
-                self._counts.sent += 1
-        except ws_exceptions.ConnectionClosed:
-            return
-        except Exception:
-            _logger.exception("the page '%s' is closed because of an error", self.name)
-            await self._connection.close(1011, "internal error")
-
-    def _frames_of(self, queued: Queued) -> list[Frame]:
-        feed = queued.feed
-        if feed.dropped_count:
-            self._tell_dropped(feed.topic, feed.dropped_count)
-            feed.dropped_count = 0
-        try:
-            return publish_frames(feed.topic, queued.message, feed.form)
+            return publish_frames(topic, queued.message, queued.feed.form)
         except NepError as error:
-            self._reject(op.OperationError(f"'{feed.topic}': {error}", level="warning"))
-            return []
+            raise op.OperationError(f"'{topic}': {error}", level="warning") from error
 
-    def _tell_dropped(self, topic: str, count: int) -> None:
-        self._counts.dropped += count
-        self._dropped += count
-        said = ngettext(
-            "this page is too slow: {count} message of '{topic}' was dropped",
-            "this page is too slow: {count} messages of '{topic}' were dropped",
-            count,
-        )
-        self._context.tell("warning", said.format(count=count, topic=topic))
+    def _warn(self, sentence: str) -> None:
+        self._context.tell("warning", sentence)
 
     # ---- operations
 
@@ -178,10 +117,8 @@ class Page:
         self._counts.operations += 1
         try:
             await self._carry_out(op.parse(data))
-        except op.OperationError as error:
-            self._reject(error)
         except NepError as error:
-            self._reject(op.OperationError(str(error)))
+            self._reject(error)
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
             self._reject(op.OperationError(_("an operation failed because of an error in the server")))
@@ -225,13 +162,14 @@ class Page:
         write = {"error": self._node.log.error, "warning": self._node.log.warning}
         write.get(operation.level, self._node.log.info)("%s", op.shown(operation.msg))
 
-    def _reject(self, error: op.OperationError) -> None:
-        """Answer, count and log (rarely) what could not be carried out."""
+    def _reject(self, error: NepError) -> None:
+        # Logged rarely: a page can send any number of wrong operations.
         self._counts.rejected += 1
         self._rejected += 1
         if is_logged(self._rejected):
             _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
-        self._context.tell(error.level, str(error), error.id)
+        shown = error if isinstance(error, op.OperationError) else op.OperationError(str(error))
+        self._context.tell(shown.level, str(shown), shown.id)
 
 
 async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:

@@ -245,8 +245,14 @@ class LiveChannels:
         return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
 
     def encoded(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
-        """Return the channel of a message that arrived at `log_ns`, and its bytes in that channel."""
+        """Return the channel of a message that arrived at `log_ns`, and its bytes in that channel.
+
+        Raises:
+            DecodeError: The message is malformed. A recorder keeps it; a client could not show it.
+        """
         encoding = encoding_of(message, log_ns)
+        if not encoding.is_decodable:
+            message.kind.decode(message.raw, message.extension)  # raises
         return definition_of(message, encoding), b"".join((encoding.before, message.raw))
 
 

@@ -113,3 +113,34 @@ def test_page_of_another_origin_is_refused(foxglove: WebServer) -> None:
     with pytest.raises(InvalidStatus) as refused, connect(foxglove.url, **options):
         pass
     assert refused.value.response.status_code == HTTPStatus.FORBIDDEN
+
+
+def test_channels_of_many_topics_arrive_together(foxglove: WebServer, node: nep.Node) -> None:
+    topics = {f"/many/{number}" for number in range(150)}
+    for topic in topics:
+        node.new_pub(topic, "json")
+    with opened(foxglove) as client:
+        missing, count = set(topics), 0
+        while missing:
+            count += 1
+            missing -= {each["topic"] for each in received(client, "advertise")["channels"]}
+        assert count < len(topics) / 10
+
+
+def test_message_that_cannot_be_decoded_does_not_close_the_connection(
+    foxglove: WebServer, node: nep.Node
+) -> None:
+    publishers = {each: node.new_pub(f"/{each}", each) for each in ("image", "json", "string", "msgpack")}
+    with opened(foxglove) as client:
+        channels: dict[str, dict[str, object]] = {}
+        while not {f"/{each}" for each in publishers} <= channels.keys():
+            channels |= {each["topic"]: each for each in received(client, "advertise")["channels"]}
+        for id_, each in enumerate(publishers, 1):
+            subscribe(client, id_, channels[f"/{each}"])
+        eventually(lambda: all(each.subscribers for each in publishers.values()))
+        for each in publishers.values():
+            for data in (b"", b"\xff\xd8\xff", b"\xff\xfe{", b"\xc1", b"[" * 5000):
+                each.publish_bytes(data)
+        publishers["json"].publish({"x": 1})
+        while message_of(client) != (2, b'{"x":1}'):
+            pass

@@ -1,4 +1,4 @@
-"""Web pages and tablets: starts and stops the web server, says who may connect, and lists connected pages."""
+"""Sheet for web pages and tablets: switches the web server, sets its access, and lists connected pages."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _ID = Qt.ItemDataRole.UserRole
 
 
 class WebPagesSheet(Overlay):
-    """What is changed counts at once: a running server is restarted with it."""
+    """Changes apply at once: a running server is restarted."""
 
     top = 56
 
     def __init__(
         self, theme: Theme, window: QWidget, web: WebPages, robots: Callable[[], tuple[str, ...]]
     ) -> None:
-        """`robots` returns the names of the robots that are connected."""
+        """``robots`` returns the names of connected robots."""
         super().__init__(theme, window, _("Web pages and tablets"))
         self._web, self._robots = web, robots
         self.switch = Switch(theme, _("Let web pages connect"))
@@ -68,11 +68,12 @@ class WebPagesSheet(Overlay):
         self.heading = label(_("Connected pages"), "bodyLarge")
         self.list = QTreeWidget()
         self.empty = label("", "body", role="textSecondary", wrap=True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.disconnect_page = Button(theme, _("Disconnect"), "x", size="small")
         self.refused = label("", "body", role="error", wrap=True)
         self.allow = Button(theme, _("Allow it"), size="small")
         self._shown: object = None
-        self._wrong_origins = ""
+        self._wrong_origins = self._refused_origin = ""
         self._set_up_list()
         self._lay_out()
         self._connect()
@@ -163,7 +164,7 @@ class WebPagesSheet(Overlay):
         return QSize(min(room.width(), wide), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
-        """Show what is so now, as long as it is open."""
+        """Open the sheet, which follows the server until it is closed."""
         self.open_to.clear()
         self.open_to.addItem(_("This computer"), "")
         for own in self._web.addresses():
@@ -188,7 +189,7 @@ class WebPagesSheet(Overlay):
         self._show_pages()
         self._show_refusal()
 
-    # ---- what it shows
+    # ---- contents
 
     def _show_state(self) -> None:
         web = self._web
@@ -265,7 +266,8 @@ class WebPagesSheet(Overlay):
         refusals = self._web.refusals
         paint.show_when(self.refused, bool(refusals))
         newest = refusals[-1] if refusals else None
-        paint.show_when(self.allow, newest is not None and bool(newest.origin))
+        self._refused_origin = "" if newest is None else newest.origin
+        paint.show_when(self.allow, bool(self._refused_origin))
         if newest is None:
             return
         clock = clock_words(dt.datetime.fromtimestamp(newest.time_s).astimezone())
@@ -276,7 +278,7 @@ class WebPagesSheet(Overlay):
             said = _("{address} was refused at {time}: {reason}.")
             self.refused.setText(said.format(address=newest.who, time=clock, reason=newest.reason))
 
-    # ---- what a person does
+    # ---- actions of the user
 
     def _do(self, change: Callable[[], None]) -> None:
         change()
@@ -310,9 +312,8 @@ class WebPagesSheet(Overlay):
             self._do(self._web.apply)
 
     def _allow(self) -> None:
-        refusals = self._web.refusals
-        if refusals and refusals[-1].origin:
-            self.origins.setText(" ".join((*self._web.origins, refusals[-1].origin)))
+        if self._refused_origin:  # as shown: another page may have been refused since
+            self.origins.setText(" ".join((*self._web.origins, self._refused_origin)))
             self._take_origins()
 
     def _chosen_id(self) -> int | None:
