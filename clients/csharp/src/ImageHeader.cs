@@ -71,7 +71,7 @@ namespace Nep
             return shape;
         }
 
-        /// <summary>Read the orientation from TIFF data; it stays as it is when they tell none.</summary>
+        /// <summary>Read the orientation from TIFF data; unchanged if there is none.</summary>
         private static void ReadOrientation(byte[] file, int at, long size, ref int orientation)
         {
             long end = Math.Min(file.Length, at + Math.Min(size, MaxExifBytes));

@@ -477,7 +477,7 @@ namespace Nep
             return made;
         }
 
-        /// <summary>Forget what is to be closed; false when the node or somebody else closes it already.</summary>
+        /// <summary>Remove an object that is about to be closed; false if it was removed before.</summary>
         private bool TryRemove<T>(Dictionary<T, MasterSession> owned, T closing, out MasterSession session)
         {
             lock (_lock)

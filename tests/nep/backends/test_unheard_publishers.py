@@ -146,7 +146,7 @@ def closed_port() -> Iterator[str]:
 
 
 class UnreachablePublisher:
-    """A publisher whose messages reach nobody."""
+    """A publisher that no subscriber can connect to."""
 
     def __init__(self, master: Attacker, endpoint: str) -> None:
         self._master = master

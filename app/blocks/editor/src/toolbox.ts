@@ -311,7 +311,7 @@ export class Toolbox extends Blockly.Toolbox {
     return this.getToolboxItems().find((item) => item instanceof SearchItem);
   }
 
-  /** Returns a function that focuses what is focused now, or what has replaced it in new contents. */
+  /** Returns a function that restores the focus after the contents were replaced. */
   private rememberFocus(): () => void {
     const manager = Blockly.getFocusManager();
     const node = manager.getFocusedNode();
