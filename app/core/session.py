@@ -349,10 +349,10 @@ class Session:
             self.tabs.follow()
         with self.guarded(lazy("check what was started here")):
             self.launcher.check()
-            self.web_pages.check()
             self.last_robots.keep(self.launcher)
             if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()
+            self.web_pages.check()
         with self.guarded(lazy("count what was missed")):
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
