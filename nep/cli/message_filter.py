@@ -16,6 +16,7 @@ from typing import Any
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.fields import MISSING, Path, pick
+from nep.system.syntax import parse_expression
 from nep.text import quotable
 
 __all__ = ["MessageFilter"]
@@ -43,7 +44,7 @@ class MessageFilter:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of Python's own about odd comparisons
-                tree = ast.parse(text.strip(), mode="eval")
+                tree = parse_expression(text.strip())
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             said = _("'{text}' is not a filter; write it like '{example}'")
             raise NepError(said.format(text=quotable(text), example=_EXAMPLE)) from error

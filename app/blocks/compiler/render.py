@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 from app.blocks.model.template import literal
+from nep.system.syntax import parse_module
 
 Marks = Mapping[ast.AST, str]
 """Which node is the beginning of which block."""
@@ -20,7 +21,7 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
         parts += (_gap(before, statement), ast.unparse(statement).strip("\n"), "\n")
     text = "".join(parts)
     lines: dict[int, str] = {}
-    for ours, theirs in _together(body, ast.parse(text).body):
+    for ours, theirs in _together(body, parse_module(text).body):
         if ours in marks:
             first = getattr(theirs, "decorator_list", None) or [theirs]
             for line in range(first[0].lineno, theirs.lineno + 1):

@@ -16,6 +16,8 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
+from nep.system.syntax import parse_expression, parse_module
+
 _HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
 _PREFIX = "_hole_"
 Node = TypeVar("Node", bound=ast.AST)
@@ -32,7 +34,7 @@ def literal(value: object) -> ast.expr:
         if not math.isfinite(value):
             raise ValueError(f"{value} is not a number that a program can hold")
         # -1 as one constant would be written "-1 ** 2", which is another number: parse what Python writes.
-        return ast.parse(repr(value), mode="eval").body
+        return parse_expression(repr(value)).body
     if isinstance(value, (list, tuple)):
         return ast.List([literal(item) for item in value], ast.Load())
     if isinstance(value, Mapping):
@@ -75,7 +77,7 @@ def holes(text: str) -> frozenset[str]:
 
 @lru_cache(maxsize=1024)
 def _parsed(text: str) -> ast.Module:
-    return ast.parse(_HOLE.sub(_PREFIX + r"\1", text))
+    return parse_module(_HOLE.sub(_PREFIX + r"\1", text))
 
 
 def _copied(node: Node) -> Node:

@@ -24,6 +24,7 @@ from app.core.series.samples import Floats
 from app.errors import CurveError
 from nep.errors import nearest
 from nep.i18n import _
+from nep.system.syntax import parse_expression
 
 LONGEST, MOST_NODES = 400, 120
 LONGEST_WINDOW_S = 600.0
@@ -138,7 +139,7 @@ class _Reader:
     def read(self) -> Source:
         python = self._without_fields()
         try:
-            tree = ast.parse(python, mode="eval")
+            tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
             raise CurveError(_("'{text}' can't be read").format(text=self._text[:80])) from None
         if sum(1 for _node in ast.walk(tree)) > MOST_NODES:

@@ -30,6 +30,7 @@ from app.robots.driver.schema import (
 from app.robots.driver.schema_values import check_sendable, plain, told, told_fields
 from app.robots.driver.tasks import BEAT_S
 from nep.i18n import _
+from nep.system.syntax import parse_module
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Described = TypeVar("Described")
@@ -405,7 +406,7 @@ def lines_of(body: type) -> dict[str, list[SourceLine]]:
     try:
         lines, first = inspect.getsourcelines(body)
         file = Path(inspect.getsourcefile(body) or "").name
-        tree = ast.parse(textwrap.dedent("".join(lines)))
+        tree = parse_module(textwrap.dedent("".join(lines)))
     except (OSError, TypeError, SyntaxError, ValueError):
         return {}
     found: dict[str, list[SourceLine]] = {}
