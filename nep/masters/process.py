@@ -109,9 +109,9 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
     try:
         socket.setsockopt(zmq.LINGER, 0)
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
-        socket.connect(endpoint_of(name.known))
-        body = encode_request(request, 1)
-        socket.send(body)
+        endpoint, body = endpoint_of(name.known), encode_request(request, 1)
+        socket.connect(endpoint)
+        _send(socket, endpoint, body)
         deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _AGAIN_S
         while (left := deadline - time.monotonic()) > 0:
             if socket.poll(int(min(left, 0.1) * 1000) + 1):
@@ -120,11 +120,18 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
                     return reply
             elif time.monotonic() >= again_at:  # it may have gone to a master that ended just then
                 again_at += _AGAIN_S
-                socket.send(body)
+                _send(socket, endpoint, body)
         raise MasterUnreachable(address, timeout_s)
     finally:
         socket.close()
         context.term()
+
+
+def _send(socket: zmq.Socket[bytes], endpoint: str, body: bytes) -> None:
+    try:
+        socket.send(body, zmq.DONTWAIT)
+    except zmq.Again:  # libzmq gave up: a socket that is no master's was there
+        socket.connect(endpoint)
 
 
 def _read(body: bytes) -> Reply | None:
