@@ -18,7 +18,7 @@ from nep.backends.zeromq.bindings import in_reach, may_stay
 from nep.backends.zeromq.io_thread import IoThread, Rest
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
-from nep.backends.zeromq.sockets import LOOPBACK, Socket, host_towards
+from nep.backends.zeromq.sockets import CONNECT_MS, LOOPBACK, Socket, host_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
@@ -71,6 +71,8 @@ _logger = logging.getLogger("nep")
 _FOLLOW_S = 1.0
 """How often a node looks whether its publishers have to move."""
 _JOIN_AGAIN_S = 0.5
+_CONNECT_AGAIN_S, _CONNECT_AGAIN_FAR_S = 2.0, 2 * CONNECT_MS / 1000
+"""libzmq gives a connection up after a failed handshake, as with a PUB socket at the master's address."""
 
 
 class SessionPublisher(Protocol):
@@ -163,6 +165,8 @@ class MasterSession:
         self._leaving: PendingCall | None = None
         self._left_at = 0.0
         self._is_near = is_loopback(address)
+        self._connect_again_s = _CONNECT_AGAIN_S if self._is_near else _CONNECT_AGAIN_FAR_S
+        self._connect_again_at = time.monotonic() + self._connect_again_s
         self._served: tuple[str, ...] = ()
         self._own_host = LOOPBACK
         self._name = MasterName(address, self._found, look_up)
@@ -329,8 +333,11 @@ class MasterSession:
         if is_connected and not self._was_connected:
             self._pace.due_at = now
         self._was_connected = is_connected
-        if not is_connected:
+        if is_connected:
+            self._connect_again_at = now + self._connect_again_s
+        else:
             self._name.look(now)
+            self._connect_when_due(now)
         is_due = now >= self._pace.due_at
         if is_due or now >= self._follow_at:
             self._follow_at = now + _FOLLOW_S
@@ -340,6 +347,11 @@ class MasterSession:
             self._renew()
         due = min(self._pace.due_at, self._follow_at)
         return Rest(due=now if self._calls.has_more else due)
+
+    def _connect_when_due(self, now: float) -> None:
+        if now >= self._connect_again_at:
+            self._connect_again_at = now + self._connect_again_s
+            self._calls.connect_again()
 
     def _follow_addresses(self) -> None:
         """Move publishers when this computer or the master has another address, or files are short."""

@@ -98,7 +98,7 @@ class RpcClient:
         self._after_use()
 
     def connect_again(self) -> None:
-        """Over a new connection: the old one begins at an address that this computer has no more."""
+        """Replace the connection: it begins at an address this computer left, or its handshake failed."""
         with self._changed:
             if self._is_closed or not self.endpoint:
                 return

@@ -1,18 +1,44 @@
-"""Another program's socket at the master's address: questions to the master end in time."""
+"""Another program's socket at the master's address: questions end in time, nodes find a later master."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Thread
 
 import pytest
 import zmq
 
+import nep
 from nep.errors import MasterUnreachable
+from nep.masters.master import Master
 from nep.masters.process import view
 
 
-@pytest.mark.parametrize("kind", [zmq.PUB, zmq.REP, zmq.PULL, zmq.PAIR])
-def test_a_socket_of_another_kind_is_no_master(kind: int) -> None:
+@contextmanager
+def foreign_socket(kind: int) -> Iterator[tuple[str, Callable[[], object]]]:
+    """Address of another program's ZeroMQ socket, and a function that waits for a client's disconnection."""
     with zmq.Context() as context, context.socket(kind) as other:
         other.setsockopt(zmq.LINGER, 0)
         port = other.bind_to_random_port("tcp://127.0.0.1")
-        with pytest.raises(MasterUnreachable):
-            view(f"127.0.0.1:{port}", timeout_s=1.5)
+        with other.get_monitor_socket(zmq.EVENT_DISCONNECTED) as monitor:
+            yield f"127.0.0.1:{port}", monitor.recv_multipart
+            other.disable_monitor()
+
+
+@pytest.mark.parametrize("kind", [zmq.PUB, zmq.REP, zmq.PULL, zmq.PAIR])
+def test_a_question_to_a_socket_of_another_kind_ends_in_time(kind: int) -> None:
+    with foreign_socket(kind) as (address, _wait), pytest.raises(MasterUnreachable):
+        view(address, timeout_s=0.6)
+
+
+def test_a_node_finds_the_master_that_starts_where_another_socket_was() -> None:
+    with foreign_socket(zmq.PUB) as (address, wait_for_disconnection):
+        node = nep.node("early", master=address, wait_s=None)
+        registering = Thread(target=node.new_pub, args=("topic",), daemon=True)
+        registering.start()
+        wait_for_disconnection()
+    with Master(address):
+        registering.join(30)
+        assert "topic" in view(address).topics
+        node.close()
