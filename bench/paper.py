@@ -1,7 +1,8 @@
 """The paper's two scenarios: round trips between two programs, by nep and by other libraries.
 
     python3 dev.py bench paper                  both: four minutes, and most of an hour for 200 trips a size
-    python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures
+    python3 dev.py bench paper -- --write       and make docs/figures.md of it, with its pictures; a scenario
+                                                that is not measured stays there
     python3 dev.py bench paper -- --scenarios local --rows nep --kinds string json --seconds 60
     python3 dev.py bench paper -- --from docs/figures.json --write      make them again, without measuring
 
@@ -17,7 +18,7 @@ as there is time for, of R-remote ten with twenty trips of each size.
 Rows that cannot be run say why, and the others are measured. rosbridge is in no package registry: give the
 folder of its sources (--rosbridge-sources, see `rosbridge.py`), or the address of a server that runs
 (--rosbridge ws://127.0.0.1:9090, L-local only; its ROS master is $ROS_MASTER_URI). The original NEP needs a
-Python 2.7 (--python2, see `paper_original.py`).
+Python 2.7 (--python2, see `paper_original.py`), rosnodejs its folder (--rosnodejs).
 """
 
 from __future__ import annotations
@@ -143,7 +144,9 @@ def cell_of(cell: Cell, seconds: Sequence[float]) -> dict[str, Any]:
 def measure_local(arguments: argparse.Namespace) -> dict[str, Any]:
     """L-local, all of it at 127.0.0.1."""
     here = ("127.0.0.1", "127.0.0.1")
-    with around(here, (), arguments.rosbridge, arguments.rosbridge_sources, arguments.python2) as places:
+    with around(
+        here, (), arguments.rosbridge, arguments.rosbridge_sources, arguments.python2, arguments.rosnodejs
+    ) as places:
         return {"name": "local", "link": "loopback", **measure(arguments, "local", places)}
 
 
@@ -177,7 +180,14 @@ def inside(arguments: argparse.Namespace) -> None:
         with ExitStack() as stack:
             link = stack.enter_context(joined(wifi))
             places = stack.enter_context(
-                around(HOSTS, link.elsewhere, "", arguments.rosbridge_sources, arguments.python2)
+                around(
+                    HOSTS,
+                    link.elsewhere,
+                    "",
+                    arguments.rosbridge_sources,
+                    arguments.python2,
+                    arguments.rosnodejs,
+                )
             )
             found = measure(arguments, "remote", places)
         delay = f"{wifi.delay_ms:g} ± {wifi.jitter_ms:g} ms each way"
@@ -220,20 +230,19 @@ def versions() -> dict[str, str]:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Measure what was asked for."""
-    found: dict[str, Any] = {
-        "taken": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
-        "computer": computer(),
-        "versions": versions(),
-        "scenarios": [],
-        "not_run": {},
-    }
+    found: dict[str, Any] = {"scenarios": [], "not_run": {}}
     for scenario, measured in (("local", measure_local), ("remote", measure_remote)):
         if scenario not in arguments.scenarios:
             continue
         try:
             if not sizes_of(scenario, arguments):
                 raise NotRunError("it has none of the sizes that were asked for")
-            found["scenarios"].append(measured(arguments))
+            about = {
+                "taken": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+                "computer": computer(),
+                "versions": versions(),
+            }
+            found["scenarios"].append(measured(arguments) | about)
         except NotRunError as error:
             found["not_run"][scenario] = str(error)
     return found
@@ -257,6 +266,7 @@ def asked() -> argparse.Namespace:
     )
     parser.add_argument("--rosbridge", default="", help="the address of a running server")
     parser.add_argument("--rosbridge-sources", default="", help="a folder with rosbridge_suite, branch ros1")
+    parser.add_argument("--rosnodejs", default="", help="its folder, as `npm install rosnodejs` makes it")
     parser.add_argument("--python2", default="python2.7", help="a Python 2.7 that has nep 0.5.3.5")
     parser.add_argument("--delay-ms", type=float, default=wifi.delay_ms, help="of the link, in one direction")
     parser.add_argument("--jitter-ms", type=float, default=wifi.jitter_ms)

@@ -1,18 +1,21 @@
-"""Rows of `paper.py` in which a Python program pings a program with nep.js or with NEP for C#."""
+"""Rows of `paper.py` in which Python pings a program with nep.js, NEP for C# or rosnodejs."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 HERE = Path(__file__).parent
 CLIENTS = HERE.parent / "clients"
 JAVASCRIPT, CSHARP = "nep with nep.js", "nep with C#"
+ROSNODEJS = "rospy with rosnodejs"
 ROWS = (JAVASCRIPT, CSHARP)
+"""Rows whose ping is nep."""
 PACKAGE = CLIENTS / "javascript" / "dist" / "index.js"
+STD_MSGS = Path("/usr/share/std_msgs/msg")
 JSON_LIBRARY = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")
 
 
@@ -35,6 +38,26 @@ def pong(row: str, folder: Path, types: Mapping[str, str]) -> tuple[str, ...]:
         options = ("-langversion:7", "-optimize+", "-nowarn:0649,0169", f"-r:{JSON_LIBRARY}")
         subprocess.run(["mcs", *options, f"-out:{program}", *map(str, sources)], check=True)
     return ("mono", str(program), json.dumps(types))
+
+
+def why_no_rosnodejs(package: str) -> str:
+    """Return why rosnodejs in the folder ``package`` can't be run on this computer, or an empty string."""
+    if not package:
+        return "no folder of rosnodejs was given"
+    if not (shutil.which("node") and (Path(package) / "package.json").is_file()):
+        return f"needs node, and '{package}' to be the folder that `npm install rosnodejs` makes"
+    return "" if STD_MSGS.is_dir() else "needs ros-std-msgs"
+
+
+def rosnodejs_pong(package: str, folder: Path, kinds: Sequence[str]) -> tuple[str, ...]:
+    """Return the command of pong of `ROSNODEJS`; message definitions are copied to ``folder``."""
+    messages = folder / "ros" / "std_msgs"
+    if not messages.exists():
+        shutil.copytree(STD_MSGS, messages / "msg")
+        about = '<package format="2"><name>std_msgs</name><version>0.0.0</version></package>\n'
+        (messages / "package.xml").write_text(about, encoding="utf-8")
+    found = f"ROS_PACKAGE_PATH={messages.parent}"
+    return ("env", found, "node", str(HERE / "pong_ros.cjs"), package, json.dumps(kinds))
 
 
 def versions() -> dict[str, str]:

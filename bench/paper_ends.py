@@ -28,6 +28,7 @@ from contextlib import ExitStack
 from typing import Any
 from urllib.parse import urlsplit
 
+from paper_clients import ROSNODEJS
 from paper_clients import ROWS as CLIENTS
 
 KINDS = ("string", "json", "bytes")
@@ -362,6 +363,12 @@ class BridgedRospyEnd(RospyEnd):
     topics = "bridged"
 
 
+class RosnodejsPeerEnd(RospyEnd):
+    """rospy whose other end is a program with rosnodejs."""
+
+    topics = "rosnodejs"
+
+
 class RoslibpyEnd(Called):
     """roslibpy, connected to the rosbridge server at `place`; bytes travel as base64."""
 
@@ -409,9 +416,10 @@ ENDS: dict[str, tuple[type[End], type[End]]] = {
     "zenoh": (ZenohEnd, ZenohEnd),
     "rospy": (RospyEnd, RospyEnd),
     "rosbridge": (BridgedRospyEnd, RoslibpyEnd),
+    ROSNODEJS: (RosnodejsPeerEnd, RosnodejsPeerEnd),
     **dict.fromkeys(CLIENTS, (NepEnd, NepEnd)),
 }
-"""Ping and pong of each row; pong of `paper_clients.ROWS` is a program in another language."""
+"""Ping and pong of each row; pong of `ROSNODEJS` and `CLIENTS` is a program in another language."""
 
 
 def run(end: End, answer: Callable[[dict[str, object]], None]) -> None:

@@ -29,7 +29,9 @@ BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 JUDGED, LARGEST = 16 * 1024, 8192 * 1024
 TOKENS = ROOT / "resources" / "theme" / "tokens.json"
 FONTS = ROOT / "resources" / "fonts"
-MARKS = "osD^vPX<>*"
+MARKS = "osD^vPX<>*h"
+MORE_COLOURS = ("run", "warn", "stop", "running")
+"""Of the theme, for rows beyond its series."""
 
 Found = Mapping[str, Any]
 
@@ -179,14 +181,14 @@ def times_text(scenario: Scenario) -> str:
     return "\n".join(["Times the median of nep, least and most of all sizes:", "", *said]) if said else ""
 
 
-def head(found: Found) -> str:
+def head(scenario: Found) -> str:
     """When, where and with what it was taken."""
-    of = found["computer"]
-    with_what = ", ".join(f"{name} {version}" for name, version in found["versions"].items())
+    of = scenario["computer"]
+    with_what = ", ".join(f"{name} {version}" for name, version in scenario["versions"].items())
     load = f", load {of['load_before']} before it" if of["load_before"] is not None else ""
     return (
-        f"Taken on {found['taken']}: {of['processor']}, {of['processors']} processors, {of['system']}{load}. "
-        f"{with_what}."
+        f"Taken on {scenario['taken']}: {of['processor']}, {of['processors']} processors, "
+        f"{of['system']}{load}. {with_what}."
     )
 
 
@@ -196,6 +198,7 @@ def section(scenario: Scenario) -> str:
     measured = f"{min(trips)} to {max(trips)} trips a figure" if trips else "nothing was measured"
     parts = [
         f"### Figure {scenario.number}: {scenario.title}, {scenario.what}",
+        head(scenario.found),
         f"Link: {scenario.found['link']}. Blocks: {scenario.found['blocks']}; {measured}.",
     ]
     told = scenario.found.get("link_told")
@@ -212,11 +215,10 @@ def section(scenario: Scenario) -> str:
 def report(found: Found, pictures: str = "") -> str:
     """All of it in Markdown; `pictures` is the folder of the figures, seen from the document."""
     parts = [
-        head(found),
         (
             "Milliseconds for a round trip: median (p95). A/A is plain pyzmq against itself; "
             f"where it is off by more than {TRUSTED:.0%} the line does not count."
-        ),
+        )
     ]
     parts += [f"{TITLES[name][1]}: not run, {why}" for name, why in found["not_run"].items()]
     for scenario in scenarios(found):
@@ -231,13 +233,23 @@ def report(found: Found, pictures: str = "") -> str:
 
 
 def write(found: Found, docs: Path) -> list[Path]:
-    """Put tables and pictures into the documentation, and the figures beside them; what was written."""
+    """Write tables, pictures and numbers of a run into the documentation; return the written files.
+
+    Scenarios that it doesn't have stay as they were.
+    """
+    figures = docs / "figures.json"
+    if figures.exists():
+        names = {each["name"] for each in found["scenarios"]}
+        kept = json.loads(figures.read_text(encoding="utf-8"))
+        scenarios = [each for each in kept["scenarios"] if each["name"] not in names] + found["scenarios"]
+        measured = {each["name"] for each in scenarios}
+        not_run = {name: why for name, why in found["not_run"].items() if name not in measured}
+        found = {"scenarios": scenarios, "not_run": not_run}
     document = docs / "figures.md"
     text = document.read_text(encoding="utf-8")
     before, _, rest = text.partition(BEGIN)
     after = rest.partition(END)[2]
     document.write_text(f"{before}{BEGIN}\n\n{report(found, 'images')}\n\n{END}{after}", encoding="utf-8")
-    figures = docs / "figures.json"
     figures.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return [document, figures, *draw(found, docs / "images")]
 
@@ -276,9 +288,7 @@ def draw(found: Found, folder: Path) -> list[Path]:
 def plot(figure: Figure, scenario: Scenario, colours: Mapping[str, Any]) -> None:
     """A panel for each kind, and what the lines are below them."""
     others = [row for row in ROWS if row != PLAIN]
-    palette = dict(
-        zip(others, (*colours["series"], colours["run"], colours["warn"], colours["stop"]), strict=True)
-    )
+    palette = dict(zip(others, (*colours["series"], *(colours[name] for name in MORE_COLOURS)), strict=True))
     palette[PLAIN] = colours["textTertiary"]
     panels = figure.subplots(1, len(scenario.kinds), sharey=True, squeeze=False)[0]
     for axes, kind in zip(panels, scenario.kinds, strict=True):

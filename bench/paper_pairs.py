@@ -51,6 +51,8 @@ class Places:
     rosbridge: str = ""
     rosbridge_master: str = ""
     python2: str = ""
+    rosnodejs: str = ""
+    """Its folder."""
     missing: Mapping[str, str] = field(default_factory=dict)
     """Why rows cannot be run, by their names."""
 
@@ -92,6 +94,8 @@ class Places:
         """Return the command of an end, with its arguments except host and place."""
         if role == "pong" and row in paper_clients.ROWS:
             return paper_clients.pong(row, self.folder, TYPES)
+        if role == "pong" and row == paper_clients.ROSNODEJS:
+            return paper_clients.rosnodejs_pong(self.rosnodejs, self.folder, KINDS)
         if row != ORIGINAL:
             return (sys.executable, str(HERE / "paper_ends.py"), role, row)
         path = self.folder / "paper_original_end.py"
@@ -262,12 +266,13 @@ def around(
     rosbridge_at: str,
     rosbridge_sources: str,
     python2: str,
+    rosnodejs: str,
 ) -> Iterator[Places]:
     """The places where rows meet, with a ROS master and a rosbridge server where these can be had."""
     missing = {}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nep-paper-")))
-        places = Places(hosts, elsewhere, folder, python2=python2)
+        places = Places(hosts, elsewhere, folder, python2=python2, rosnodejs=rosnodejs)
         why = why_missing(python2)
         if why:
             missing[ORIGINAL] = why
@@ -276,6 +281,9 @@ def around(
             places = replace(places, ros_master=master)
         except NotRunError as error:
             missing["rospy"] = str(error)
+        why = missing.get("rospy", "") or paper_clients.why_no_rosnodejs(rosnodejs)
+        if why:
+            missing[paper_clients.ROSNODEJS] = why
         for row in paper_clients.ROWS:
             why = "it is measured in L-local only" if elsewhere else paper_clients.why_missing(row)
             if why:

@@ -87,10 +87,10 @@ def found(again: float = 1.0, nep: float = 0.4, sizes: list[int] = SIZES) -> dic
             cells.append(cell)
     local = {"name": "local", "link": "loopback", "blocks": 4, "cells": cells}
     local["not_run"] = {"rospy": "it is missing"}
+    local["taken"] = "2026-11-24"
+    local["computer"] = {"processor": "one", "processors": 2, "system": "Linux", "load_before": 0.1}
+    local["versions"] = {"Python": "3.11.7"}
     return {
-        "taken": "2026-11-24",
-        "computer": {"processor": "one", "processors": 2, "system": "Linux", "load_before": 0.1},
-        "versions": {"Python": "3.11.7"},
         "scenarios": [local],
         "not_run": {"remote": "there is no 'ip'"},
     }
@@ -145,6 +145,10 @@ def test_writing_replaces_what_was_measured_and_nothing_else(figures: ModuleType
     (tmp_path / "images").mkdir()
     document = tmp_path / "figures.md"
     document.write_text(f"before\n{figures.BEGIN}\nold\n{figures.END}\nafter\n", encoding="utf-8")
+    kept = found() | {"not_run": {}}
+    remote = kept["scenarios"][0] | {"name": "remote", "taken": "2026-11-20"}
+    kept["scenarios"] = [remote, kept["scenarios"][0] | {"blocks": 99}]
+    (tmp_path / "figures.json").write_text(json.dumps(kept), encoding="utf-8")
     # In a process of its own: matplotlib keeps its fonts open.
     command = [sys.executable, "-c", WRITE, json.dumps(found()), str(tmp_path)]
     subprocess.run(command, cwd=BENCH, check=True)
@@ -153,7 +157,8 @@ def test_writing_replaces_what_was_measured_and_nothing_else(figures: ModuleType
     assert text.endswith(f"{figures.END}\nafter\n")
     assert "old" not in text
     assert "| 16 kB | 0.016 (0.033) | 0.007 (0.013) | 1.00 |  |" in text
-    assert json.loads((tmp_path / "figures.json").read_text(encoding="utf-8")) == found()
+    written = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
+    assert written == {"scenarios": [remote, *found()["scenarios"]], "not_run": {}}
     assert "<svg" in (tmp_path / "images" / "figure-10.svg").read_text(encoding="utf-8")
     assert (tmp_path / "images" / "figure-10.png").read_bytes().startswith(b"\x89PNG")
 
