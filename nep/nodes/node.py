@@ -78,7 +78,8 @@ class Node(ServiceNode):
     end, "zeromq" (also "ZMQ"), "memory" (nodes of this process only), "zenoh", "nanomsg", "ros" or "ros2"
     (docs/backends.md). `master`: the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`:
     how long `new_pub` and `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for
-    ever. `generation`: what it is in the graph, another word for gateways to other systems. `strict`: its
+    ever. `generation`: what it is in the graph, another word for gateways to other systems. `language`: the language of its program in the
+    graph, for nodes that stand for others, such as the web pages of `nep web`. `strict`: its
     publishers raise `EncodeError` for whatever cannot be sent, see `Publisher.publish`. Raises
     `UnknownBackendError`, `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is
     forked it is closed, with all that was made on it; a new node works there.
@@ -92,6 +93,7 @@ class Node(ServiceNode):
         master: str | None = None,
         wait_s: float | None = 2.0,
         generation: str = "native",
+        language: str = "Python",
         strict: bool = False,
     ) -> None:
         self.name = check_node_name(name)
@@ -116,6 +118,7 @@ class Node(ServiceNode):
             name,
             platform.node(),
             os.getpid(),
+            language=language,
             generation=generation,
             since_ns=time.time_ns(),
             key=key,

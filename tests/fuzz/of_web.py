@@ -16,7 +16,9 @@ from nep.programs.web.outgoing import EncodingOptions, publish_frames
 from nep.programs.web.payloads import from_ros, nep_type_of, ros_type_of
 from nep.programs.web.png import text_as_png, text_in_png
 from nep.programs.web.server import node_name
+from nep.programs.web.visitors import MAX_SHOWN_LENGTH, client_name, page_title
 from nep.protocol.wire import check_node_name
+from nep.text import control_in
 from tests.fuzz.target import Targets, check_sentence, text_of
 
 TARGETS = Targets()
@@ -81,6 +83,9 @@ def origins_of_pages(data: bytes) -> None:
         check_sentence(NepError(refusal))
     assert refusal or "localhost" in text.lower() or "127." in text or "::" in text or "192.168.1.5" in text
     assert access.is_given("/?" + text, text) is not True or "a-long-token" in text
+    for name in (client_name(text), page_title(text, text, text)):
+        assert len(name) <= MAX_SHOWN_LENGTH
+        assert not control_in(name)
     if not refusal:
         check_node_name(node_name(text, "127.0.0.1:5"))
 

@@ -112,6 +112,17 @@ class MotionGuard:
                 return self.is_settled
             threading.Event().wait(_POLL_S)
 
+    def set_allowed(self, names: Collection[str]) -> None:
+        """Replace the robots (or topics) that may be moved; applies to the next call of `refusal`."""
+        with self._lock:
+            self._allowed = frozenset(names)
+            self._cache = {}
+
+    def refused_robots(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+        """Return the robots for which `refusal` refuses a topic; the topic itself for an unknown robot."""
+        with self._lock:
+            return _not_allowed(topic, self._moving.moved_by(topic, msg_type), self._allowed)
+
     def refusal(self, topic: str, msg_type: str = "") -> str:
         """Return why nothing may be published on a topic, with the option that allows it; "" when it may."""
         key = topic, msg_type
@@ -198,10 +209,14 @@ def _read(message: Message, topic: str) -> RobotControls | None:
         return None
 
 
+def _not_allowed(topic: str, robots: Sequence[str], allowed: Collection[str]) -> tuple[str, ...]:
+    return () if topic in allowed else tuple(name for name in robots if name not in allowed)
+
+
 def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
     """Return the sentence that names the robots and the option that allows it; "" when all are allowed."""
-    missing = [name for name in robots if name not in allowed]
-    if not missing or topic in allowed:
+    missing = list(_not_allowed(topic, robots, allowed))
+    if not missing:
         return ""
     shown = shortened(escaped(topic), _MAX_NAME_SHOWN)
     names = [shortened(escaped(name), _MAX_NAME_SHOWN) for name in missing]

@@ -5,7 +5,7 @@ Here: the protocol, the server, and NEP's messages in the shapes of ROS. Robots'
 """
 
 from nep.programs.web.access import Access
-from nep.programs.web.context import ConnectedPage, Refusal
+from nep.programs.web.context import ConnectedPage, PageTopic, Refusal
 from nep.programs.web.server import WebServer, WebSettings
 
-__all__ = ["Access", "ConnectedPage", "Refusal", "WebServer", "WebSettings"]
+__all__ = ["Access", "ConnectedPage", "PageTopic", "Refusal", "WebServer", "WebSettings"]

@@ -80,13 +80,18 @@ class Access:
     origins: Collection[str] = ()
     token: str = ""
 
-    def origin_refusal(self, origin: str | None) -> str:
-        """Return why a page of this origin may not connect; "" when it may. None: a program without one."""
+    def origin_refusal(self, origin: str | None, own: str = "") -> str:
+        """Return why a page of this origin may not connect; "" when it may.
+
+        Args:
+            origin: None for a program without one.
+            own: Origin of the server's own pages: the address and port at which the connection came.
+        """
         if origin is None:
             return ""
         try:
             known = checked_origin(origin)
-            if known in self.origins or is_own_host(urlsplit(known).hostname or ""):
+            if known == own or known in self.origins or is_own_host(urlsplit(known).hostname or ""):
                 return ""
         except NepError:
             pass

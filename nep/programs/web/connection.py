@@ -8,14 +8,15 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from nep.errors import NepError
 from nep.i18n import ngettext
 from nep.nodes.node import Node
-from nep.programs.web.context import ConnectedPage, WebCounts
+from nep.programs.web.context import ConnectedPage, PageTopic, Protocol, WebCounts
 from nep.programs.web.outgoing import Frame
 from nep.programs.web.send_queue import Queued, SendQueue
+from nep.programs.web.visitors import client_name, page_title
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -30,14 +31,17 @@ _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008
 _INTERNAL_ERROR = 1011
 _NODE_CLOSE_S = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 _ids = itertools.count(1)
 
 
 class PageConnection:
     """A page at a WebSocket connection. Lives in the server's event loop.
 
-    Subclasses implement a protocol: `_frames_of`, `_warn`, `_reject`, `_subscribed` and `_published`.
+    Subclasses implement a protocol: `_frames_of`, `_warn`, `_reject` and `_topic_list`.
     """
+
+    protocol: ClassVar[Protocol]
 
     def __init__(
         self, connection: ServerConnection, name: str, new_node: Callable[[str], Node], counts: WebCounts
@@ -52,17 +56,14 @@ class PageConnection:
         self._node = new_node(name)
         self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
         self._closing: asyncio.Task[None] | None = None
+        self.is_closing = False
+        """Its messages are ignored: it may not stay. Set from any thread before `close` is scheduled."""
 
     # ---- implemented by subclasses
 
     @property
-    def _subscribed(self) -> tuple[str, ...]:
-        """Topics that the page subscribes to. Thread-safe."""
-        raise NotImplementedError
-
-    @property
-    def _published(self) -> tuple[str, ...]:
-        """Topics that the page publishes. Thread-safe."""
+    def _topic_list(self) -> tuple[PageTopic, ...]:
+        """Topics of the page. Thread-safe."""
         raise NotImplementedError
 
     async def _frames_of(self, queued: Queued) -> list[Frame]:
@@ -82,27 +83,58 @@ class PageConnection:
     @property
     def snapshot(self) -> ConnectedPage:
         """Topics and connection of the page. Thread-safe."""
-        address, request = self._connection.remote_address, self._connection.request
+        address = self._connection.remote_address
+        path, origin, referer, user_agent = self._request
         return ConnectedPage(
-            self.id,
-            self.name,
-            str(address[0]) if isinstance(address, tuple) else str(address),
-            ("" if request is None else request.headers.get("Origin")) or "",
-            self._since_s,
-            self._subscribed,
-            self._published,
-            self._dropped,
+            id=self.id,
+            name=self.name,
+            address=str(address[0]) if isinstance(address, tuple) else str(address),
+            origin=origin,
+            since_s=self._since_s,
+            client=client_name(user_agent, is_foxglove=self.protocol == "foxglove"),
+            protocol=self.protocol,
+            title=page_title(path, referer, origin) or self.name,
+            topics=self._topic_list,
+            dropped_count=self._dropped,
         )
 
-    async def close(self) -> None:
-        """Close the connection; `run` then ends."""
-        await self._connection.close(_POLICY_VIOLATION, "disconnected by the user of the server")
+    @property
+    def _request(self) -> tuple[str, str, str, str]:
+        """Path, origin, referer and user agent of the handshake; "" for what is not there or ambiguous."""
+        request = self._connection.request
+        if request is None:
+            return "", "", "", ""
+        found = (request.headers.get_all(name) for name in ("Origin", "Referer", "User-Agent"))
+        origin, referer, user_agent = (each[0] if len(each) == 1 else "" for each in found)
+        return request.path, origin, referer, user_agent
+
+    @property
+    def connection(self) -> ServerConnection:
+        """The WebSocket connection."""
+        return self._connection
+
+    def start_closing(self, reason: str) -> None:
+        """Close the connection within some seconds, whatever the page does; `run` then ends."""
+        self.is_closing = True
+        self._closing = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
+
+    async def _close_connection(self, code: int, reason: str) -> None:
+        # The library waits without a limit until a page that reads nothing takes the close frame (17.4).
+        try:
+            await asyncio.wait_for(self._connection.close(code, reason), _CLOSE_TIMEOUT_S)
+        except asyncio.TimeoutError:
+            self._connection.transport.abort()
+
+    async def _receive(self) -> bytes:
+        """Return the next message of the page. Raises `ConnectionClosed`."""
+        while True:
+            data = bytes(await self._connection.recv(decode=False))
+            if not self.is_closing:
+                return data
 
     def _end_slow(self) -> None:
         _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
-        self._closing = asyncio.create_task(
-            self._connection.close(_POLICY_VIOLATION, "the page does not read its answers")
-        )
+        self.start_closing("the page does not read its answers")
 
     async def _close_node(self) -> None:
         self._thread.submit(self._node.close, _NODE_CLOSE_S)
@@ -115,15 +147,24 @@ class PageConnection:
         try:
             while True:
                 next_up = await self._queue.take()
-                frames = [next_up] if isinstance(next_up, Frame) else await self._frames_of_message(next_up)
-                for frame in frames:
-                    await self._connection.send(frame.data, text=frame.is_text)
-                self._counts.sent += bool(frames)
+                if isinstance(next_up, Queued):
+                    await self._send_message(next_up)
+                else:
+                    await self._connection.send(next_up.data, text=next_up.is_text)
+                    self._counts.sent += 1
         except ws_exceptions.ConnectionClosed:
             return
         except Exception:
             _logger.exception("the page '%s' is closed because of an error", self.name)
-            await self._connection.close(_INTERNAL_ERROR, "internal error")
+            await self._close_connection(_INTERNAL_ERROR, "internal error")
+
+    async def _send_message(self, queued: Queued) -> None:
+        frames = await self._frames_of_message(queued)
+        for frame in frames:
+            await self._connection.send(frame.data, text=frame.is_text)
+        if frames:
+            self._counts.sent += 1
+            queued.feed.sent.count(sum(len(frame.data) for frame in frames))
 
     async def _frames_of_message(self, queued: Queued) -> list[Frame]:
         feed = queued.feed

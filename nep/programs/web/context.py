@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
-from typing import ParamSpec, TypeVar
+from typing import Literal, ParamSpec, TypeVar
 
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
@@ -14,10 +16,33 @@ from nep.programs.web.operations import LEVELS, Level, OperationId
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
 
-__all__ = ["ConnectedPage", "PageContext", "Refusal", "WebCounts"]
+__all__ = ["ConnectedPage", "PageContext", "PageTopic", "Protocol", "Refusal", "RefusalKind", "WebCounts"]
+
+Protocol = Literal["rosbridge", "foxglove"]
+RefusalKind = Literal["origin", "token", "robot", "limit", "other"]
+_ROBOT_REFUSAL_INTERVAL_S = 10.0
+_MAX_REMEMBERED_ROBOTS = 50
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class PageTopic:
+    """A topic that a page publishes or subscribes to.
+
+    `at_most_per_s` is the limit that the page asked for (``throttle_rate``), None without one. `rate` and
+    `bytes_per_s` are averages of the last two seconds, of what was sent to the page or received from it.
+    `dropped_count` counts the messages that the page was too slow for, not those beyond its limit.
+    """
+
+    topic: str
+    is_published: bool
+    at_most_per_s: float | None = None
+    rate: float = 0.0
+    bytes_per_s: float = 0.0
+    sent_count: int = 0
+    dropped_count: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +50,10 @@ class ConnectedPage:
     """A page or program that is connected: its node, address, origin, and topics.
 
     `id` is given to `WebServer.disconnect`; `origin` is "" for programs; `since_s` is by `time.time`.
+    `name` is that of its node, whose ``language`` in the graph is "web". `client` is the program, such as
+    "Chrome" or "roslibpy", "" if it is not known. `title` is the file name of the page if it sends that
+    (``ws://HOST:PORT/?title=buttons.html``, or a Referer), else the host of its origin, else `name`. Both
+    are the client's own words: escaped and bounded, but not verified.
     """
 
     id: int
@@ -32,22 +61,38 @@ class ConnectedPage:
     address: str
     origin: str
     since_s: float
-    subscribed: tuple[str, ...] = ()
-    published: tuple[str, ...] = ()
+    client: str = ""
+    protocol: Protocol = "rosbridge"
+    title: str = ""
+    topics: tuple[PageTopic, ...] = ()
     dropped_count: int = 0
+
+    @property
+    def subscribed(self) -> tuple[str, ...]:
+        """Names of the topics that it subscribes to."""
+        return tuple(each.topic for each in self.topics if not each.is_published)
+
+    @property
+    def published(self) -> tuple[str, ...]:
+        """Names of the topics that it publishes."""
+        return tuple(each.topic for each in self.topics if each.is_published)
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A connection or an operation that was refused.
+    """A connection that was refused, or a message of a page that would have moved a robot (kind "robot").
 
     `who` is the page's origin, or its address; `origin` is not "" where allowing that origin would help.
+    `robot` is the name of the robot that the page asked to move, or the topic of a robot without a known
+    name. The same page and robot appear at most once in ten seconds.
     """
 
     time_s: float
     who: str
     reason: str
     origin: str = ""
+    kind: RefusalKind = "other"
+    robot: str = ""
 
 
 @dataclass
@@ -76,7 +121,13 @@ class PageContext:
     """See the module."""
 
     def __init__(
-        self, node: Node, queue: SendQueue, thread: Executor, guard: MotionGuard, counts: WebCounts
+        self,
+        node: Node,
+        queue: SendQueue,
+        thread: Executor,
+        guard: MotionGuard,
+        counts: WebCounts,
+        on_robot_refused: Callable[[str, str], object] = lambda _robot, _reason: None,
     ) -> None:
         self.node = node
         self.queue = queue
@@ -84,11 +135,33 @@ class PageContext:
         self.counts = counts
         self.level: Level = "error"
         self._thread = thread
+        self._on_robot_refused = on_robot_refused
+        self._refused_at: dict[str, float] = {}
+        self._refused_lock = threading.Lock()
 
     async def in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
         """Call what waits for the network in the page's own thread; calls keep their order."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
+
+    def motion_refusal(self, topic: str, msg_type: str) -> str:
+        """Return why the page may not publish on a topic, and report it; "" when it may. Thread-safe."""
+        refusal = self.guard.refusal(topic, msg_type)
+        if refusal:
+            for robot in self.guard.refused_robots(topic, msg_type):
+                self._report_refused(robot, refusal)
+        return refusal
+
+    def _report_refused(self, robot: str, reason: str) -> None:
+        now = time.monotonic()
+        with self._refused_lock:
+            if now - self._refused_at.get(robot, float("-inf")) < _ROBOT_REFUSAL_INTERVAL_S:
+                return
+            self._refused_at.pop(robot, None)
+            self._refused_at[robot] = now
+            while len(self._refused_at) > _MAX_REMEMBERED_ROBOTS:
+                del self._refused_at[next(iter(self._refused_at))]
+        self._on_robot_refused(robot, reason)
 
     def tell(self, level: Level, sentence: str, id_: OperationId = None) -> None:
         """Send a status, unless the page wants none of this level."""

@@ -28,10 +28,11 @@ from nep.nodes.loop_wait import give_way
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.programs.web.connection import PageConnection
-from nep.programs.web.context import WebCounts
+from nep.programs.web.context import PageTopic, WebCounts
 from nep.programs.web.limits import MAX_TOPICS
 from nep.programs.web.operations import Subscribe
 from nep.programs.web.outgoing import Frame
+from nep.programs.web.page_topics import subscribed_topic
 from nep.programs.web.send_queue import Feed, Queued
 from nep.system.lazy_import import lazy_module
 
@@ -98,6 +99,8 @@ class _Subscription:
 class FoxglovePage(PageConnection):
     """See the module. `name` is that of its node. Lives in the server's event loop."""
 
+    protocol = "foxglove"
+
     def __init__(
         self,
         connection: ServerConnection,
@@ -114,13 +117,8 @@ class FoxglovePage(PageConnection):
         self._is_gone = asyncio.Event()
 
     @property
-    def _subscribed(self) -> tuple[str, ...]:
-        topics = {each.channel.definition.topic for each in self._subscriptions.copy().values()}
-        return tuple(sorted(topics))
-
-    @property
-    def _published(self) -> tuple[str, ...]:
-        return ()
+    def _topic_list(self) -> tuple[PageTopic, ...]:
+        return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
 
     async def run(self) -> None:
         """Serve the client until it goes; then close its node."""
@@ -128,8 +126,7 @@ class FoxglovePage(PageConnection):
         tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._watch_topics())]
         try:
             while True:
-                data = await self._connection.recv(decode=False)
-                await self._handle(bytes(data))
+                await self._handle(await self._receive())
                 await give_way()  # other pages have their turn
         except ws_exceptions.ConnectionClosed:
             return
@@ -242,6 +239,8 @@ class FoxglovePage(PageConnection):
         channel = next((each for each in self._channels.values() if each.id == channel_id), None)
         if type(id_) is not int or not 0 <= id_ <= _MAX_ID or id_ in self._subscriptions or channel is None:
             raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
+        if any(each.channel is channel for each in self._subscriptions.values()):
+            raise NepError(_("a channel has one subscription at a time"))
         if len(self._subscriptions) >= MAX_TOPICS:
             raise NepError(
                 _("this page subscribes to {count} topics, and may have no more").format(count=MAX_TOPICS)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, cast
 
 import orjson
@@ -99,6 +99,8 @@ class Publish:
     id: OperationId
     topic: str
     msg: object
+    size_bytes: int = field(default=0, compare=False)
+    """Of the operation as it was received."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +254,7 @@ def parse(data: bytes) -> Operation:
         ) from None
     if not isinstance(fields, dict):
         raise OperationError(_("an operation is a JSON object with an 'op'"))
-    return _operation(_Fields(fields))
+    return _operation(_Fields(fields, len(data)))
 
 
 def shown(text: str) -> str:
@@ -263,8 +265,9 @@ def shown(text: str) -> str:
 class _Fields:
     """The fields of an operation, each checked when it is read."""
 
-    def __init__(self, fields: Mapping[str, object]) -> None:
+    def __init__(self, fields: Mapping[str, object], size_bytes: int) -> None:
         self._fields = fields
+        self.size_bytes = size_bytes
         given = fields.get("id")
         is_id = isinstance(given, str | int) and not isinstance(given, bool)
         self.id = cast("str | int", given) if is_id and len(str(given)) <= MAX_NAME_LENGTH else None
@@ -385,7 +388,7 @@ def _advertise(fields: _Fields) -> Operation:
 
 
 def _publish(fields: _Fields) -> Operation:
-    return Publish(fields.id, fields.own_name("topic"), fields.get("msg", {}))
+    return Publish(fields.id, fields.own_name("topic"), fields.get("msg", {}), fields.size_bytes)
 
 
 def _subscribe(fields: _Fields) -> Operation:

@@ -15,7 +15,7 @@ from nep.programs.robots.guard import MotionGuard
 from nep.programs.web import operations as op
 from nep.programs.web.access import AuthCheck
 from nep.programs.web.connection import PageConnection
-from nep.programs.web.context import PageContext, WebCounts
+from nep.programs.web.context import PageContext, PageTopic, WebCounts
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import AUTH_TIMEOUT_S, MAX_NESTED_OPERATIONS
 from nep.programs.web.outgoing import Frame, publish_frames
@@ -40,6 +40,8 @@ _logger = logging.getLogger("nep.programs.web")
 class Page(PageConnection):
     """See the module. `name` is that of its node. Lives in the server's event loop."""
 
+    protocol = "rosbridge"
+
     def __init__(
         self,
         connection: ServerConnection,
@@ -47,9 +49,10 @@ class Page(PageConnection):
         new_node: Callable[[str], Node],
         guard: MotionGuard,
         counts: WebCounts,
+        on_robot_refused: Callable[[str, str], object],
     ) -> None:
         super().__init__(connection, name, new_node, counts)
-        self._context = PageContext(self._node, self._queue, self._thread, guard, counts)
+        self._context = PageContext(self._node, self._queue, self._thread, guard, counts, on_robot_refused)
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
@@ -72,12 +75,8 @@ class Page(PageConnection):
     # ---- the connection
 
     @property
-    def _subscribed(self) -> tuple[str, ...]:
-        return self._topics.subscribed
-
-    @property
-    def _published(self) -> tuple[str, ...]:
-        return self._topics.published
+    def _topic_list(self) -> tuple[PageTopic, ...]:
+        return self._topics.topics
 
     async def run(self) -> None:
         """Serve the page until it goes; then close its node."""
@@ -85,8 +84,7 @@ class Page(PageConnection):
         try:
             await self._context.in_thread(self._announce)
             while True:
-                data = await self._connection.recv(decode=False)
-                await self.handle(bytes(data))
+                await self.handle(await self._receive())
                 await give_way()  # other pages have their turn
         except ws_exceptions.ConnectionClosed:
             return

@@ -69,7 +69,7 @@ class PageServices:
 
     async def _answer(self, operation: CallService) -> object:
         if is_rosapi(operation.service):
-            api = RosApi(self._context.node, self._context.guard)
+            api = RosApi(self._context.node, self._context.motion_refusal)
             return await self._context.in_thread(api.answer, operation.service, operation.args)
         client = self._clients.pop(operation.service, None)
         if client is None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from nep.i18n import _
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
-from nep.programs.web.context import PageContext
+from nep.programs.web.context import PageContext, PageTopic
 from nep.programs.web.limits import MAX_SUBSCRIPTION_IDS, MAX_TOPICS
 from nep.programs.web.operations import (
     Advertise,
@@ -22,11 +22,12 @@ from nep.programs.web.operations import (
     Unsubscribe,
 )
 from nep.programs.web.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
+from nep.programs.web.rates import RateMeter
 from nep.programs.web.ros_definitions import bare_type, definition_of
 from nep.programs.web.send_queue import Feed
 from nep.text import quotable
 
-__all__ = ["PageTopics"]
+__all__ = ["PageTopics", "subscribed_topic"]
 
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
@@ -40,6 +41,7 @@ class _Publication:
     publisher: Publisher
     ros_type: str
     ids: set[OperationId] = field(default_factory=set)
+    received: RateMeter = field(default_factory=lambda: RateMeter(time.monotonic))
 
 
 @dataclass
@@ -58,14 +60,10 @@ class PageTopics:
         self._subscriptions: dict[str, _Subscription] = {}
 
     @property
-    def published(self) -> tuple[str, ...]:
-        """Topics that the page publishes. Thread-safe."""
-        return tuple(self._publications)
-
-    @property
-    def subscribed(self) -> tuple[str, ...]:
-        """Topics that the page subscribes to. Thread-safe."""
-        return tuple(self._subscriptions)
+    def topics(self) -> tuple[PageTopic, ...]:
+        """Topics that the page subscribes to, then those that it publishes. Thread-safe."""
+        feeds = [each.feed for each in self._subscriptions.copy().values()]
+        return (*map(subscribed_topic, feeds), *map(_published_topic, self._publications.copy().items()))
 
     # ---- publishing
 
@@ -110,7 +108,7 @@ class PageTopics:
         return "" if members <= {own.id} else known.msg_type
 
     def _check_motion(self, topic: str, msg_type: str, id_: OperationId) -> None:
-        refusal = self._context.guard.refusal(topic, msg_type)
+        refusal = self._context.motion_refusal(topic, msg_type)
         if refusal:
             self._context.counts.motions_refused += 1
             raise OperationError(refusal, id_)
@@ -124,6 +122,7 @@ class PageTopics:
         self._check_motion(operation.topic, publisher.msg_type, operation.id)
         msg = _with_header(operation.msg, known.ros_type)
         publisher.publish(from_ros(msg, known.ros_type, publisher.msg_type), strict=True)
+        known.received.count(operation.size_bytes)
 
     async def _open_by_type(self, operation: Publish) -> _Publication:
         msg_type = await self._context.in_thread(self._type_of, operation.topic)
@@ -222,6 +221,26 @@ class PageTopics:
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
+
+
+def subscribed_topic(feed: Feed) -> PageTopic:
+    """Return the limit, rates and counts of a feed. Thread-safe."""
+    rate, bytes_per_s = feed.sent.rates()
+    return PageTopic(
+        feed.topic,
+        False,
+        feed.at_most_per_s,
+        rate,
+        bytes_per_s,
+        feed.sent.total,
+        feed.total_dropped_count,
+    )
+
+
+def _published_topic(item: tuple[str, _Publication]) -> PageTopic:
+    topic, publication = item
+    rate, bytes_per_s = publication.received.rates()
+    return PageTopic(topic, True, None, rate, bytes_per_s, publication.received.total)
 
 
 def _another_type(topic: str, ros_type: str, known: str, id_: OperationId) -> OperationError:

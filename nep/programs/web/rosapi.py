@@ -15,7 +15,6 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.patterns.parameters.owned import place_of
-from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.payloads import ros_type_of
 from nep.programs.web.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
 from nep.protocol.graph_view import GraphView, NodeInfo
@@ -45,9 +44,10 @@ def is_shown(name: str) -> bool:
 class RosApi:
     """Answers one call. Made for each; reads the graph once, when it is needed."""
 
-    def __init__(self, node: Node, guard: MotionGuard) -> None:
+    def __init__(self, node: Node, motion_refusal: Callable[[str, str], str]) -> None:
+        """Create it. `motion_refusal` returns why a page may not publish on a topic of a type."""
         self._node = node
-        self._guard = guard
+        self._motion_refusal = motion_refusal
 
     def answer(self, service: str, args: object) -> Mapping[str, object]:
         """Return the values of a service of rosapi. Raises `NepError`."""
@@ -229,8 +229,9 @@ class RosApi:
             raise NepError(_('the value of a parameter is a JSON text, such as 0.5 or "slow"')) from None
         ids = {each.id for each in self._nodes_named(node)}
         for topic in self._view.topics.values():
-            refusal = self._guard.refusal(topic.name, topic.msg_type)
-            if refusal and _has(topic.subscribers, ids):
+            if not _has(topic.subscribers, ids):
+                continue
+            if refusal := self._motion_refusal(topic.name, topic.msg_type):
                 raise NepError(refusal)
         with self._node.parameters_of(node, _PARAMETER_TIMEOUT_S) as remote:
             remote.set(name, value)

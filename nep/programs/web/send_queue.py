@@ -8,6 +8,7 @@ Used in the event loop's thread only.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES, MAX_QUEUED_BYTES, MAX_QUEUED_MESSAGES
 from nep.programs.web.operations import COMPRESSIONS, OperationId, Subscribe
 from nep.programs.web.outgoing import EncodingOptions, Frame
+from nep.programs.web.rates import RateMeter
 
 __all__ = ["Feed", "Queued", "SendQueue"]
 
@@ -37,11 +39,13 @@ class Feed:
     and the smallest fragments.
     """
 
-    def __init__(self, topic: str) -> None:
+    def __init__(self, topic: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.topic = topic
+        self.sent = RateMeter(clock)
         self.form = EncodingOptions()
         self.dropped_count = 0
-        """Messages that the page was too slow for."""
+        """Messages that the page was too slow for, since it was told so last."""
+        self.total_dropped_count = 0
         self.throttled_count = 0
         """Messages that were left out because the page asked for fewer."""
         self.size_bytes = 0
@@ -110,6 +114,12 @@ class Feed:
             self.throttled_count += 1
         else:
             self.dropped_count += 1
+            self.total_dropped_count += 1
+
+    @property
+    def at_most_per_s(self) -> float | None:
+        """Messages per second that the page asked for at most; None without a limit."""
+        return 1 / self._throttle_s if self._throttle_s else None
 
     @property
     def next_at(self) -> float:

@@ -9,12 +9,13 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from http import HTTPStatus
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlsplit
 
 from nep.errors import AddressInUseError, NepError, TooManyFilesError
@@ -22,7 +23,7 @@ from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host
-from nep.programs.web.context import ConnectedPage, Refusal, WebCounts
+from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
 from nep.programs.web.foxglove_page import SUBPROTOCOLS, ChannelFormat, FoxglovePage
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
@@ -52,6 +53,8 @@ _CLOSE_TIMEOUT_S = 2.0
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
+LANGUAGE = "web"
+"""Language of pages' nodes in the graph, by which others recognize them."""
 _MAX_LOCKED = 16
 """Connections without a token that may still send an ``auth``."""
 
@@ -86,8 +89,17 @@ class WebSettings:
         return any(not is_own_host(each) for each in self.hosts)
 
 
+class _Rejection(NamedTuple):
+    status: HTTPStatus
+    kind: RefusalKind
+    sentence: str
+
+
 class WebServer:
     """Serves from `start` until `close`; a context manager.
+
+    Each page is a node whose ``language`` in the graph is "web" (`NodeInfo.language`), and whose name is
+    `ConnectedPage.name`; the server's own node is "nep_web" with the language "Python".
 
     `start` raises `AddressInUseError`, and `NepError` for an address that this computer doesn't have, and
     where the libraries are not installed.
@@ -97,7 +109,11 @@ class WebServer:
         self.settings = settings
         self.counts = WebCounts()
         self.port = settings.port
-        self._pages: set[Page | FoxglovePage] = set()
+        self._pages: dict[Page | FoxglovePage, Access] = {}
+        """Pages, each with the rules by which it was let in."""
+        self._lock = threading.Lock()
+        """For changes of `settings` while pages connect."""
+        self._guard: MotionGuard | None = None
         self._locked = 0
         self._refusals: deque[Refusal] = deque(maxlen=_MAX_REFUSALS)
         self._auth = AuthCheck(settings.access.token)
@@ -115,30 +131,78 @@ class WebServer:
     @property
     def page_names(self) -> tuple[str, ...]:
         """Names of the nodes of connected pages."""
-        return tuple(sorted(each.name for each in tuple(self._pages)))
+        return tuple(sorted(each.name for each in self._pages.copy()))
 
     @property
     def pages(self) -> tuple[ConnectedPage, ...]:
         """Connected pages and programs, the first that came first. Thread-safe."""
-        return tuple(each.snapshot for each in sorted(self._pages.copy(), key=lambda page: page.id))
+        pages = sorted(self._pages.copy(), key=lambda page: page.id)
+        return tuple(each.snapshot for each in pages if not each.is_closing)
 
     @property
     def refusals(self) -> tuple[Refusal, ...]:
-        """The newest connections that were refused, the last one last. Thread-safe."""
-        return tuple(self._refusals)
+        """The newest refused connections and messages, the last one last. Thread-safe."""
+        return tuple(self._refusals.copy())
 
     def disconnect(self, page_id: int) -> None:
         """Close the connection of a page; it may connect again. Thread-safe, returns at once."""
-        page = next((each for each in tuple(self._pages) if each.id == page_id), None)
-        if page is not None and self._loop is not None:
-            with suppress(RuntimeError):  # it has ended
-                asyncio.run_coroutine_threadsafe(page.close(), self._loop)
+        self._disconnect(lambda page, _access: page.id == page_id, "disconnected by the user of the server")
+
+    def set_access(self, access: Access) -> int:
+        """Change who may connect, at once; return the number of pages that are disconnected.
+
+        Pages that may not connect by the new rules are disconnected: those of a removed origin, and those
+        that connected with another token or without one. All others stay connected. Thread-safe. Raises
+        `NepError` for rules without a token while other computers can connect.
+        """
+        check_token(replace(self.settings, access=access))
+        with self._lock:
+            if access.token != self.settings.access.token:
+                self._auth = AuthCheck(access.token)
+            self.settings = replace(self.settings, access=access)
+            return self._disconnect(
+                lambda page, known: not self._may_stay(page.connection, known),
+                "this page may not be connected any more",
+            )
+
+    def set_allow_moving(self, names: Collection[str]) -> None:
+        """Change the robots that pages may move, also for connected pages. Thread-safe."""
+        with self._lock:
+            self.settings = replace(self.settings, allow_moving=frozenset(names))
+            if self._guard is not None:
+                self._guard.set_allowed(names)
+
+    def set_foxglove(self, channels: ChannelFormat | None) -> int:
+        """Serve clients of Foxglove's protocol, or none; return the number of pages that are disconnected.
+
+        `channels` is a `nep.recordings.formats.channels.LiveChannels`; None serves none and disconnects those
+        that are connected. Thread-safe.
+        """
+        with self._lock:
+            self.settings = replace(self.settings, foxglove=channels)
+            if channels is not None:
+                return 0
+            return self._disconnect(
+                lambda page, _access: page.protocol == "foxglove", "Foxglove's protocol was switched off"
+            )
+
+    def _disconnect(self, is_chosen: Callable[[Page | FoxglovePage, Access], bool], reason: str) -> int:
+        found = [
+            page
+            for page, access in self._pages.copy().items()
+            if not page.is_closing and is_chosen(page, access)
+        ]
+        for page in found:
+            page.is_closing = True
+            if self._loop is not None:
+                with suppress(RuntimeError):  # it has ended
+                    self._loop.call_soon_threadsafe(page.start_closing, reason)
+        return len(found)
 
     def start(self) -> Self:
         """Listen; return once pages can connect."""
         check_installed()
-        if self.settings.is_open and not self.settings.access.token:
-            raise NepError(_("a web server that other computers can reach needs a token"))
+        check_token(self.settings)
         for host in self.settings.listen:
             check_own_address(host)
         self._thread.start()
@@ -192,10 +256,11 @@ class WebServer:
         with Node(
             _NODE_NAME, self.settings.transport, master=self.settings.master, wait_s=_WAIT_FOR_MASTER_S
         ) as node:
-            self._guard = MotionGuard(node, self.settings.allow_moving)
+            with self._lock:
+                guard = self._guard = MotionGuard(node, self.settings.allow_moving)
             try:
                 server = await serve(
-                    self._page,
+                    partial(self._page, guard),
                     self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                     self.settings.port,
                     process_request=self._refusal,
@@ -213,11 +278,11 @@ class WebServer:
             async with server:
                 self.port = next(iter(server.sockets)).getsockname()[1]
                 self._started.set()
-                watch = asyncio.create_task(self._watch_robots())
+                watch = asyncio.create_task(self._watch_robots(guard))
                 await self._stop.wait()
                 watch.cancel()
                 server.close()  # with 1001, going away
-            self._guard.close()
+            guard.close()
 
     def _bind_error(self, error: OSError) -> Exception:
         address = f"{', '.join(self.settings.hosts)}:{self.settings.port}"
@@ -237,14 +302,14 @@ class WebServer:
             )
         )
 
-    async def _watch_robots(self) -> None:
+    async def _watch_robots(self, guard: MotionGuard) -> None:
         """Ask who is there while a page could publish: a robot may come after it advertised a topic."""
         loop = asyncio.get_running_loop()
         stop = self._stop
         with ThreadPoolExecutor(1, "nep-web-robots") as thread:
             while stop is not None and not stop.is_set():
                 if self._pages:
-                    await loop.run_in_executor(thread, self._guard.look)
+                    await loop.run_in_executor(thread, guard.look)
                 with suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(stop.wait(), _REFRESH_S)
 
@@ -252,29 +317,41 @@ class WebServer:
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a handshake that is refused; None lets it go on."""
-        said, is_foreign = "", False
-        status = HTTPStatus.FORBIDDEN
-        origins = request.headers.get_all("Origin")
         access = self.settings.access
+        origins = request.headers.get_all("Origin")
+        origin = origins[0] if origins else None
+        refusal: _Rejection | None
         if len(origins) > 1:
-            said = _("a connection has one Origin")
+            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("a connection has one Origin"))
         elif len(self._pages) + self._locked >= MAX_PAGES:
-            status, said = HTTPStatus.SERVICE_UNAVAILABLE, _("there are too many connections")
+            refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("there are too many connections"))
+        elif said := access.origin_refusal(origin, _own_origin(connection)):
+            refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
         else:
-            said = access.origin_refusal(origins[0] if origins else None)
-            is_foreign = bool(said)
-        if not said and access.token:
-            authorizations = request.headers.get_all("Authorization")
-            is_given = access.is_given(request.path, authorizations[0] if authorizations else None)
-            if is_given is False:
-                status, said = HTTPStatus.UNAUTHORIZED, _("the token is wrong")
-            elif is_given is None and self._locked >= _MAX_LOCKED:
-                status, said = HTTPStatus.UNAUTHORIZED, _("give the token, as in ws://HOST:PORT/?token=TOKEN")
-            connection.is_unlocked = is_given is True  # type: ignore[attr-defined]
-        if not said:
+            refusal = self._token_refusal(connection, request, access)
+        if refusal is None:
             return None
-        self._turn_away(connection, said, origins[0] if origins and is_foreign else "")
-        return connection.respond(status, said + "\n")
+        self._turn_away(
+            connection, refusal.kind, refusal.sentence, (origin or "") if refusal.kind == "origin" else ""
+        )
+        return connection.respond(refusal.status, refusal.sentence + "\n")
+
+    def _token_refusal(
+        self, connection: ServerConnection, request: Request, access: Access
+    ) -> _Rejection | None:
+        authorizations = request.headers.get_all("Authorization")
+        is_given = access.is_given(request.path, authorizations[0] if authorizations else None)
+        connection.is_unlocked = not access.token or is_given is True  # type: ignore[attr-defined]
+        connection.access = access  # type: ignore[attr-defined]
+        if not access.token or is_given:
+            return None
+        if is_given is False:
+            return _Rejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
+        if self._locked >= _MAX_LOCKED:
+            return _Rejection(
+                HTTPStatus.UNAUTHORIZED, "token", _("give the token, as in ws://HOST:PORT/?token=TOKEN")
+            )
+        return None
 
     def _subprotocol(
         self, _connection: ServerConnection, offered: Sequence[Subprotocol]
@@ -284,50 +361,76 @@ class WebServer:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
 
-    def _turn_away(self, connection: ServerConnection, said: str, origin: str = "") -> None:
-        who = origin or _address_of(connection).rpartition(":")[0]
-        self._refusals.append(Refusal(time.time(), escaped(who[:200]), said, origin[:200]))
+    def _turn_away(
+        self, connection: ServerConnection, kind: RefusalKind, said: str, origin: str = ""
+    ) -> None:
+        who = escaped((origin or _host_of(connection))[:200])
+        self._refusals.append(Refusal(time.time(), who, said, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             where = _address_of(connection)
             _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
 
-    async def _page(self, connection: ServerConnection) -> None:
+    def _report_robot(self, connection: ServerConnection, robot: str, said: str) -> None:
+        who = escaped((_origin_of(connection) or _host_of(connection))[:200])
+        self._refusals.append(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+
+    async def _page(self, guard: MotionGuard, connection: ServerConnection) -> None:
+        access: Access = connection.access  # type: ignore[attr-defined]
         page: Page | FoxglovePage | None = None
         try:
-            if not getattr(connection, "is_unlocked", True) and not await self._is_authenticated(connection):
+            if not connection.is_unlocked:  # type: ignore[attr-defined]
+                with self._lock:
+                    access, auth = self.settings.access, self._auth
+                if access.token and not await self._is_authenticated(connection, auth):
+                    return
+            with self._lock:
+                if self._may_stay(connection, access):
+                    page = self._new_page(connection, guard)
+                    self._pages[page] = access
+            if page is None:
+                await connection.close(_POLICY_VIOLATION, "this page may not connect any more")
                 return
-            name = node_name(_origin_of(connection), _address_of(connection))
-            channels = self.settings.foxglove
-            if channels is not None and connection.subprotocol in SUBPROTOCOLS:
-                page = FoxglovePage(connection, name, self._new_node, channels, self.counts)
-            else:
-                page = Page(connection, name, self._new_node, self._guard, self.counts)
-            self._pages.add(page)
             self.counts.opened += 1
             await page.run()
         except NepError as error:  # no more files for a node
-            self._turn_away(connection, str(error))
+            self._turn_away(connection, "limit", str(error))
             await connection.close(1013, "try again later")
         finally:
             if page is not None:
-                self._pages.discard(page)
+                self._pages.pop(page, None)
 
-    async def _is_authenticated(self, connection: ServerConnection) -> bool:
+    def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
+        name = node_name(_origin_of(connection), _address_of(connection))
+        channels = self.settings.foxglove
+        if channels is not None and connection.subprotocol in SUBPROTOCOLS:
+            return FoxglovePage(connection, name, self._new_node, channels, self.counts)
+        report = partial(self._report_robot, connection)
+        return Page(connection, name, self._new_node, guard, self.counts, report)
+
+    def _may_stay(self, connection: ServerConnection, known: Access) -> bool:
+        """Whether the current rules admit a page that was let in by `known`."""
+        access = self.settings.access
+        is_refused = access.origin_refusal(_origin_of(connection), _own_origin(connection))
+        return not is_refused and (not access.token or access.token == known.token)
+
+    async def _is_authenticated(self, connection: ServerConnection, auth: AuthCheck) -> bool:
         self._locked += 1
         try:
-            if await authenticate(connection, self._auth):
+            if await authenticate(connection, auth):
                 return True
         finally:
             self._locked -= 1
         said = _("give the token, as in ws://HOST:PORT/?token=TOKEN")
-        self._turn_away(connection, said)
+        self._turn_away(connection, "token", said)
         await connection.close(_POLICY_VIOLATION, "the token is missing or wrong")
         return False
 
     def _new_node(self, name: str) -> Node:
         settings = self.settings
-        return Node(name, settings.transport, master=settings.master, wait_s=_WAIT_FOR_MASTER_S)
+        return Node(
+            name, settings.transport, master=settings.master, wait_s=_WAIT_FOR_MASTER_S, language=LANGUAGE
+        )
 
 
 def check_installed() -> None:
@@ -339,6 +442,12 @@ def check_installed() -> None:
         raise NepError(
             _("the web server is not installed; install it with: pip install 'nep-studio[web]'")
         ) from error
+
+
+def check_token(settings: WebSettings) -> None:
+    """Raise `NepError` for a server that other computers can reach and that needs no token."""
+    if settings.is_open and not settings.access.token:
+        raise NepError(_("a web server that other computers can reach needs a token"))
 
 
 def check_own_address(host: str) -> None:
@@ -358,6 +467,19 @@ def node_name(origin: str | None, address: str) -> str:
     host = urlsplit(origin).netloc if origin else ""
     port = address.rpartition(":")[2]
     return escaped(f"web_{host}_{port}" if host else f"web_{address}")[:150]
+
+
+def _own_origin(connection: ServerConnection) -> str:
+    """The origin of pages that this server serves itself, at the address that the client chose.
+
+    Never a host name: a page of another site can let its own name point to this computer.
+    """
+    address = connection.local_address
+    return f"http://{address[0]}:{address[1]}" if isinstance(address, tuple) else ""
+
+
+def _host_of(connection: ServerConnection) -> str:
+    return _address_of(connection).rpartition(":")[0]
 
 
 def _origin_of(connection: ServerConnection) -> str | None:

@@ -1,0 +1,46 @@
+"""RateMeter: messages and bytes per second over the last two seconds. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+__all__ = ["RateMeter"]
+
+_SLOT_S = 0.5
+_SLOTS = 4
+_WINDOW_S = _SLOT_S * _SLOTS
+
+
+class RateMeter:
+    """Counts in slots of half a second; a message costs a few additions.
+
+    `count` is called in one thread; `rates` may be called in any: a slot that is replaced at that moment
+    makes one value imprecise.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._since_s = clock()
+        self._slots = [(-1, 0, 0)] * (_SLOTS + 1)
+        """(number of the slot since the clock's zero, messages, bytes), with one more that is not over."""
+        self.total = 0
+
+    def count(self, size_bytes: int) -> None:
+        """Count a message."""
+        self.total += 1
+        number = int(self._clock() / _SLOT_S)
+        known, messages, size = self._slots[number % len(self._slots)]
+        if known != number:
+            messages = size = 0
+        self._slots[number % len(self._slots)] = number, messages + 1, size + size_bytes
+
+    def rates(self) -> tuple[float, float]:
+        """Return messages and bytes per second; 0 until the first half second is over."""
+        now = self._clock()
+        current = int(now / _SLOT_S)
+        begin = current - _SLOTS
+        full = [each for each in tuple(self._slots) if begin <= each[0] < current]
+        span_s = min(_WINDOW_S, current * _SLOT_S - self._since_s)
+        if span_s < _SLOT_S:
+            return 0.0, 0.0
+        return sum(each[1] for each in full) / span_s, sum(each[2] for each in full) / span_s

@@ -1,0 +1,81 @@
+"""Names for connected pages: client program and title, from the headers of the handshake. Pure."""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from nep.text import escaped
+
+__all__ = ["MAX_SHOWN_LENGTH", "client_name", "page_title"]
+
+MAX_SHOWN_LENGTH = 60
+_MAX_READ_LENGTH = 2_000
+_CLIENTS = (
+    ("Lichtblick", "Lichtblick"),
+    ("Foxglove", "Foxglove"),
+    ("Autobahn", "roslibpy"),
+    ("Firefox/", "Firefox"),
+    ("FxiOS/", "Firefox"),
+    ("SamsungBrowser/", "Samsung Internet"),
+    ("OPR/", "Opera"),
+    ("Edg", "Edge"),
+    ("QtWebEngine/", "Qt WebEngine"),
+    ("CriOS/", "Chrome"),
+    ("Chrome/", "Chrome"),
+    ("Safari/", "Safari"),
+)
+"""Marks in User-Agents, in this order: most browsers also claim to be Chrome and Safari."""
+_PRODUCT = re.compile(r"[A-Za-z][\w.+-]*")
+
+
+def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
+    """Return the name of the client program; "" if it is not known.
+
+    Args:
+        user_agent: Its header, whatever it contains. A program's own name is shown as it is, bounded.
+        is_foxglove: The client speaks Foxglove's protocol: without a better name it is "Foxglove".
+    """
+    given = user_agent[:_MAX_READ_LENGTH]
+    if is_foxglove:
+        return "Lichtblick" if "lichtblick" in given.lower() else "Foxglove"
+    for mark, name in _CLIENTS:
+        if mark in given:
+            return name
+    product = _PRODUCT.match(given)
+    return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_SHOWN_LENGTH]
+
+
+def page_title(path: str, referer: str, origin: str) -> str:
+    """Return a short name for a page: "buttons.html"; "" for a program without any.
+
+    Args:
+        path: Path of the WebSocket URL; its parameter ``title`` comes first.
+        referer: URL of the page, which few browsers send here: the last part of its path.
+        origin: Origin of the page, which every browser sends: its host and port.
+    """
+    for title in (_given_title(path), _last_part(referer), _host(origin)):
+        if shown := escaped(title.strip())[:MAX_SHOWN_LENGTH]:
+            return shown
+    return ""
+
+
+def _given_title(path: str) -> str:
+    try:
+        return parse_qs(urlsplit(path[:_MAX_READ_LENGTH]).query).get("title", [""])[0]
+    except ValueError:
+        return ""
+
+
+def _last_part(url: str) -> str:
+    try:
+        return unquote(urlsplit(url[:_MAX_READ_LENGTH]).path.rpartition("/")[2])
+    except ValueError:
+        return ""
+
+
+def _host(origin: str) -> str:
+    try:
+        return urlsplit(origin[:_MAX_READ_LENGTH]).netloc
+    except ValueError:
+        return ""
