@@ -1,14 +1,17 @@
-"""Binding to a port that this process has just released."""
+"""Ports of 127.0.0.1: binding to one that was just released, and reserving a closed one."""
 
 from __future__ import annotations
 
+import socket as sockets
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import zmq
 
-__all__ = ["bind_again"]
+__all__ = ["bind_again", "closed_port"]
 
 _WAIT_S = 5.0
 
@@ -24,3 +27,11 @@ def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
             if error.errno != zmq.EADDRINUSE or time.monotonic() >= deadline:
                 raise
         threading.Event().wait(0.005)
+
+
+@contextmanager
+def closed_port() -> Iterator[str]:
+    """Reserve a port that rejects connections; the value is its endpoint."""
+    with sockets.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{held.getsockname()[1]}"

@@ -301,6 +301,19 @@ class LosesMillions(Client):
         return False
 
 
+@breaks("lost-new")
+class CountsFromTheFirstReceived(Client):
+    def expect_all_of(self, publisher: int) -> None:
+        pass
+
+
+@breaks("lost-unreachable")
+class CountsOnceConnected(Client):
+    def promised(self, sub: Sub, publisher: int, seq: int) -> None:
+        if publisher in sub.sources and sub.sources[publisher].has_echoed:
+            super().promised(sub, publisher, seq)
+
+
 # ---- closing
 
 

@@ -321,6 +321,8 @@ class Client(Services):
             self.replies[call] = answer
         if name == "publisher+":
             self.connect([what["publisher"]])
+            if what.get("is_new"):
+                self.expect_all_of(what["publisher"]["publisher"]["id"])
         elif name == "publisher-":
             self.unlisted(what)
         elif name == "renewed" and what.get("again"):
@@ -364,6 +366,12 @@ class Client(Services):
                         self.unusable(sub, endpoint)
                     elif source.endpoint != endpoint:
                         self.move(sub, source, endpoint)
+
+    def expect_all_of(self, publisher: int) -> None:
+        for sub in self.subs.values():
+            source = sub.sources.get(publisher)
+            if source is not None and source.last is None:
+                source.last = 0
 
     def hears(self, sub: Sub, topic: str) -> bool:
         if not sub.record.get("pattern"):

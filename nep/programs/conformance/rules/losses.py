@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from nep.i18n import lazy
 from nep.programs.conformance.bench import Bench
+from nep.programs.conformance.ports import closed_port
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.verdict import expect
 
@@ -18,6 +21,17 @@ def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
             return
         bench.wait(0.05)
     expect("received, lost", bench.counts(sub), (received, lost))
+
+
+def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
+    """Report a last seq in three renewals, the second of which makes missing messages count as lost."""
+    bench.master.change = lambda _request, reply: (
+        {**reply, "what": {**reply["what"], "last_seqs": {publisher: seq}}}
+        if reply["is"] == "renewed"
+        else reply
+    )
+    for _turn in range(3):
+        bench.renewal(len(bench.master.received))
 
 
 @rule(
@@ -76,13 +90,7 @@ def _lost_last_seq(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     bench.need(lambda: bool(bench.events(sub)), "message")
-    bench.master.change = lambda _request, reply: (
-        {**reply, "what": {**reply["what"], "last_seqs": {publisher.id: 3}}}
-        if reply["is"] == "renewed"
-        else reply
-    )
-    for _turn in range(3):
-        bench.renewal(len(bench.master.received))
+    _report_last_seq(bench, publisher.id, 3)
     _expect_counts(bench, sub, 1, 2)
 
 
@@ -113,3 +121,40 @@ def _lost_leap(bench: Bench) -> None:
     publisher.send(b"1", seq=2**40)
     publisher.send(b"1", seq=2)
     _expect_counts(bench, sub, 2, 0)
+
+
+@rule(
+    "lost-new",
+    lazy("Losses of a publisher whose 'publisher+' has 'is_new' count from seq 1, those of others do not."),
+    "how-a-publisher-ends",
+    "losses",
+)
+def _lost_new(bench: Bench) -> None:
+    topic = bench.new_topic()
+    sub = bench.new_sub(topic)
+    new, rejoined = bench.publisher(topic, echoes=False), bench.publisher(topic, is_listed=False)
+    bench.need(lambda: bool(new.hellos), "hello")
+    new.send(b"1", seq=5)
+    _expect_counts(bench, sub, 1, 4)
+    rejoined.seq = 100
+    bench.master.repeat_pushes(bench.node_id, rejoined.record, rejoined.node)  # without is_new
+    bench.need(lambda: bool(rejoined.hellos), "hello")
+    rejoined.send(b"1", seq=101)
+    _expect_counts(bench, sub, 2, 4)
+
+
+@rule(
+    "lost-unreachable",
+    lazy("Messages of a new publisher also count as lost while the subscriber can't connect to it."),
+    "how-a-publisher-ends",
+    "losses",
+)
+def _lost_unreachable(bench: Bench) -> None:
+    topic = bench.new_topic()
+    sub = bench.new_sub(topic)
+    publisher = bench.publisher(topic, is_listed=False)
+    with closed_port() as endpoint:
+        publisher.record = replace(publisher.record, endpoints=(endpoint,))
+        bench.list_publisher(publisher)
+        _report_last_seq(bench, publisher.id, 7)
+        _expect_counts(bench, sub, 0, 7)
