@@ -55,8 +55,8 @@ var callback = function (message) {{
 var subscriber = node.new_callback("test", "json", callback);
 """
 SLOW_RULES = {
-    "again", "bye-again", "closed-is-left", "lost-last-seq", "lost-late", "malformed-named", "next-s",
-    "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
+    "again", "bye-again", "closed-is-left", "lost-last-seq", "lost-late", "lost-unreachable",
+    "malformed-named", "next-s", "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
 }  # fmt: skip
 """Rules that wait for renewals; only `nep wire check` without --rule runs them."""
 ALL_TYPES = """\

@@ -54,6 +54,52 @@ test("unlisted publishers are forgotten beyond a thousand", () => {
   assert.equal(sources.byId.size, 1000);
 });
 
+/** Losses of a subscriber that was registered when publisher `ID` was created. */
+function ofNewPublisher(history = 0) {
+  const sources = new Sources();
+  sources.expectAllOf(ID);
+  sources.listed({ id: ID, topic: "t", endpoints: [], history, nodeName: "n" });
+  return sources;
+}
+
+test("losses of a new publisher count from seq 1", () => {
+  let sources = ofNewPublisher();
+  assert.ok(sources.arrived(ID, 8n, false));
+  assert.deepEqual([sources.received, sources.lost], [1, 7]);
+  sources = ofNewPublisher();
+  assert.ok(sources.reached(ID, 0n), "its echo");
+  sources.arrived(ID, 1n, false);
+  assert.deepEqual([sources.received, sources.lost], [1, 0]);
+  sources = ofNewPublisher();
+  assert.ok(!sources.reached(ID, 2n ** 32n + 1n), "an impossible first seq");
+  assert.equal(sources.lost, 0);
+  sources.arrived(9n, 100n, false);
+  sources.expectAllOf(9n);
+  assert.deepEqual([sources.received, sources.lost], [1, 0], "a publisher that was heard before");
+});
+
+test("losses of an unreachable new publisher grow with each renewal", () => {
+  const sources = ofNewPublisher();
+  sources.promised(ID, 100n);
+  assert.equal(sources.lost, 0);
+  sources.promised(ID, 250n);
+  assert.equal(sources.lost, 100);
+  sources.arrived(ID, 100n, false);
+  assert.deepEqual([sources.received, sources.lost], [1, 99], "it was only late");
+  sources.settle(ID);
+  assert.equal(sources.lost, 249);
+});
+
+test("the history of a new publisher is received although it was promised before", () => {
+  const sources = ofNewPublisher(3);
+  sources.promised(ID, 9n);
+  sources.promised(ID, 9n);
+  assert.equal(sources.lost, 9);
+  assert.ok(sources.isEarly(ID), "its history brings this message again");
+  for (const seq of [8n, 9n, 10n]) assert.ok(sources.arrived(ID, seq, true));
+  assert.deepEqual([sources.received, sources.lost], [3, 7]);
+});
+
 test("a send window closes at its limit and opens after acknowledgements", () => {
   const window = new SendWindow();
   const size = 6 * 2 ** 20;

@@ -141,6 +141,7 @@ test("replies and pushes of the master are decoded as in the vectors", () => {
     assert.equal(read.is, answer_means.is, name);
     if (answer_means.what.epoch) assert.equal(String(read.epoch), answer_means.what.epoch, name);
     if (answer_means.what.code) assert.equal(read.code, answer_means.what.code, name);
+    if (answer_means.is === "publisher+") assert.equal(read.isNew, answer_means.what.is_new ?? false, name);
     for (const [id, seq] of Object.entries(answer_means.what.last_seqs ?? {}))
       assert.equal(String(read.lastSeqs.get(BigInt(id))), seq, name);
   }

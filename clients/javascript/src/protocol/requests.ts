@@ -135,7 +135,12 @@ export type Answer = FromMaster &
         readonly nextS: number;
       }
     | { readonly is: "refused"; readonly reason: string; readonly code: string }
-    | { readonly is: "publisher+"; readonly publisher: RemotePublisher }
+    | {
+        readonly is: "publisher+";
+        readonly publisher: RemotePublisher;
+        /** Whether it was created just now: its first message has seq 1. */
+        readonly isNew: boolean;
+      }
     | {
         readonly is: "publisher-";
         readonly id: bigint;
@@ -207,7 +212,7 @@ function readAnswer(name: string, what: Fields): Answer | undefined {
     case "refused":
       return { is: name, ...common, reason: what.text("reason"), code: what.text("code", "") };
     case "publisher+":
-      return { is: name, ...common, publisher: readRemote(what.map("publisher")) };
+      return { is: name, ...common, publisher: readRemote(what.map("publisher")), isNew: what.flag("is_new") };
     case "publisher-":
       return {
         is: name,

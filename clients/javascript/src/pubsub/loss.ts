@@ -14,8 +14,10 @@ export class Source {
   endpoint: string | undefined;
   /** Why it can't be connected to. */
   problem = "";
-  /** The newest message heard of it. */
+  /** Seq of its newest message, received or lost; undefined while unknown, 0 if all are still to come. */
   last: bigint | undefined;
+  /** Whether a message, an echo or a bye has been received. */
+  isHeard = false;
   hasEchoed = false;
   isLapsed = false;
   endsAt: number | undefined;
@@ -49,6 +51,11 @@ export class Sources {
     return source;
   }
 
+  /** Count losses from the first message of a new publisher. Has no effect once it was heard. */
+  expectAllOf(id: bigint): void {
+    this.get(id).last ??= 0n;
+  }
+
   listed(remote: ReachablePublisher): Source {
     const source = this.get(remote.id);
     source.remote = remote;
@@ -77,6 +84,7 @@ export class Sources {
    */
   arrived(id: bigint, seq: bigint, isAlone: boolean): boolean {
     const source = this.get(id);
+    source.isHeard = true;
     const { last } = source;
     if (last !== undefined && seq - last > MAX_GAP) return this.leapt(source, last, seq);
     if (last === undefined || seq > last) {
@@ -107,7 +115,7 @@ export class Sources {
   /** Whether a message, not for this subscriber alone, comes again with the history before the echo. */
   isEarly(id: bigint): boolean {
     const source = this.byId.get(id);
-    if (!source?.remote || source.hasEchoed || source.last !== undefined || source.remote.history <= 1) return false;
+    if (!source?.remote || source.hasEchoed || source.isHeard || source.remote.history <= 1) return false;
     source.earlyUntil ??= performance.now() + EARLY_MS;
     return performance.now() < source.earlyUntil;
   }
@@ -115,6 +123,7 @@ export class Sources {
   /** An echo or a bye: messages up to `seq` were sent before it. False when that can't be. */
   reached(id: bigint, seq: bigint): boolean {
     const source = this.get(id);
+    source.isHeard = true;
     if (source.last !== undefined && seq - source.last > MAX_GAP) return false;
     if (source.last !== undefined && seq > source.last) this.lost += Number(seq - source.last);
     if (source.last === undefined || seq > source.last) source.last = seq;

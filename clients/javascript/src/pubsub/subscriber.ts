@@ -361,8 +361,8 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   }
 
   /** @internal */
-  connect(remotes: readonly ReachablePublisher[]): void {
-    if (!this.isClosed) for (const each of remotes) this.reader(each.topic).connect(each);
+  connect(remotes: readonly ReachablePublisher[], areNew = false): void {
+    if (!this.isClosed) for (const each of remotes) this.reader(each.topic).connect(each, areNew);
   }
 
   /** @internal */

@@ -46,11 +46,12 @@ export class TopicReader {
 
   // ---- connections
 
-  /** Connect to a publisher; twice is once. */
-  connect(remote: ReachablePublisher): void {
+  /** Connect to a publisher; twice is once. All messages of one that `isNew` are still to come. */
+  connect(remote: ReachablePublisher, isNew = false): void {
     for (const old of this.sources.replacedBy(remote)) this.sources.closing(old, 0n);
     const { endpoint } = remote;
     const source = this.sources.listed(remote);
+    if (isNew && endpoint) this.sources.expectAllOf(remote.id);
     source.isLapsed = false;
     source.endsAt = undefined;
     if (!endpoint || endpoint === source.endpoint) return;

@@ -33,8 +33,11 @@ export interface SessionPublisher {
 /** A subscriber or client as its session needs it. */
 export interface SessionSubscriber {
   counts(): SubscriberCount;
-  /** These publishers are there, too. `endpoint` of each is the one to connect to. */
-  connect(remotes: readonly ReachablePublisher[]): void;
+  /**
+   * These publishers are there, too. `endpoint` of each is the one to connect to. `areNew`: they have sent nothing
+   * before, and the subscriber was registered already.
+   */
+  connect(remotes: readonly ReachablePublisher[], areNew?: boolean): void;
   /** These are all publishers of `topic`; with a pattern there are several topics. */
   reconcile(topic: string, remotes: readonly ReachablePublisher[]): void;
   /** A publisher is not listed any more. */
@@ -147,10 +150,11 @@ export class MasterSession {
     const request = { do: "subscriber+", node: this.node, subscriber: record } as const;
     // Connects before the next push is read, which may say that one of these publishers closes.
     const connect = (found: Answer): void => {
-      if (found.is === "found") owner.connect(found.publishers.map((each) => this.inReach(each)));
+      if (found.is !== "found") return;
+      registered.isConfirmed = true;
+      owner.connect(found.publishers.map((each) => this.inReach(each)));
     };
     const found = await this.register(() => this.rpc.ask(request, waitS, connect), this.subscribers, record.id);
-    registered.isConfirmed = true;
     if (record.pattern && found.is === "found" && !found.pattern) {
       this.removeSubscriber(record.id);
       throw new NepError(`The master at ${this.address} is older and knows no wildcards. Start a newer one.`);
@@ -277,10 +281,10 @@ export class MasterSession {
     }
     switch (answer.is) {
       case "publisher+":
-        this.publisherCame(this.inReach(answer.publisher));
+        this.publisherCame(this.inReach(answer.publisher), answer.isNew);
         break;
       case "publisher-":
-        for (const each of this.subscribersOf(answer.topic)) each.gone(answer.id, answer.lastSeq, answer.isClosed);
+        for (const { owner } of this.subscribersOf(answer.topic)) owner.gone(answer.id, answer.lastSeq, answer.isClosed);
         break;
       case "renewed":
         this.renewed(answer);
@@ -294,8 +298,8 @@ export class MasterSession {
     if (this.isKnown && answer.epoch !== this.epoch) this.join();
   }
 
-  private publisherCame(remote: ReachablePublisher): void {
-    for (const each of this.subscribersOf(remote.topic)) each.connect([remote]);
+  private publisherCame(remote: ReachablePublisher, isNew: boolean): void {
+    for (const { owner, isConfirmed } of this.subscribersOf(remote.topic)) owner.connect([remote], isNew && isConfirmed);
   }
 
   private renewed(answer: Extract<Answer, { is: "renewed" }>): void {
@@ -308,7 +312,7 @@ export class MasterSession {
     this.renewS = Math.min(MAX_RENEW_S, Math.max(RENEW_S, answer.nextS));
     for (const each of answer.topics) {
       const remotes = each.publishers.map((remote) => this.inReach(remote));
-      for (const subscriber of this.subscribersOf(each.topic)) subscriber.reconcile(each.topic, remotes);
+      for (const { owner } of this.subscribersOf(each.topic)) owner.reconcile(each.topic, remotes);
     }
     this.tickAfter(this.renewS * 1000);
     for (const each of this.subscribers.values()) each.owner.tick(answer.lastSeqs);
@@ -356,12 +360,10 @@ export class MasterSession {
     }
   }
 
-  private subscribersOf(topic: string): SessionSubscriber[] {
-    const found: SessionSubscriber[] = [];
-    for (const { record, owner } of this.subscribers.values()) {
-      if (record.topic === topic || (record.pattern && matchesPattern(record.topic, topic))) found.push(owner);
-    }
-    return found;
+  private subscribersOf(topic: string): Registered<SubscriberRecord, SessionSubscriber>[] {
+    return [...this.subscribers.values()].filter(
+      ({ record }) => record.topic === topic || (record.pattern && matchesPattern(record.topic, topic)),
+    );
   }
 
   private inReach(remote: RemotePublisher): ReachablePublisher {
