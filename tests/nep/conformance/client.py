@@ -320,9 +320,7 @@ class Client(Services):
         if call:
             self.replies[call] = answer
         if name == "publisher+":
-            self.connect([what["publisher"]])
-            if what.get("is_new"):
-                self.expect_all_of(what["publisher"]["publisher"]["id"])
+            self.listed(what)
         elif name == "publisher-":
             self.unlisted(what)
         elif name == "renewed" and what.get("again"):
@@ -354,6 +352,11 @@ class Client(Services):
 
     def in_topics(self, what: Mapping[str, Any]) -> list[Mapping[str, Any]]:
         return [each for topic in what.get("topics", ()) for each in topic["publishers"]]
+
+    def listed(self, what: Mapping[str, Any]) -> None:
+        self.connect([what["publisher"]])
+        if what.get("is_new"):
+            self.expect_all_of(what["publisher"]["publisher"]["id"])
 
     def connect(self, remotes: Any) -> None:
         for remote in remotes:
