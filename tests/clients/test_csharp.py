@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -18,6 +19,8 @@ import zmq
 import nep
 from nep.masters.master import Master
 from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, ROOT, WITHOUT, MonoProgram, program, running
+from tests.nep.backends.test_unheard_publishers import UnreachablePublisher
+from tests.nep.masters.test_attacks import attacker_at
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
@@ -310,6 +313,22 @@ def test_slow_subscriber_counts_its_losses_exactly(node: Node) -> None:
         except AssertionError:
             raise AssertionError(seen[-3:]) from None
         assert slow.end() == 0
+
+
+def test_messages_of_new_publishers_that_cannot_be_reached_are_lost(adapter: Adapter, master: Master) -> None:
+    topics = (("t", False), ("*", True))
+    subs = [
+        adapter.ask("subscriber", topic=name, type="json", pattern=is_pattern)["sub"]
+        for name, is_pattern in topics
+    ]
+    with socket.socket() as closed, attacker_at(master) as connection:
+        closed.bind(("127.0.0.1", 0))
+        publisher = UnreachablePublisher(connection, f"tcp://127.0.0.1:{closed.getsockname()[1]}")
+        publisher.register()
+        publisher.renew(100)
+        for sub in subs:
+            eventually(lambda sub=sub: adapter.ask("counts", sub=sub)["lost"] == "100")
+            assert adapter.ask("counts", sub=sub)["received"] == "0"
 
 
 def test_services_are_called_in_both_directions(adapter: Adapter, node: Node) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import random
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,10 @@ import msgpack
 import numpy as np
 import pytest
 
+from nep.backends.zeromq.loss import HeardPublishers
+from nep.errors import WireError
 from nep.messages import image_codec
+from nep.protocol.requests import PublisherRecord, RemotePublisher
 from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
 from tests.nep import bad_pictures as bad
 
@@ -115,6 +119,70 @@ def test_filters_and_notices_are_read_and_written_as_in_the_vectors(wire: MonoPr
         assert header["header"] == vector["parts"][1]
         for field in ("seq", "stamp_ns", "publisher"):
             assert header[field] == vector["means"][field], vector["name"]
+
+
+STEPS = (
+    *(
+        "listed",
+        "expect",
+        "arrived",
+        "arrived",
+        "arrived",
+        "alone",
+        "early",
+        "reached",
+        "promised",
+        "promised",
+    ),
+    *("closing", "lapsed", "settle", "dropped", "forget"),
+)
+
+
+def losses_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
+    """Apply steps to a new subscriber's losses; return each result, then received and lost messages."""
+    sources = HeardPublishers()
+
+    def connect(id: int, history: int) -> None:
+        record = PublisherRecord(id, "t", "json", "json", history=history)
+        source = sources.listed(RemotePublisher(record, "n", "name"))
+        source.is_lapsed, source.ends_at = False, None
+
+    do: dict[str, Callable[[int, int], object]] = {
+        "listed": connect,
+        "expect": lambda id, _number: sources.expect_all_of(id),
+        "arrived": lambda id, number: sources.arrived(id, number, is_alone=False),
+        "alone": lambda id, number: sources.arrived(id, number, is_alone=True),
+        "early": lambda id, _number: sources.is_early(id),
+        "reached": sources.reached,
+        "promised": sources.promised,
+        "closing": lambda id, number: sources.closing(id, number, 0.0),
+        "lapsed": sources.lapsed,
+        "settle": lambda id, _number: sources.settle(id),
+        "dropped": lambda _id, number: sources.dropped(number),
+        "forget": lambda id, _number: sources.pop(id),
+    }
+    results: list[object] = []
+    for step, id, number in steps:
+        try:
+            result = do[step](id, number)
+            results.append(result if isinstance(result, bool) else None)
+        except WireError as error:
+            results.append(error.code)
+    return [*results, sources.received, sources.lost]
+
+
+def test_losses_are_counted_as_in_python(wire: MonoProgram) -> None:
+    chance = random.Random(34)
+    for _ in range(1000):
+        steps = [("expect", 1, 0), ("listed", 1, chance.choice((0, 3)))]
+        for _ in range(chance.randrange(1, 25)):
+            number = chance.choice((chance.randrange(1, 20), 2**33 + chance.randrange(3)))
+            small = chance.randrange(1, 20)
+            step = chance.choice(STEPS)
+            is_leap = chance.random() < 0.05 and step in {"arrived", "reached", "promised"}
+            steps.append((step, chance.randrange(1, 3), number if is_leap else small))
+        asked = " ".join(":".join(map(str, each)) for each in steps)
+        assert json.loads(wire.ask(f"loss {asked}")) == losses_in_python(steps), asked
 
 
 @pytest.mark.parametrize("order", [">", "<"])

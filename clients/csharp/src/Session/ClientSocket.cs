@@ -137,7 +137,7 @@ namespace Nep.Session
             }
         }
 
-        public void Connect(RemotePublisher remote)
+        public void Connect(RemotePublisher remote, bool isNew)
         {
             ZmtpEndpoint endpoint;
             lock (_lock)
@@ -190,7 +190,7 @@ namespace Nep.Session
                 }
                 foreach (RemotePublisher each in remotes)
                 {
-                    Connect(each);
+                    Connect(each, false);
                 }
             }
         }

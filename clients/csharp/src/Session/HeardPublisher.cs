@@ -11,8 +11,11 @@ namespace Nep.Session
         public RemotePublisher Remote;
         public SubConnection Connection;
 
-        /// <summary>Newest message heard; null before the first message, echo or bye.</summary>
+        /// <summary>Newest message that was received or counted as lost; null while unknown, 0 if all are still to come.</summary>
         public ulong? Last;
+
+        /// <summary>Whether a message, an echo or a bye was received.</summary>
+        public bool IsHeard;
 
         public bool HasEchoed;
         public bool IsLapsed;
@@ -75,6 +78,13 @@ namespace Nep.Session
             return source;
         }
 
+        /// <summary>Count losses from the first message of a new publisher. Has no effect once it was heard.</summary>
+        public void ExpectAllOf(ulong publisher)
+        {
+            HeardPublisher source = Get(publisher);
+            source.Last = source.Last ?? 0;
+        }
+
         public HeardPublisher Remove(ulong publisher)
         {
             HeardPublisher found = Find(publisher);
@@ -88,6 +98,7 @@ namespace Nep.Session
         public bool Arrived(ulong publisher, ulong seq, bool isAlone)
         {
             HeardPublisher source = Get(publisher);
+            source.IsHeard = true;
             if (source.Last == null)
             {
                 source.Last = seq;
@@ -127,7 +138,7 @@ namespace Nep.Session
         public bool IsEarly(ulong publisher)
         {
             HeardPublisher source = Find(publisher);
-            if (source == null || source.HasEchoed || source.Last != null || source.Remote == null || source.Remote.Publisher.History <= 1)
+            if (source == null || source.HasEchoed || source.IsHeard || source.Remote == null || source.Remote.Publisher.History <= 1)
             {
                 return false;
             }
@@ -139,6 +150,7 @@ namespace Nep.Session
         public bool Reached(ulong publisher, ulong seq)
         {
             HeardPublisher source = Get(publisher);
+            source.IsHeard = true;
             if (source.Last != null && seq > source.Last && seq - source.Last > MaxGap)
             {
                 return false;

@@ -25,7 +25,10 @@ namespace Nep.Session
 
         Dictionary<object, object> Statistics();
 
-        void Connect(RemotePublisher remote);
+        /// <summary>Connect to a publisher; twice is once.</summary>
+        /// <param name="remote">Publisher that the master lists.</param>
+        /// <param name="isNew">Whether it was created after this subscriber was registered: losses count from its first message.</param>
+        void Connect(RemotePublisher remote, bool isNew);
 
         /// <summary>Whether it subscribes to a topic.</summary>
         bool Hears(string topic);
@@ -153,7 +156,7 @@ namespace Nep.Session
                     }
                     foreach (RemotePublisher remote in ReadRemotes(reply.List("publishers")))
                     {
-                        subscriber.Connect(remote);
+                        subscriber.Connect(remote, false);
                     }
                 });
             }
@@ -292,7 +295,8 @@ namespace Nep.Session
             else if (name == "publisher+")
             {
                 RemotePublisher remote = RemotePublisher.Read(what.Map("publisher"), _address);
-                EachSubscriberOf(remote.Publisher.Topic, each => each.Connect(remote));
+                bool isNew = what.Flag("is_new");
+                EachSubscriberOf(remote.Publisher.Topic, each => each.Connect(remote, isNew && IsConfirmed(each.Record.Id)));
             }
             else if (name == "publisher-")
             {
@@ -338,6 +342,15 @@ namespace Nep.Session
                 {
                     action(each);
                 }
+            }
+        }
+
+        /// <summary>Whether the master has answered the registration of a publisher or subscriber.</summary>
+        private bool IsConfirmed(ulong id)
+        {
+            lock (_lock)
+            {
+                return _confirmed.Contains(id);
             }
         }
 
@@ -403,12 +416,7 @@ namespace Nep.Session
             IList<string> hosts = Hosts();
             foreach (ISessionPublisher each in publishers)
             {
-                bool isConfirmed;
-                lock (_lock)
-                {
-                    isConfirmed = _confirmed.Contains(each.Record.Id);
-                }
-                if (isConfirmed && each.Move(hosts))
+                if (IsConfirmed(each.Record.Id) && each.Move(hosts))
                 {
                     _calls.Tell("publisher+", new Dictionary<object, object> { { "node", _node.ToMap() }, { "publisher", each.Record.ToMap() } }, null);
                 }

@@ -81,12 +81,12 @@ namespace Nep.Session
             return TopicPattern.Matches(Record.Topic, topic);
         }
 
-        public void Connect(RemotePublisher remote)
+        public void Connect(RemotePublisher remote, bool isNew)
         {
             SubscriberSocket member = MemberOf(remote.Publisher.Topic, true);
             if (member != null)
             {
-                member.Connect(remote);
+                member.Connect(remote, isNew);
             }
         }
 

@@ -96,7 +96,7 @@ namespace Nep.Session
             }
         }
 
-        public void Connect(RemotePublisher remote)
+        public void Connect(RemotePublisher remote, bool isNew)
         {
             lock (_lock)
             {
@@ -110,6 +110,10 @@ namespace Nep.Session
                 }
                 LeaveOthersAt(remote);
                 HeardPublisher source = _sources.Listed(remote);
+                if (isNew && remote.Endpoint != null)
+                {
+                    _sources.ExpectAllOf(remote.Publisher.Id);
+                }
                 if (remote.Endpoint == null || source.Connection != null && source.Connection.Endpoint == remote.Endpoint)
                 {
                     return;
@@ -164,7 +168,7 @@ namespace Nep.Session
                 }
                 foreach (RemotePublisher each in remotes)
                 {
-                    Connect(each);
+                    Connect(each, false);
                 }
             }
         }

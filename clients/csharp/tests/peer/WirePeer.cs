@@ -1,6 +1,7 @@
 using System;
 using System.Collections.Generic;
 using System.Globalization;
+using Nep.Session;
 using Nep.Wire;
 using Newtonsoft.Json.Linq;
 
@@ -57,10 +58,76 @@ internal static class WirePeer
             case "id":
                 string key = words[1] == "e9" ? "\u00e9" : words[1];
                 return words.Length == 2 ? Ids.NodeId(key) : Ids.Id(key, long.Parse(words[2], CultureInfo.InvariantCulture)).ToString(CultureInfo.InvariantCulture);
+            case "loss":
+                return Losses(words);
             case "image":
                 return JToken.FromObject(Nep.ImageHeader.Describe(FromHex(words[1])));
             default:
                 throw new WireException("malformed");
+        }
+    }
+
+    /// <summary>Applies steps to the losses of a new subscriber; returns what each step returned, then received and lost messages.</summary>
+    private static JToken Losses(string[] words)
+    {
+        var sources = new HeardPublishers();
+        var results = new JArray();
+        for (int i = 1; i < words.Length; i++)
+        {
+            string[] step = words[i].Split(':');
+            ulong publisher = ulong.Parse(step[1], CultureInfo.InvariantCulture);
+            ulong number = ulong.Parse(step[2], CultureInfo.InvariantCulture);
+            try
+            {
+                results.Add(Lose(sources, step[0], publisher, number));
+            }
+            catch (WireException exception)
+            {
+                results.Add(exception.Code);
+            }
+        }
+        results.Add(sources.Received);
+        results.Add(sources.Lost);
+        return results;
+    }
+
+    private static JToken Lose(HeardPublishers sources, string step, ulong publisher, ulong number)
+    {
+        switch (step)
+        {
+            case "listed":
+                var record = new PublisherRecord { Id = publisher, History = (int)number };
+                sources.Listed(new RemotePublisher { Publisher = record });
+                return null;
+            case "expect":
+                sources.ExpectAllOf(publisher);
+                return null;
+            case "arrived":
+                return sources.Arrived(publisher, number, false);
+            case "alone":
+                return sources.Arrived(publisher, number, true);
+            case "early":
+                return sources.IsEarly(publisher);
+            case "reached":
+                return sources.Reached(publisher, number);
+            case "promised":
+                sources.PromisedBy(publisher, number);
+                return null;
+            case "closing":
+                sources.Closing(publisher, number);
+                return null;
+            case "lapsed":
+                sources.Lapsed(publisher, number);
+                return null;
+            case "settle":
+                sources.Settle(publisher);
+                return null;
+            case "dropped":
+                sources.Dropped((int)number);
+                return null;
+            default:
+                sources.Remove(publisher);
+                return null;
         }
     }
 
