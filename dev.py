@@ -36,7 +36,7 @@ from pathlib import Path
 
 from tools.computer import ROOT, Computer, Trouble, end, timed, venv_python
 from tools.fuzz import fuzz
-from tools.system_packages import bring_mono, bring_system_packages
+from tools.system_packages import bring_system_packages, bring_test_packages
 from tools.versions import environment, pip, versions
 
 PYTHONS = ((3, 10), (3, 13))
@@ -228,7 +228,7 @@ def run(computer: Computer, command: str, arguments: Sequence[str]) -> int:
     if command not in {"versions", "fuzz"}:  # which have nothing of Qt's, and so ask nothing of the system
         bring_system_packages(computer)
     if command == "test":
-        bring_mono(computer)
+        bring_test_packages(computer)
     if command == "setup":
         make_environment(computer, ROOT, "dev")
         code = 0

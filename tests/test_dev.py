@@ -122,21 +122,31 @@ def test_an_ordinary_user_gets_the_one_line_to_type() -> None:
     assert system.ran == []
 
 
-def test_mono_is_installed_for_root_and_named_to_others(capsys: pytest.CaptureFixture[str]) -> None:
-    system = FakeSystem(listed=set(system_packages.MONO))
-    system_packages.bring_mono(system.computer(root=False))
+def test_packages_of_tests_are_installed_for_root_and_named_to_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    names = {name for packages in system_packages.TEST_PACKAGES.values() for name in packages}
+    system = FakeSystem(listed=names)
+    system_packages.bring_test_packages(system.computer(root=False))
     assert system.ran == []
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in names)
+    system_packages.bring_test_packages(system.computer())
+    assert system.installed >= names
+    ran = len(system.ran)
+    system_packages.bring_test_packages(system.computer())
+    assert len(system.ran) == ran
+
+
+def test_missing_packages_of_tests_do_not_keep_others_from_being_installed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    mono, *others = system_packages.TEST_PACKAGES.values()
+    system = FakeSystem(served={name for packages in others for name in packages})
+    system_packages.bring_test_packages(system.computer())
+    assert system.installed.isdisjoint(mono)
+    assert system.installed >= {name for packages in others for name in packages}
     assert "mono-mcs" in capsys.readouterr().out
-    system_packages.bring_mono(system.computer())
-    assert set(system_packages.MONO) <= system.installed
-    system.ran.clear()
-    system_packages.bring_mono(system.computer())
-    assert system.ran == []
-
-
-def test_mono_that_cannot_be_had_is_no_failure(capsys: pytest.CaptureFixture[str]) -> None:
-    system_packages.bring_mono(FakeSystem().computer())
-    assert "skipped" in capsys.readouterr().out
 
 
 def test_bringing_them_is_a_command_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,8 +41,19 @@ QT_LIBRARIES = (
 )
 
 
-MONO = ("mono-mcs", "mono-runtime", "libnewtonsoft-json5.0-cil")
-"""Packages that compile and run the C# client in tests; without them these tests are skipped."""
+TEST_PACKAGES = {
+    "the C# client": ("mono-mcs", "mono-runtime", "libnewtonsoft-json5.0-cil"),
+    "ROS 1": (
+        "python3-rospy",
+        "python3-rosmaster",
+        "python3-std-msgs",
+        "python3-std-srvs",
+        "python3-sensor-msgs",
+        "python3-geometry-msgs",
+    ),
+    "nanocat": ("nanomsg-utils",),
+}
+"""Packages that some tests need, by what they test; without them these tests are skipped."""
 
 
 def wanted_packages(computer: Computer) -> list[str]:
@@ -97,21 +108,23 @@ def bring_system_packages(computer: Computer) -> None:
         apt_install(computer, missing, names, unknown)
 
 
-def bring_mono(computer: Computer) -> None:
-    """Install mono for the tests of the C# client, as root; otherwise print that they are skipped."""
+def bring_test_packages(computer: Computer) -> None:
+    """Install `TEST_PACKAGES` as root; otherwise print which tests are skipped and what to install."""
     if not computer.has_apt:
         return
-    lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *MONO]).splitlines()
-    missing = [name for name in MONO if f"{name} installed" not in lines]
-    if not missing:
-        return
-    try:
-        if not computer.root:
-            raise Trouble(f"sudo apt-get install -y --no-install-recommends {' '.join(missing)}")
-        with timed("bringing mono with apt for the C# client"):
-            apt_install(computer, missing, *available(computer, missing))
-    except Trouble as trouble:
-        print(f"· The tests of the C# client are skipped without mono: {trouble}")
+    names = [name for packages in TEST_PACKAGES.values() for name in packages]
+    lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *names]).splitlines()
+    for tested, packages in TEST_PACKAGES.items():
+        missing = [name for name in packages if f"{name} installed" not in lines]
+        if not missing:
+            continue
+        try:
+            if not computer.root:
+                raise Trouble(f"sudo apt-get install -y --no-install-recommends {' '.join(missing)}")
+            with timed(f"bringing {len(missing)} packages with apt to test {tested}"):
+                apt_install(computer, missing, *available(computer, missing))
+        except Trouble as trouble:
+            print(f"· Tests of {tested} are skipped: {trouble}")
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
