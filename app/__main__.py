@@ -47,29 +47,35 @@ _log = logging.getLogger("studio")
 def window_parser() -> argparse.ArgumentParser:
     """The options of ``python -m app``."""
     made = argparse.ArgumentParser(
-        prog="nep-studio", description=_("NEP Studio. `nep-studio run FILE` runs a behaviour with no window.")
+        prog="nep-studio",
+        description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window."),
     )
     made.add_argument("files", nargs="*", type=Path, metavar="FILE", help=_("behaviours to open"))
     made.add_argument(
-        "--new-window", action="store_true", help=_("a window of its own, although Studio runs already")
+        "--new-window",
+        action="store_true",
+        help=_("open a separate window even if Studio is already running"),
     )
     made.add_argument(
-        "--demo", action="store_true", help=_("begin with the virtual robot and the first example")
+        "--demo", action="store_true", help=_("start with the virtual robot and the first example")
     )
-    made.add_argument("--master", metavar="HOST:PORT", help=_("the master to join"))
+    made.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
     made.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
-    made.add_argument("--theme", choices=("light", "dark", "system"), help=_("its colours"))
+    made.add_argument("--theme", choices=("light", "dark", "system"), help=_("colour theme"))
     made.add_argument(
-        "--self-drive", metavar="DIR", type=Path, help=_("do the main job alone; screenshots go to DIR")
+        "--self-drive",
+        metavar="DIR",
+        type=Path,
+        help=_("run the main job without a person; screenshots go to DIR"),
     )
     made.add_argument(
         "--selftest",
         metavar="DIR",
         type=Path,
-        help=_("try whether all of Studio works; a report goes to DIR"),
+        help=_("test whether all of Studio works; write a report to DIR"),
     )
     made.add_argument(
-        "--no-web", dest="web", action="store_false", help=_("with --selftest: without the block editor")
+        "--no-web", dest="web", action="store_false", help=_("with --selftest: skip the block editor")
     )
     return made
 
@@ -79,25 +85,29 @@ def run_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="nep-studio run",
         description=_(
-            "Run a behaviour with no window. Exit codes: 0 ended well; 1 a block failed or a "
-            "robot did not stop; 2 the file can't be run; 3 a robot of it is not there; 4 a real "
-            "robot would move and may not; 130 stopped by Ctrl+C."
+            "Run a behaviour without a window. Exit codes: 0 finished; 1 a block failed or a robot did "
+            "not stop; 2 the file can't be run; 3 one of its robots is missing; 4 a real robot would "
+            "move and is not allowed to; 130 stopped by Ctrl+C."
         ),
     )
     made.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))
     made.add_argument(
-        "--robot-wait", type=float, metavar="S", default=10.0, help=_("wait for its robots, in seconds")
+        "--robot-wait",
+        type=float,
+        metavar="S",
+        default=10.0,
+        help=_("how long to wait for its robots, in seconds"),
     )
-    made.add_argument("--master", metavar="HOST:PORT", help=_("the master to join"))
+    made.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
     made.add_argument(
         "--allow-moving",
         action="store_true",
-        help=_("let robots move that are not virtual; Ctrl+C stops them"),
+        help=_("allow real robots to move; Ctrl+C stops them"),
     )
     made.add_argument(
         "--keep-position",
         action="store_true",
-        help=_("begin where the virtual robots are, not at their start position"),
+        help=_("start where the virtual robots are instead of at their start position"),
     )
     return made
 
@@ -140,7 +150,7 @@ def _main(given: Sequence[str]) -> int:
     if options.selftest is not None:
         return end_process(self_test(options.selftest, web=options.web))
     if not options.web:
-        parser.error(_("--no-web belongs to --selftest"))
+        parser.error(_("--no-web needs --selftest"))
     gc.disable()  # a tenth of the time to start; the window collects by itself (`app.ui.startup.interpreter`)
     # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
     importlib.import_module("app.core.session")
@@ -184,7 +194,7 @@ def self_test(folder: Path, *, web: bool) -> int:
         return 2
 
     def show() -> int:
-        test.begin("program", _("the program is loaded"))
+        test.begin("program", _("the program was loaded"))
         importlib.import_module("app.core.session")
         allow_many()
         from app.ui.self_test import show_steps  # noqa: PLC0415  what can't be loaded is in the report
@@ -193,7 +203,7 @@ def self_test(folder: Path, *, web: bool) -> int:
 
     gc.disable()  # as at every start of the window
     code = test.run(show)
-    words = test.report.why or _("the self-test went well")
+    words = test.report.why or _("the self-test passed")
     with suppress(OSError, ValueError):  # nobody may read it: the report is what counts
         (sys.stderr if code else sys.stdout).write(f"{words}: {test.place.folder}\n")
     return code
@@ -217,7 +227,7 @@ def hand_over(module: str, arguments: Sequence[str]) -> int:
     """Become the process of one of our modules; 2 when it is none of them."""
     if module not in PROCESSES:
         sys.stderr.write(
-            _("no process '{module}'; there are {names}").format(module=module, names=", ".join(PROCESSES))
+            _("no process '{module}'; available: {names}").format(module=module, names=", ".join(PROCESSES))
             + "\n"
         )
         return 2

@@ -76,7 +76,7 @@ class SettingsError(AppError):
         """Make the sentence from the file's name and the reason."""
         self.path = path
         self.reason = reason
-        super().__init__(_("settings can't be kept in '{path}': {reason}").format(path=path, reason=reason))
+        super().__init__(_("can't save settings in '{path}': {reason}").format(path=path, reason=reason))
 
 
 class BackpackError(AppError):
@@ -91,9 +91,7 @@ class ReportError(AppError):
         self.path = path
         self.reason = reason
         super().__init__(
-            _("{file} can't be written ({reason}); {advice}").format(
-                file=path.name, reason=reason, advice=advice
-            )
+            _("can't write {file} ({reason}); {advice}").format(file=path.name, reason=reason, advice=advice)
         )
 
 

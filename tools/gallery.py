@@ -55,7 +55,7 @@ def row(*widgets: QWidget) -> QWidget:
 
 
 def _buttons(theme: Theme) -> list[QWidget]:
-    run = RunButton(theme, "Run", "play", widest="Go on")
+    run = RunButton(theme, "Run", "play", widest="Resume")
     run.set_filled(True)
     idle = RunButton(theme, "Pause", "pause")
     idle.setEnabled(False)
@@ -119,7 +119,7 @@ def _rest(theme: Theme) -> list[QWidget]:
     )
     card = Card(theme)
     inside = QVBoxLayout(card)
-    inside.addWidget(label("Make a new behaviour", "heading"))
+    inside.addWidget(label("Create a behaviour", "heading"))
     inside.addWidget(label("Start with an empty page.", "bodyLarge", role="textSecondary"))
     empty = EmptyState(
         theme,

@@ -41,7 +41,7 @@ LATE_S = 10.0
 """What waited for a master for longer is not sent any more: who knows what is so by then."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
-NOT_CARRIED = lazy("an alarm can't do what it is to do: {error}")
+NOT_CARRIED = lazy("an alarm can't carry out its action: {error}")
 _MOST_BYTES = 4_000_000
 MILD = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
 """What is a warning; the rest is an error."""
@@ -159,8 +159,8 @@ class SessionAlarms:
         """Whether one more may be added: no file holds more."""
         if len(self.rules) < MOST_ALARMS:
             return True
-        said = _("There are {count} alarms, and no more can be kept.").format(count=MOST_ALARMS)
-        hint = _("Delete one that you do not need.")
+        said = _("You have {count} alarms, the maximum.").format(count=MOST_ALARMS)
+        hint = _("Delete one you don't need.")
         self._session.alerts.put(
             "alarms:most", "warn", said, hint, button=_("Show the alarms"), action=SHOW, count=0
         )
@@ -215,7 +215,8 @@ class SessionAlarms:
         if asked is not None and self._session.fleet.permission.question is not asked.question:
             self._asked = None
             asked.done(
-                False, _("not sent: {robots} may not move").format(robots=listed(asked.question.names))
+                False,
+                _("not sent: {robots} is not allowed to move").format(robots=listed(asked.question.names)),
             )
 
     def check(self) -> None:
@@ -232,8 +233,8 @@ class SessionAlarms:
             self._session.alerts.put(
                 "alarms:kept",
                 "warn",
-                _("Alarms can't be kept."),
-                _("They are watched until Studio ends: {reason}.").format(reason=error.strerror or error),
+                _("Alarms can't be saved."),
+                _("Alarms stay active until Studio closes: {reason}.").format(reason=error.strerror or error),
                 count=0,
             )
 
@@ -302,19 +303,19 @@ class SessionAlarms:
     def _sound(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         speaker = self._session.voices.speaker
         if speaker is None:
-            done(False, _("there is no sound here"))
+            done(False, _("sound is not available"))
             return
         speaker.play(SOUND, VOLUME)
         done(True, _("sound"))
 
     def _keep(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         if self.keep is None:
-            done(False, _("nothing was kept: nothing is being recorded"))
+            done(False, _("nothing saved: recording is off"))
         else:
             self.keep(event, action, done)
 
     def _run(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        why_not = _("there is no window") if self.run_behaviour is None else self.run_behaviour(action.name)
+        why_not = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
         if why_not:
             done(False, _("“{name}” was not run: {reason}").format(name=action.name, reason=why_not))
         else:
@@ -322,13 +323,13 @@ class SessionAlarms:
 
     def _stop(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         self._session.runs.stop()
-        done(True, _("all robots were told to stop"))
+        done(True, _("Stop was sent to all robots"))
 
     def _send(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         """Send a message; what moves a real robot once a person has said that it may."""
         fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
-            done(False, _("not sent: the question whether a robot may move is not answered yet"))
+            done(False, _("not sent: waiting for permission to move a robot"))
             return
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=what_words(event.rule.condition, event.seen)
@@ -352,7 +353,7 @@ class SessionAlarms:
 
         def job(node: Node) -> None:
             if self._clock() - asked > LATE_S:
-                done(False, _("no master was there"))
+                done(False, _("there was no master"))
             else:
                 self._commands.carry(node, action, done)
 

@@ -70,8 +70,8 @@ class Console:
         if dropped:
             self.left_out += dropped
             words = ngettext(
-                "{count} log record was left out: too many at once",
-                "{count} log records were left out: too many at once",
+                "{count} log record was dropped: too many at once",
+                "{count} log records were dropped: too many at once",
                 dropped,
             )
             self.add("warn", "studio", words.format(count=dropped))
@@ -125,7 +125,7 @@ class Console:
         return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
-            given.node or given.name or _("somebody"),
+            given.node or given.name or _("someone"),
             _cut(given.text),
             logger="" if given.name == given.node else given.name,
             place=place,

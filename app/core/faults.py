@@ -211,7 +211,9 @@ class FaultAlerts:
         except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
             english, told = what.format(**holes), _(what).format(**holes)
             _log.exception("can't %s", english)
-            self._failed(english, _("It can't {what}: {error}").format(what=told, error=error_words(error)))
+            self._failed(
+                english, _("Studio can't {what}: {error}").format(what=told, error=error_words(error))
+            )
         else:
             if self._faults and what in self._faults:
                 self._faults[what].is_well = True
@@ -240,7 +242,7 @@ class FaultAlerts:
             self._tell(self._faults[what], count=1)  # of others and of how often the log tells
 
     def _tell(self, fault: _Fault, *, count: int) -> None:
-        title = _("Something went wrong in Studio. It may show old values.")
+        title = _("Something went wrong in Studio. It may show outdated values.")
         self._alerts.put(
             ALERT, "error", title, fault.said, button=_("Show the log"), action="help.log", count=count
         )

@@ -78,7 +78,7 @@ else:
     replay_module = lazy_module("app.core.recording.replay.replay")
 
 CHECK_S = 1.0
-NO_WATCH = lazy("can't watch over the robots: {error}")
+NO_WATCH = lazy("can't monitor the robots: {error}")
 LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """Topics of the Console."""
 
@@ -290,10 +290,10 @@ class Session:
         now, now_ns = self._clock(), self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
-            with self.guarded(lazy("take over {event}"), event=type(event).__name__):
+            with self.guarded(lazy("handle {event}"), event=type(event).__name__):
                 self._on_event(event, now)
         self._on_messages(drained, now)
-        with self.guarded(lazy("let topics and nodes age")):
+        with self.guarded(lazy("update the ages of topics and nodes")):
             live = self.live
             live.topics.age(now, now_ns)
             live.nodes.age(now)
@@ -303,18 +303,18 @@ class Session:
                 self._tick_replay(self.replay, now)
         with self.guarded(lazy("follow the robots")):
             self._follow_robots()
-        with self.guarded(lazy("watch over the alarms")):
+        with self.guarded(lazy("monitor the alarms")):
             self.alarms.tick()
-        with self.guarded(lazy("see to what is sent by hand")):
+        with self.guarded(lazy("send messages by hand")):
             self.acting.tick()
-        with self.guarded(lazy("let the robots be heard")):
+        with self.guarded(lazy("play the robots' voices")):
             self.voices.follow()
-        with self.guarded(lazy("tell the program of its robots")):
+        with self.guarded(lazy("tell the program about its robots")):
             self.runs.follow_robots()
         with self.guarded(lazy("stop robots again")):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
-        with self.guarded(lazy("follow what was started here")):
+        with self.guarded(lazy("follow started programs")):
             self.launcher.follow()
         with self.guarded(lazy("show the run")):
             self.runs.tick()
@@ -340,25 +340,25 @@ class Session:
 
     def _check(self, now: float) -> None:
         self._faults.check()
-        with self.guarded(lazy("keep the alarms")):
+        with self.guarded(lazy("save the alarms")):
             self.alarms.check()
             self.acting.check()
-        with self.guarded(lazy("look after the recorder")):
+        with self.guarded(lazy("monitor the recorder")):
             self.recordings.check()
-        with self.guarded(lazy("keep which tabs are open")):
+        with self.guarded(lazy("save the open tabs")):
             self.tabs.follow()
-        with self.guarded(lazy("check what was started here")):
+        with self.guarded(lazy("check started programs")):
             self.launcher.check()
             self.last_robots.keep(self.launcher)
             if self.master.kind == "none" and self._start_processes:
                 self.launcher.keep_master()
             self.web_pages.check()
-        with self.guarded(lazy("count what was missed")):
+        with self.guarded(lazy("count lost messages")):
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
-        with self.guarded(lazy("tell what is wrong with Stop")):
+        with self.guarded(lazy("report problems with Stop")):
             self._look_for_problems_of_stop()
-        with self.guarded(lazy("check what is wrong")):
+        with self.guarded(lazy("check for problems")):
             self._health.check(self.runs.used, self.launcher.virtual_robots)
             self.documents.unkept()
             self._health.journal(self.documents.journal_error)
@@ -379,7 +379,7 @@ class Session:
             ("end what is sent by hand", self.acting.close),
             ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
             ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
-            ("keep the alarms", self.alarms.close),
+            ("save the alarms", self.alarms.close),
             ("end the behaviours", self.documents.end),
             ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
@@ -428,18 +428,18 @@ class Session:
     def _on_messages(self, drained: Drained, now: float) -> None:
         batches, others = by_network(drained.batches)
         for topic, batch in batches.items():
-            with self.guarded(lazy("take over messages of {topic}"), topic=topic):
+            with self.guarded(lazy("receive messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
         for key, batch in others.items():
-            with self.guarded(lazy("take over messages of {topic}"), topic=key):
+            with self.guarded(lazy("receive messages of {topic}"), topic=key):
                 self.live.networks.add(key, batch, now)
-        with self.guarded(lazy("take over what is plotted")):
+        with self.guarded(lazy("update the plots")):
             self.live.series.add(drained.batches)
         with self.guarded(lazy("count messages")):
             self.traffic.add(batches, now)
-        with self.guarded(lazy("take over what robots say")):
+        with self.guarded(lazy("update the robots")):
             self.fleet.add(batches)
-        with self.guarded(lazy("take over what is said of the room")):
+        with self.guarded(lazy("update the room")):
             self.room.add_messages(batches)
             self.room.tick()
         with self.guarded(lazy("check messages")):
@@ -454,7 +454,7 @@ class Session:
                     "{count} events were lost because the window was busy.",
                     drained.lost_events,
                 ).format(count=drained.lost_events),
-                _("What panels show may be out of date for a second."),
+                _("Panels may be up to a second out of date."),
                 count=drained.lost_events,
             )
 
@@ -488,14 +488,14 @@ class Session:
                     "error",
                     event.sentence,
                     event.detail.splitlines()[-1] if event.detail else "",
-                    button=_("Start it again") if event.is_robot else _(ASK_DOCTOR),
+                    button=_("Restart it") if event.is_robot else _(ASK_DOCTOR),
                     action=f"connect:{event.what}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
                 self.alerts.put(
                     f"watch:{event.topic}",
                     "warn",
-                    _("{topic} can't be read.").format(topic=event.topic),
+                    _("{topic} can't be decoded.").format(topic=event.topic),
                     event.sentence,
                 )
             case (
@@ -555,8 +555,8 @@ class Session:
             self.alerts.put(
                 "master",
                 "warn",
-                _("The master has gone; a new one is being started."),
-                _("Programs that are connected go on; new ones can't join until it is back."),
+                _("The master disappeared; starting a new one."),
+                _("Connected programs keep running; new ones can't join until it is back."),
                 button=_(ASK_DOCTOR),
                 action="help.doctor",
             )

@@ -163,7 +163,7 @@ class DiffDrive:
             if self.wheels.still():
                 return
             waited.wait(0.005)
-        raise Failed(_("its wheels go on turning"))
+        raise Failed(_("its wheels keep turning"))
 
     # ---- steering ---------------------------------------------------------------------------------
 
@@ -253,7 +253,7 @@ class Pattern(DiffDrive):
 
     def __init__(self, link: Link) -> None:
         raise Failed(
-            _("{robot} has no wheels; its driver must bring them, as app.robots.turtle does").format(
+            _("{robot} has no wheels; its driver must provide them, as app.robots.turtle does").format(
                 robot=link.name
             )
         )

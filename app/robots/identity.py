@@ -92,7 +92,7 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
         return None
-    return _("{topic} says that it is {robot}, which is announced on {home} only; it is left out").format(
+    return _("{topic} announces {robot}, which belongs to {home} only; it is ignored").format(
         topic=topic, robot=robot.name, home=home
     )
 
@@ -157,7 +157,7 @@ def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
             continue
         for other in known:
             if is_home(other.name, topic) or topic in reserved(other):
-                return _("{robot} says that {topic} is its own, which belongs to {other}").format(
+                return _("{robot} claims {topic}, which belongs to {other}").format(
                     robot=robot.name, topic=topic, other=other.name
                 )
     return None

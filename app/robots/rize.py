@@ -103,7 +103,7 @@ def from_answer(message: object) -> dict[str, object] | None:
     first = as_part(primitives[0] if isinstance(primitives, list) and primitives else primitives)
     action = bounded_str(first.get("primitive") or "")
     error = _(_FAILED).format(
-        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("do it")
+        robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("perform it")
     )
     return {
         "id": wanted,

@@ -280,7 +280,7 @@ class VirtualPepper(Acting):
         with self._life.changed:
             self._life.body.halt()
         if not self._life.wait_for(lambda: self._life.body.still, timeout_s=2.0):
-            raise Failed(_("the virtual robot goes on moving"))
+            raise Failed(_("the virtual robot keeps moving"))
 
 
 ROBOT = Kind(

@@ -95,7 +95,7 @@ def make_application() -> QApplication:
     translate_qt(application)
     refused = fonts.load()
     if refused:
-        words = _("Qt can't use the fonts {fonts}; others stand in").format(fonts=", ".join(refused))
+        words = _("Qt can't load the fonts {fonts}; using others").format(fonts=", ".join(refused))
         sys.stderr.write(f"{words}\n")
     return application
 
@@ -159,10 +159,10 @@ def tell_of_what_was_found(session: Session) -> None:
         session.alerts.put(
             "journal:newer",
             "warn",
-            _("A newer NEP Studio has unsaved work here: {names}.").format(
+            _("A newer version of NEP Studio has unsaved work here: {names}.").format(
                 names=listed([f"“{name}”" for name in names])
             ),
-            _("Start that version to put it back."),
+            _("Start that version to restore it."),
         )
 
 
@@ -268,13 +268,13 @@ def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
         return ""
     if not any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")):
         return _(
-            "there is no screen here (DISPLAY and WAYLAND_DISPLAY are not set); start it where you see a "
-            "desktop, or run a behaviour with no window: nep-studio run FILE"
+            "no screen found (DISPLAY and WAYLAND_DISPLAY are not set). Start Studio on a desktop, or "
+            "run a behaviour without a window: nep-studio run FILE"
         )
     if user == 0 and not environ.get("QTWEBENGINE_DISABLE_SANDBOX"):
         return _(
-            "the block editor's browser refuses to run as root with its sandbox; start Studio as another "
-            "user, or, where nothing else can be done, set QTWEBENGINE_DISABLE_SANDBOX=1"
+            "The block editor's browser can't run as root with its sandbox. Start Studio as another "
+            "user or, if there is no other way, set QTWEBENGINE_DISABLE_SANDBOX=1"
         )
     return ""
 

@@ -309,7 +309,7 @@ class _Watching:
                 self._keeper = self._node.new_client(KEEP_SERVICE, timeout_s=KEEP_S)
             self._keeper.call_async(asked).add_done_callback(lambda ended: _tell_kept(ended, done))
         except NepError as error:
-            done(False, _("nothing was kept: {reason}").format(reason=error))
+            done(False, _("nothing saved: {reason}").format(reason=error))
 
     def _ring(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         if sys.stderr.isatty():
@@ -330,11 +330,11 @@ class _Watching:
 def _tell_kept(ended: Future[object], done: Done) -> None:
     error = None if ended.cancelled() else ended.exception()
     if error is not None or ended.cancelled():
-        done(False, _("nothing was kept: {reason}").format(reason=error or ""))
+        done(False, _("nothing saved: {reason}").format(reason=error or ""))
     else:
         told = ended.result()
         path = told.get("path") if isinstance(told, dict) else ""
-        done(True, _("kept {file}").format(file=path))
+        done(True, _("saved {file}").format(file=path))
 
 
 def _nothing(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:

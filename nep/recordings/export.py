@@ -143,7 +143,9 @@ def _wanted(
         topics = [name for name in topics if counts.get(name)]
     if not any(counts.values()):
         is_all = part.start_ns is None and part.end_ns is None
-        reason = _("it holds no message that can be read") if is_all else _("nothing of it came in that part")
+        reason = (
+            _("it has no message that can be decoded") if is_all else _("nothing of it came in that part")
+        )
         raise RecordingError(str(recording.path), reason)
     return topics, _Counted(sum(counts.values()), progress)
 

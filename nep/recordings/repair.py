@@ -127,7 +127,7 @@ def repair(
                 counts = mending.run()
                 first_ns, last_ns = _read_back(unfinished, mending.writer)
                 if not counts.recovered:
-                    raise RecordingError(str(path), _("it holds no message that can be read"))
+                    raise RecordingError(str(path), _("it has no message that can be decoded"))
                 replace_file(unfinished, target)
             finally:
                 mending.writer.close()

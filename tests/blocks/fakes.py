@@ -109,7 +109,7 @@ class Play:
         return self
 
     def end(self, timeout_s: float = LONG_S) -> Play:
-        assert self.runtime.finished.wait(timeout_s), "the program has not ended"
+        assert self.runtime.finished.wait(timeout_s), "the program is still running"
         return self
 
     def stop(self) -> None:

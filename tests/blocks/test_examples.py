@@ -120,7 +120,7 @@ def test_the_behaviour_of_the_designs_picture_has_the_problems_of_the_picture():
     program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
     assert [problem.sentence for problem in program.problems] == [
         "NAO is not connected, so wave will be skipped.",
-        "wait until may wait for ever if nobody comes.",
+        "wait until waits forever if no one appears.",
     ]
     assert program.starts == 3
 

@@ -102,9 +102,9 @@ def test_rounds():
 
 
 def test_errors_in_words():
-    assert explain(OverflowError(), "÷", "b").sentence == "“÷” gives a value that is too large."
+    assert explain(OverflowError(), "÷", "b").sentence == "The result of “÷” is too large."
     assert explain(MemoryError(), "÷", "b").block == "b"
-    assert explain(RecursionError(), "", None).sentence == "this block has too many blocks inside each other."
+    assert explain(RecursionError(), "", None).sentence == "this block is nested too deeply."
     assert explain(KeyError("x"), "say", "b").sentence == "“say” failed: 'x'."
     inner = BehaviourError("no voice.", "inner")
     assert explain(inner, "outer", "outer").block == "inner"

@@ -55,8 +55,8 @@ def test_a_value_brings_an_alarm_on_which_calls_and_sends(session: Session) -> N
         assert {deed.kind: deed.words for deed in record.deeds} == {
             "call": "restart answered",
             "send": "sent to /say",
-            "keep": "nothing was kept: the flight recorder is off",
-            "run": "“Greeting” was not run: there is no window",
+            "keep": "nothing saved: the flight recorder is off",
+            "run": "“Greeting” was not run: no window is open",
         }
         said = alert(session, rule)
         assert said.title == "Range of /distance is 0.36, below 0.4."
@@ -85,11 +85,11 @@ def test_an_alarm_moves_a_real_robot_only_after_a_yes(session: Session, master) 
 
         assert come_on() == []
         tick_until(session, lambda: permission.question is not None)
-        assert permission.question.title == "Let Rover move?"
+        assert permission.question.title == "Allow Rover to move?"
         assert f"An alarm wants to send a message on {TOPIC}" in permission.question.sentence
         permission.answer(let=False)
         tick_until(session, lambda: session.alarms.history.records[0].deeds)
-        assert session.alarms.history.records[0].deeds[0].words == "not sent: Rover may not move"
+        assert session.alarms.history.records[0].deeds[0].words == "not sent: Rover is not allowed to move"
         session.alarms.put(AlarmRule("e", BELOW, rule.actions))
         publisher.publish({"range": 0.1})
         tick_until(session, lambda: permission.question is not None)
@@ -211,5 +211,5 @@ def test_what_waited_too_long_for_a_master_is_not_sent(tmp_path: Path) -> None:
     session.alarms._command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
     now[0] += LATE_S + 1
     jobs[0](None)
-    assert told == [(False, "no master was there")]
+    assert told == [(False, "there was no master")]
     session.close()

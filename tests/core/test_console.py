@@ -69,9 +69,9 @@ def test_what_the_window_was_too_slow_for_is_counted() -> None:
     console.take([record(text="newest")], dropped=744)
     console.take([], dropped=1)
     assert [line.text for line in console.records] == [
-        "744 log records were left out: too many at once",
+        "744 log records were dropped: too many at once",
         "newest",
-        "1 log record was left out: too many at once",
+        "1 log record was dropped: too many at once",
     ]
     assert console.left_out == 745
 

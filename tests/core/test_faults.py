@@ -194,7 +194,7 @@ def test_an_event_that_raises_takes_no_other_with_it(
     assert stopped == [done] * 29
     assert session.master.kind == "connected"
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
-    assert alert.detail.startswith("It can't take over RunnerEvent: ValueError")
+    assert alert.detail.startswith("Studio can't take over RunnerEvent: ValueError")
     assert alert.action == "help.log"
     once = RepeatFilter()
     assert sum(once.filter(record) is not None for record in caplog.records) == 2  # the first, and the tenth
@@ -268,7 +268,7 @@ def test_the_alert_of_a_fault_is_cured_when_what_failed_goes_well(
         broken.setattr(session.traffic, "add", raising)
         seconds(6)
         (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
-        assert alert.detail.startswith("It can't count messages: "), "the other one is over"
+        assert alert.detail.startswith("Studio can't count messages: "), "the other one is over"
     seconds(4)
     assert session.alerts.has("studio"), "what fails now and then does not flicker"
     seconds(2)
@@ -313,7 +313,7 @@ def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> No
     try:
         done = threading.Event()
         source.submit("do the impossible", raising)
-        source.submit("do it", lambda _node: done.set())
+        source.submit("perform it", lambda _node: done.set())
         assert done.wait(20)
         assert [e.sentence for e in events if isinstance(e, JobFailed)] == [
             "ValueError: invalid literal for int() with base 10: 'x'"

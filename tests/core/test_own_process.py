@@ -75,10 +75,10 @@ def test_what_became_of_a_behaviour_is_still_told_after_the_look_at_studios_own_
 ) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
     try:
-        session.alerts.put("program", "error", "The behaviour ended by itself.")
+        session.alerts.put("program", "error", "The behaviour ended unexpectedly.")
         session._check(0.0)
         assert [each.title for each in session.alerts.active if each.id == "program"] == [
-            "The behaviour ended by itself."
+            "The behaviour ended unexpectedly."
         ]
     finally:
         session.close()

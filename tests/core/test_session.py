@@ -124,7 +124,7 @@ def test_the_virtual_robot_is_found_watched_tried_and_stopped(session: Session) 
         tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
         assert walk.state == "canceled"
         assert link.last_stop is not None
-        assert link.last_stop.startswith("answered in ")
+        assert link.last_stop.startswith("confirmed in ")
     session.launcher.stop_virtual_robot("Pepper")
     tick_until(session, lambda: link.state == "away")
     with pytest.raises(RobotInputError):
@@ -137,7 +137,7 @@ def test_a_virtual_robot_that_died_is_told_with_its_next_step(session: Session) 
     session.launcher._robots["Pepper"][0].kill()
     tick_until(session, lambda: session.alerts.has("companion:Pepper"))
     (alert,) = [alert for alert in session.alerts.active if alert.id == "companion:Pepper"]
-    assert (alert.button, alert.action) == ("Start it again", "connect:Pepper")
+    assert (alert.button, alert.action) == ("Restart it", "connect:Pepper")
     tick_until(session, lambda: not session.fleet.connected)
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: not session.alerts.has("companion:Pepper"))
@@ -311,5 +311,5 @@ def test_a_job_on_the_network_that_failed_is_told_in_one_sentence(session: Sessi
     session._on_event(JobFailed(NO_WATCH, "the master has gone"), 0.0)
     session._on_event(JobFailed("", "nobody asked"), 0.0)
     texts = [record.text for record in session.console.records]
-    assert "can't watch over the robots: the master has gone" in texts
+    assert "can't monitor the robots: the master has gone" in texts
     assert not [text for text in texts if "nobody asked" in text]

@@ -60,8 +60,8 @@ class Fingers:
         self.studio.find(FIELD, focus=True)
         self.studio.screen.type(words)
         until(
-            lambda: entry in [row["texts"][0] for row in self.studio.rows("What fits")][1:2],
-            lambda: f"{entry} first: {[row['texts'][0] for row in self.studio.rows('What fits')][:4]}",
+            lambda: entry in [row["texts"][0] for row in self.studio.rows("Matches")][1:2],
+            lambda: f"{entry} first: {[row['texts'][0] for row in self.studio.rows('Matches')][:4]}",
         )
 
     # -- in the block editor --------------------------------------------------------------------------

@@ -64,7 +64,7 @@ def said(studio: Studio) -> str:
     buttons = [
         (each["name"] or each["text"], each["enabled"]) for each in studio.look() if each["kind"] in kinds
     ]
-    lines = [row["texts"] for row in studio.rows("What happened, newest first")][:8]
+    lines = [row["texts"] for row in studio.rows("Events, newest first")][:8]
     return f"buttons {buttons}; the Console {lines}"
 
 
@@ -78,10 +78,10 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
         write(studio, fingers, "Name of the message", "Warm light")
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
         fingers.press("Escape")  # what is offered
-        write(studio, fingers, "The message", '{"level": 0.4 "on": true}')
+        write(studio, fingers, "Message", '{"level": 0.4 "on": true}')
         studio.says("a comma is missing between two values")
         assert seen.heard == []
-        studio.click("Put it right")
+        studio.click("Fix it")
         studio.click("Arm and send")
         until(
             lambda: seen.heard == [{"level": 0.4, "on": True}],
@@ -91,16 +91,16 @@ def test_a_message_is_written_armed_and_sent_until_stop(studio: Studio, address:
         studio.click("Start sending")
         until(lambda: len(seen.heard) > 10, lambda: f"heard again: {len(seen.heard)}; {said(studio)}")
         fingers.press("F12")
-        until(lambda: not studio.all("End sending"), "Stop ends it")
+        until(lambda: not studio.all("Stop sending"), "Stop ends it")
         count = len(seen.heard)
         studio.find("Arm and send", enabled=True)
 
         fingers.do("call a serv", "Call a service")
         studio.says("1 service of 1 node")
         studio.click("JSON")  # nothing is known of what it takes
-        write(studio, fingers, "The request", '{"name": "Aiko"}')
+        write(studio, fingers, "Request", '{"name": "Aiko"}')
         studio.click("Arm and call")
         until(lambda: seen.asked == [{"name": "Aiko"}], lambda: f"called once: {seen.asked}; {said(studio)}")
-        studio.says("answered in ")
+        studio.says("confirmed in ")
         assert len(seen.heard) == count
     assert studio.quit() == 0

@@ -59,7 +59,7 @@ def test_a_click_in_a_picture_is_heard_as_its_pixel_once_that_is_armed(studio: S
         picture = until(lambda: studio.all("Picture", kind="ClickablePicture"), "a picture shows")[0]
         studio.screen.click(*middle(picture["rect"]))
         studio.screen.key("p")
-        studio.says("A click sends nothing until this is armed")
+        studio.says("Clicks send nothing until armed")
         picture = studio.find("Picture", kind="ClickablePicture")
         studio.screen.click(*middle(picture["rect"]))
         studio.click(kind="Switch", name="Armed")
@@ -74,10 +74,10 @@ def test_a_click_in_a_picture_is_heard_as_its_pixel_once_that_is_armed(studio: S
         assert abs(point["y"] - HEIGHT / 2) <= 2
         studio.says("1 point sent, heard by 1")
         Fingers(studio).press("F12")
-        studio.says("A click sends nothing until this is armed")
+        studio.says("Clicks send nothing until armed")
         studio.screen.click(*middle(picture["rect"]))
         Fingers(studio).do("sent", "Sent")
-        listed = until(lambda: studio.rows("What was sent, newest first"), "what was sent is listed")
+        listed = until(lambda: studio.rows("Sent messages, newest first"), "what was sent is listed")
         words = [" ".join(row["texts"]) for row in listed]
         assert [" /webcam/point Point (" in line for line in words] == [False, True, False]
         assert len(heard["/webcam/point"]) == 1
@@ -103,7 +103,7 @@ def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
     studio = start(str(path))
     studio.says(f"Master {address}", 60)
     with program(address, LAMP, WHEELS) as heard:
-        studio.says("Nothing is sent", 60)
+        studio.says("Sending is off", 60)
         fingers = Fingers(studio)
         studio.click(kind="Switch", name="Armed")
         studio.find("Topics that can be sent", focus=True)
@@ -114,11 +114,11 @@ def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
         studio.click("Arm and send")
         studio.says(f"{WHEELS} tells robots what to do.")
         studio.click("Cancel")
-        until(lambda: not studio.all("Let it be sent"), "the question is answered")
+        until(lambda: not studio.all("Arm sending"), "the question is answered")
         studio.click("Play")
         until(lambda: len(heard[LAMP]) >= 5, lambda: f"the lamp hears: {heard}; {texts(studio)}")
         fingers.press("F12")
-        studio.says("Nothing is sent")
+        studio.says("Sending is off")
         numbers = [each["n"] for each in heard[LAMP]]  # type: ignore[index]
         assert numbers == sorted(set(numbers))
         assert all(number % 2 == 0 for number in numbers)

@@ -33,8 +33,8 @@ def test_a_right_click_makes_an_alarm_which_tells_and_goes_off(studio: Studio) -
         thread = threading.Thread(target=talk)
         thread.start()
         try:
-            until(lambda: not studio.all("Close this message"), "the banner goes")
-            studio.click("What must be so: silent")
+            until(lambda: not studio.all("Dismiss"), "the banner goes")
+            studio.click("Condition: silent")
             studio.pick("A topic has more messages")
             studio.find("/distance has more than 100 messages a second for 2 s", kind="AlarmRow")
         finally:

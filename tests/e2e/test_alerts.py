@@ -125,14 +125,14 @@ def test_alerts_cover_nothing_and_panels_keep_what_they_show(
     studio.click("1 alert", kind="StatusItem")
     studio.find(kind="AlertsPanel")
     before = places(studio)
-    studio.click("Close this message")
+    studio.click("Dismiss")
     until(lambda: not studio.all(kind="Banner"), "the banner goes")
     assert places(studio) == before, "no strip is left, and nothing moved"
 
     with adder(address):
         fingers.do("call a serv", "Call a service")
         studio.click("Arm and call")
-        studio.says("answered in ")
+        studio.says("confirmed in ")
         panel, answer = (
             studio.find(kind="ServicesPanel")["rect"],
             studio.find("Answer", kind="TableView")["rect"],

@@ -59,7 +59,7 @@ def test_pause_holds_the_question_and_stop_takes_it_away(asking: Studio) -> None
     asking.click("Pause")
     asking.says("Paused at “")
     asking.find("Answer", kind="Button", enabled=False)
-    asking.click("Go on")
+    asking.click("Resume")
     asking.find("Answer", kind="Button", enabled=True)
     asking.screen.key("F12")
     asking.says("Pepper stopped (")

@@ -34,7 +34,7 @@ def test_blocks_go_from_one_file_to_another_and_are_there_at_the_next_start(
     before = shown(studio)
     carry(studio, "say Two", *on_the_backpack(studio))
     studio.screen.release()
-    studio.says("Put 2 blocks into the backpack")
+    studio.says("Added 2 blocks to the backpack")
     assert shown(studio) == before
     assert tabs(studio) == ["Quiz", "Greeting"], "nothing is edited"
     studio.screen.key("Tab", ["Ctrl"])

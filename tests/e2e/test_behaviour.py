@@ -36,7 +36,7 @@ def test_an_error_stands_on_its_block_as_a_sentence(with_robot: Callable[[dict],
     studio.click("Run", kind="RunButton")
     until(lambda: studio.outlined("error") == ["walk"], "the block has its error", 40)
     assert "something is in the way" in str(studio.page("document.body.textContent"))
-    studio.says("Stopped by a problem")
+    studio.says("Stopped because of an error")
 
 
 def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str) -> None:
@@ -48,7 +48,7 @@ def test_pause_step_and_go_on(with_robot: Callable[[dict], Studio], address: str
     (first,) = until(lambda: studio.outlined("stopped"), "the next block is outlined")
     studio.click("Step")
     until(lambda: studio.outlined("stopped") not in ([], [first]), "another block is next")
-    studio.click("Go on")
+    studio.click("Resume")
     until(lambda: studio.outlined("running"), "it runs")
     studio.screen.key("F12")
     studio.says("Pepper stopped (")
@@ -82,7 +82,7 @@ def test_a_robot_that_dies_is_missed_and_comes_back(with_robot: Callable[[dict],
     studio = with_robot(started(forever(turn(30))))
     (robot,) = studio.children("app.robots.simulated")
     robot.kill()
-    studio.says("The virtual robot Pepper has ended.")
+    studio.says("The virtual robot Pepper ended.")
     until(lambda: "not connected" in str(studio.page("document.body.textContent")), "the toolbox says so")
     studio.says("Pepper is not connected, so ")
     studio.click("Start a virtual Pepper")

@@ -45,8 +45,8 @@ def test_who_lost_is_told_and_mended(start: Callable[..., Studio], tmp_path: Pat
         studio.screen.key("F12")
         studio.says("Pepper stopped (")
         assert bubbles(studio)
-    with film.step("Put one after the other: one script, no problem, no warning"):
-        studio.click("Put one after the other")
+    with film.step("Run one after the other: one script, no problem, no warning"):
+        studio.click("Run one after the other")
         until(lambda: not studio.look(says=BOTH), "the problem is gone")
         until(lambda: not bubbles(studio), "the blocks have changed: the warning goes")
         inside = "document.querySelector('[data-id=one] [data-id=walk]') !== null"

@@ -29,7 +29,7 @@ def step(studio: Studio, words: str) -> None:
 
 
 def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -> None:
-    studio.says("First steps: five minutes")  # the very first start offers them
+    studio.says("First steps (five minutes)")  # the very first start offers them
     studio.click("First steps")
     step(studio, "Use the virtual robot")
     studio.click("Use the virtual robot", kind="Button")
@@ -38,7 +38,7 @@ def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -
     until(lambda: studio.page("document.querySelector('.nepRing:not([hidden])') !== null"), "the ring")
     view = studio.find(kind="QWebEngineView")["rect"]
     take(studio, "Events", "events_started", view[0] + 480, view[1] + 120)
-    step(studio, "Put “say” below it")
+    step(studio, "Place “say” below it")
     hang_below(studio, "Speech", "robot_pepper_do_say", "events_started")
     step(studio, "Press Run and listen")
     studio.click("Show me")
@@ -48,9 +48,9 @@ def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -
     assert ring[0] + ring[2] >= run[0] + run[2]
     studio.click("Run", kind="RunButton")
     until(lambda: not studio.all(kind="HintRing"), "the ring goes with the press")
-    step(studio, "Put “turn” below “say”")
+    step(studio, "Place “turn” below “say”")
     hang_below(studio, "Movement", "robot_pepper_do_turn", "robot_pepper_do_say")
-    step(studio, "Press Run, then Stop while it turns")
+    step(studio, "Press Run, then Stop while the robot turns")
     studio.says("Finished")
     studio.click("Run", kind="RunButton")
     until(lambda: studio.outlined("running"), "a block runs")
@@ -61,7 +61,7 @@ def test_six_steps_lead_to_a_robot_that_speaks_turns_and_stops(studio: Studio) -
 
 def test_after_kill_9_the_second_start_does_not_offer_them_again(start: Callable[..., Studio]) -> None:
     first = start()
-    first.says("First steps: five minutes")
+    first.says("First steps (five minutes)")
     first.kill()
     second = start()
     second.says("Learn in five minutes")

@@ -14,8 +14,8 @@ FIELD = "Find a command, panel, topic, robot or file"
 def chosen_first(studio: Studio, words: str) -> None:
     """Wait until the palette shows this as its best."""
     until(
-        lambda: words in [row["texts"][0] for row in studio.rows("What fits")][1:2],
-        lambda: f"{words} is first: {studio.rows('What fits')[:3]}",
+        lambda: words in [row["texts"][0] for row in studio.rows("Matches")][1:2],
+        lambda: f"{words} is first: {studio.rows('Matches')[:3]}",
     )
 
 

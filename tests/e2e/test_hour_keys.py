@@ -128,13 +128,13 @@ def first_steps(studio: Studio, film: Film, fingers: Fingers) -> None:
         fingers.put_down("events_started")
         done(studio, "Drag “when started” onto the page")
         fingers.find_block("say", "robot_pepper_do_say")
-        done(studio, "Put “say” below it")
+        done(studio, "Place “say” below it")
     with film.step("F5: the robot speaks"):
         fingers.press("F5")
         done(studio, "Press Run and listen")
     with film.step("A turn; F5, and F12 while it moves: all first steps are done"):
         fingers.find_block("turn", "robot_pepper_do_turn")
-        done(studio, "Put “turn” below “say”")
+        done(studio, "Place “turn” below “say”")
         fingers.press("F5")
         until(lambda: studio.outlined("running"), "it runs")
         fingers.press("F12")
@@ -182,20 +182,20 @@ def count(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("A new variable: the touches are counted"):
         fingers.to_page()
         fingers.do("new variable", "New variable")
-        studio.find("Name of the new variable", focus=True)
+        studio.find("New variable", focus=True)
         fingers.write("touches")
         fingers.press("Return")
-        until(lambda: not studio.all("Name of the new variable"), "it is made")
+        until(lambda: not studio.all("New variable"), "it is made")
         fingers.to_page()
         fingers.until_in_page("Left", "say")
         fingers.find_block("change", "variables_change")
         assert "touches" in words_of(studio, kind_of(studio, "variables_change")[0])
     with film.step("A new list: a mistake, nothing ever sets it"):
         fingers.do("new list", "New list")
-        studio.find("Name of the new list", focus=True)
+        studio.find("New list", focus=True)
         fingers.write("words")
         fingers.press("Return")
-        until(lambda: not studio.all("Name of the new list"), "it is made")
+        until(lambda: not studio.all("New list"), "it is made")
         fingers.to_page()
         fingers.find_block("append", "lists_add")
         has_problem(studio, "words")
@@ -285,7 +285,7 @@ def fight(studio: Studio, film: Film, fingers: Fingers) -> None:
         studio.says("stopped (")
     with film.step("Problems, Tab, Enter: one after the other"):
         fingers.do("problems", "Problems")
-        fingers.until_on("Tab", name="Put one after the other")
+        fingers.until_on("Tab", name="Run one after the other")
         fingers.press("Return")
         has_no_problem(studio, FIGHT)
         assert len(kind_of(studio, "events_started")) == 1
@@ -311,8 +311,8 @@ def work_in_tabs(studio: Studio, film: Film, fingers: Fingers) -> None:
 
 def restore(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("Started again: Put it back, and all is there"):
-        studio.find("Put it back")
-        fingers.until_on("Tab", name="Put it back")
+        studio.find("Restore")
+        fingers.until_on("Tab", name="Restore")
         fingers.press("Return")
         until(lambda: len(tabs(studio)) == 3, lambda: f"{tabs(studio)}")
         assert tabs(studio)[0].startswith("Quiz")
@@ -348,7 +348,7 @@ def take_back(studio: Studio, film: Film, fingers: Fingers) -> None:
 
 def picture(studio: Studio, film: Film, fingers: Fingers, home: Path) -> None:
     with film.step("A picture of the blocks: Ctrl+K, its name, Enter"):
-        fingers.do("picture", "Save a picture of the blocks")
+        fingers.do("picture", "Save blocks as image")
         studio.find(kind="FileSheet")
         studio.find(kind="QLineEdit", focus=True)
         fingers.press("Return")

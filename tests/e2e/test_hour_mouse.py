@@ -136,7 +136,7 @@ def go_the_first_steps(hour: Hour, turn: str) -> None:
     studio, film, hand = hour.studio, hour.film, hour.hand
     with film.step("Help has first steps; those that are done are checked"):
         studio.choose("Help", "First steps")
-        studio.find("Put “say” below it: the next step")
+        studio.find("Place “say” below it: the next step")
     with film.step("“say” comes between “when started” and “turn”"):
         (hat,) = kind_of(studio, "events_started")
         say = hand.below(hat, "Speech", "robot_pepper_do_say")
@@ -144,7 +144,7 @@ def go_the_first_steps(hour: Hour, turn: str) -> None:
         studio.find("Press Run and listen: the next step")
     with film.step("Run: it speaks, and what is built already is checked at once"):
         studio.click("Run", kind="RunButton")
-        studio.find("Press Run, then Stop while it turns: the next step")
+        studio.find("Press Run, then Stop while the robot turns: the next step")
     with film.step("Run again, and Stop: all six are done"):
         run(hour)
         stop(hour)
@@ -164,7 +164,7 @@ def greet(hour: Hour) -> None:
     with film.step("“wave” goes into it"):
         wave = hand.inside(condition, "Movement", "robot_pepper_do_wave")
     with film.step("The robot turns to the person again; Run: it greets who is there"):
-        studio.click("Put the robot and its room back")
+        studio.click("Reset the robot and its room")
         until(lambda: abs(hour.room.state("Pepper")["theta_deg"]) < 1, "it is where it was at first")
         run(hour)
         until(lambda: wave in studio.outlined("running"), "it waves")
@@ -182,10 +182,10 @@ def react_to_touch(hour: Hour) -> str:
         until(lambda: "cheer" in words_of(studio, sound), "the block says so")
     with film.step("A counter: a name is suggested, nothing is typed"):
         hand.press_button("Variables", "New variable")
-        at = middle(studio.find("Name of the new variable", kind="QLineEdit")["rect"])
+        at = middle(studio.find("New variable", kind="QLineEdit")["rect"])
         hour.mouse.click(*at, RIGHT)
         studio.pick("Copy")  # it becomes the name of a behaviour later
-        studio.click("Make the variable")
+        studio.click("Create")
         change = hand.below(sound, "Variables", "variables_change")
     with film.step("A list, which nothing has set yet: Problems says so"):
         add = hand.below(change, "Lists", "lists_add")
@@ -270,7 +270,7 @@ def fight(hour: Hour) -> None:
         until(lambda: any("was replaced by" in each for each in warnings(studio)), "the loser says so")
     stop(hour)
     with film.step("One click puts one after the other"):
-        studio.click("Put one after the other")
+        studio.click("Run one after the other")
         has_no_problem(studio)
         until(lambda: holds(studio, one, walk), "one script does both")
         until(lambda: not warnings(studio), "nothing warns any more")
@@ -306,9 +306,9 @@ def come_back_after_a_crash(hour: Hour, start: Callable[..., Studio]) -> None:
     hour.follow(start(HOME=str(hour.home)))
     studio = hour.studio
     with hour.film.step("The next start offers what was not saved"):
-        studio.says("Put back the unsaved work?")
+        studio.says("Restore unsaved work?")
     with hour.film.step("One click: all is back, and the tab that was worked on shows"):
-        studio.click("Put it back")
+        studio.click("Restore")
         until(lambda: blocks_of(studio) == before, lambda: f"{blocks_of(studio)} is not {before}")
         assert tabs(studio) == names
         studio.says("2 robots", 60)  # they come back, too
@@ -348,7 +348,7 @@ def pack_for_another(hour: Hour) -> None:
 def keep(hour: Hour) -> None:
     studio, film = hour.studio, hour.film
     with film.step("A picture of all blocks: where, and as what"):
-        studio.choose("File", "Save a picture of the blocks")
+        studio.choose("File", "Save blocks as image")
         studio.find(kind="FileSheet")
     with film.step("It is saved"):
         studio.click("Save", kind="Button")

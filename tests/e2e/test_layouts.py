@@ -51,7 +51,7 @@ def test_panels_come_back_as_they_were_left(start: Callable[..., Studio]) -> Non
     studio.click("Open the Developer layout")
     first = settled(studio, lambda now: set(now) == {"topics", "inspector", "image", "console"})
 
-    studio.click("More about Inspector")
+    studio.click("Options of Inspector")
     studio.pick("Close")
     wide = settled(studio, lambda now: set(now) == {"topics", "image", "console"})["topics"]
     window = studio.find(kind="MainWindow")["rect"]
@@ -61,14 +61,14 @@ def test_panels_come_back_as_they_were_left(start: Callable[..., Studio]) -> Non
     studio.screen.glide(edge - 150, high)
     until(lambda: panels(studio)["topics"][2] < wide[2] - 140, "the panel follows the mouse")
     studio.screen.release()
-    studio.click("More about Image")
+    studio.click("Options of Image")
     studio.pick("Float")
     left = settled(studio, lambda now: len(now["image"]) == 2)
     assert studio.quit() == 0
 
     again = start()  # shows the layout that was left
     settled(again, lambda now: set(now) == set(left) and all(close(now[name], left[name]) for name in left))
-    again.choose("View", "Put the panels back")
+    again.choose("View", "Reset panels")
     settled(
         again, lambda now: set(now) == set(first) and all(close(now[name], first[name]) for name in first)
     )

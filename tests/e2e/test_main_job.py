@@ -42,7 +42,7 @@ def test_topics_inspector_and_pictures_are_live(studio: Studio, address: str) ->
         assert new["chip"] == "new"
         assert publisher.subscribers == 0, "nothing is subscribed until somebody looks"
         studio.screen.click(*middle(studio.row("Topics", "/weather")["rect"]))
-        until(lambda: publisher.subscribers == 1, "a click on the topic subscribes it")
+        until(lambda: publisher.subscribers == 1, "a click on the topic subscribes to it")
         for degrees in (21.5, -3):
             publisher.publish({"degrees": degrees, "sky": {"clouds": [1, 2]}})
             until(

@@ -33,7 +33,7 @@ def delete_the_script(studio: Studio) -> None:
 
 def add_a_block(studio: Studio) -> None:
     """By the keyboard: find it in the toolbox of the tab that shows."""
-    studio.choose("Edit", "Find a block to add")
+    studio.choose("Edit", "Find and add a block")
     until(lambda: studio.page("document.activeElement.type") == "search", "the keys go to the field")
     studio.screen.type("wait")
     studio.spot(".nepTab:not([hidden]) .blocklyFlyout .control_wait")
@@ -60,9 +60,9 @@ def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_pa
     studio.kill()
 
     again = start()
-    again.says("Put back the unsaved work?")
-    again.says("“Mine” was not saved when Studio ended last time.")
-    again.click("Put it back")
+    again.says("Restore unsaved work?")
+    again.says("“Mine” wasn't saved before Studio closed.")
+    again.click("Restore")
     until(lambda: set(again.blocks()) == edited, "every block is back")
     assert path.read_bytes() == saved, "the file is as it was last saved"
     again.click("Blocks")
@@ -73,7 +73,7 @@ def test_work_is_offered_again_after_kill_9(start: Callable[..., Studio], tmp_pa
 
     third = start()
     until(lambda: set(third.blocks()) == edited, "what was worked on last shows")
-    assert not third.all("Put it back")
+    assert not third.all("Restore")
     third.choose("File", "Start page")
     third.find(kind="StartPage")
     assert third.quit() == 0
@@ -104,7 +104,7 @@ def test_after_kill_9_the_tab_that_was_worked_on_shows_and_all_stand_in_their_or
     studio.kill()
 
     again = start()
-    again.click("Put it back")
+    again.click("Restore")
     order = ["One", "New behaviour, not saved", "Two", "Three, not saved"]
     until(lambda: tabs(again) == order, "all tabs are back, in their order")
     until(lambda: again.page(WAITS), "the one that was worked on shows, with its block")
@@ -122,7 +122,7 @@ def test_what_is_thrown_away_is_not_offered_again(start: Callable[..., Studio], 
     until(lambda: list((studio.home / "journal").glob("*.json")), "the edit is kept")
     studio.kill()
     again = start()
-    again.click("Throw it away")
+    again.click("Discard")
     until(lambda: not list((studio.home / "journal").glob("*.json")), "it is thrown away")
     assert again.quit() == 0
 

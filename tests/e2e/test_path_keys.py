@@ -47,7 +47,7 @@ def run(studio: Studio, film: Film, fingers: Fingers) -> None:
     with film.step("F5: the block that runs now glows"):
         fingers.press("F5")
         until(lambda: studio.outlined("running"), "a block glows", 40)
-    with film.step("F8: the program waits, the robot holds still"):
+    with film.step("F8: the program waits, the robot is paused"):
         fingers.press("F8")
         studio.says("Paused at “")
     with film.step("F10: one block"):

@@ -61,12 +61,12 @@ def test_a_persons_path_with_the_mouse_alone(start: Callable[..., Studio], tmp_p
         studio.click("Run", kind="RunButton")
         until(lambda: studio.outlined("running"), "a block glows", 40)
         studio.find("Pause", kind="RunButton", enabled=True)
-    with film.step("Pause: the program waits, the robot holds still"):
+    with film.step("Pause: the program waits, the robot is paused"):
         studio.click("Pause", kind="RunButton")
         studio.says("Paused at “")
         until(lambda: studio.outlined("stopped"), "the next block is outlined")
-    with film.step("Go on"):
-        studio.click("Go on", kind="RunButton")
+    with film.step("Resume"):
+        studio.click("Resume", kind="RunButton")
         until(lambda: studio.outlined("running"), "it glows again")
     with film.step("Stop: every robot has answered"):
         studio.click("Stop", kind="StopButton")

@@ -43,7 +43,7 @@ def odometry(address: str) -> Iterator[None]:
 
 
 def curves(studio: Studio) -> list[str]:
-    return [row["texts"][2] for row in studio.rows("Curves and their figures")]
+    return [row["texts"][2] for row in studio.rows("Curves and their values")]
 
 
 def coloured(studio: Studio) -> int:
@@ -75,8 +75,8 @@ def test_a_value_is_dragged_from_the_inspector_and_another_typed(studio: Studio,
         studio.screen.key("Return")
         until(lambda: len(curves(studio)) == 2, "what was typed is plotted")
         studio.screen.key(" ")
-        studio.says("paused, the data goes on")
+        studio.says("paused; data is still recorded")
         studio.screen.key("m")
-        studio.says("Min, max and mean are between A and B")
-        studio.click("Go on")
+        studio.says("Min, max and mean between A and B")
+        studio.click("Resume")
     assert studio.quit() == 0

@@ -36,7 +36,7 @@ def test_what_was_published_while_it_recorded_is_in_the_file(studio: Studio) -> 
         studio.click("Show")
         studio.find(path.stem, kind="ElidedLabel")
         studio.screen.key("F2")
-        studio.find("Name of the recording")
+        studio.find("Recording name")
         studio.screen.type("my tour")
         studio.screen.key("Return")
         until((folder / "my tour.mcap").exists, "it has another name")

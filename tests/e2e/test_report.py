@@ -16,7 +16,7 @@ from tests.e2e.studio import END_S, Studio
 from tests.e2e.waiting import until
 
 pytestmark = pytest.mark.timeout(240)
-OFFER = "Studio ended unexpectedly last time."
+OFFER = "Studio closed unexpectedly last time."
 
 
 def kept(studio: Studio) -> list[str]:
@@ -39,7 +39,7 @@ def has_looked_back(studio: Studio) -> None:
     """What a start does before it can be found by others."""
     until(lambda: Path(place(studio.home)).exists(), "it can be found")
     studio.choose("Help", "About NEP Studio")
-    studio.says("Copy the versions")
+    studio.says("Copy version information")
     studio.screen.key("Escape")
 
 
@@ -53,10 +53,10 @@ def test_a_native_crash_is_offered_once_and_its_report_is_written(
     again = start()
     again.says(OFFER)
     again.click("Report a problem", kind="Button")
-    again.says("1 report of a crash")
+    again.says("1 crash report")
     again.screen.type("it went away")
-    again.click("Write the report")
-    again.find(name="Name of the file")
+    again.click("Write report")
+    again.find(name="File name")
     again.screen.key("a", ["Ctrl"])
     again.screen.type(str(documents / "report.zip"))
     again.screen.key("Return")
@@ -88,7 +88,7 @@ def test_an_end_by_the_system_is_told_once_and_one_that_was_asked_for_is_not(
     again.says(OFFER)
     report = next((again.home / "log" / "crashes").glob("*.txt")).read_text("utf-8")
     assert "without a word" in report
-    again.click("Close this message")
+    again.click("Dismiss")
     again.process.send_signal(signal.SIGTERM)
     assert again.process.wait(END_S) == 0
     third = start()
@@ -106,7 +106,7 @@ def test_a_robot_and_an_editor_that_crash_are_reported_and_the_next_start_offers
     studio.says("Pepper is connected", within_s=END_S)
     (robot,) = studio.children("app.robots.simulated")
     robot.send_signal(signal.SIGSEGV)
-    studio.says("The virtual robot Pepper has ended.", within_s=END_S)
+    studio.says("The virtual robot Pepper ended.", within_s=END_S)
     until(lambda: [name for name in kept(studio) if "robot" in name], "it is reported")
     renderers = until(lambda: renderers_of(studio), "the editor's page has its process")
     renderers[0].send_signal(signal.SIGSEGV)

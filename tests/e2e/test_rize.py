@@ -53,7 +53,7 @@ def test_blocks_drive_it_without_a_window(driver: Peer, tmp_path: Path) -> None:
     words = ("-m", "app", "run", str(turtle(tmp_path)), "--robot-wait", "30", "--allow-moving")
     with Program(*words) as program:
         assert program.wait(60) == 0, program.lines
-        program.says("Turtle: stop sent; this robot cannot confirm")
+        program.says("Turtle: Stop sent; this robot can't confirm")
     heard(driver)
 
 
@@ -65,6 +65,6 @@ def test_the_window_finds_it_and_blocks_drive_it(
     studio.open_category("Speech")
     studio.screen.key("Escape")
     studio.click("Run", kind="RunButton")
-    studio.click("Let it move")  # it is no virtual robot, and its program walks
+    studio.click("Allow motion")  # it is no virtual robot, and its program walks
     heard(driver)
     studio.says("Turtle cannot confirm")

@@ -47,7 +47,7 @@ def turning(start: Callable[..., Studio], tmp_path: Path) -> Studio:
     path = write(tmp_path / "Turning.nepb", started(forever(turn(300))), speech)
     studio = start(str(path))
     studio.choose("Robots", "Use the virtual Pepper")
-    studio.says("Pepper is coming")
+    studio.says("Pepper is starting")
     studio.says("Pepper ready", 40)
     studio.spot("[data-id=turn]")
     studio.click("Run", kind="RunButton")

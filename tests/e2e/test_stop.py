@@ -170,7 +170,7 @@ def settings(studio: Studio) -> None:
 
 def a_name_that_is_typed(studio: Studio) -> None:
     studio.screen.key("s", ["Ctrl", "Shift"])
-    studio.find("Name of the file", focus=True)
+    studio.find("File name", focus=True)
     studio.screen.key("a", ["Ctrl"])
     studio.screen.type("Half")
 
@@ -197,7 +197,7 @@ def test_one_press_on_stop_whatever_is_open(turning: Studio) -> None:
                 turning.screen.key("Escape")
                 until(lambda: not menus(turning) and not turning.all(kind="Scrim"), "all is closed")
     turning.screen.type("way")
-    name = "Name of the file"
+    name = "File name"
     until(lambda: turning.find(name, focus=True)["text"] == "Halfway", "it is typed where it was")
     turning.screen.key("Escape")
     until(lambda: not turning.all(kind="FileSheet"), "the sheet has the keys")
@@ -221,4 +221,4 @@ def test_a_program_that_is_killed_leaves_no_robot_moving(turning: Studio) -> Non
     (program,) = turning.children("app.blocks.runtime.child")
     program.kill()
     stands_still(turning)
-    turning.says("The behaviour ended by itself.")
+    turning.says("The behaviour ended unexpectedly.")

@@ -27,7 +27,7 @@ def test_a_tab_is_renamed_with_its_file_and_back(start: Callable[..., Studio], t
     assert field["text"] == "Greeting"
     studio.screen.type("Quiz")
     studio.screen.key("Return")
-    studio.says("There is a file “Quiz” in ")
+    studio.says("A file named “Quiz” already exists in ")
     assert taken.read_bytes() == content
     studio.screen.key("End")
     studio.screen.type(" for class")

@@ -67,7 +67,7 @@ def test_tabs_from_the_first_start_to_the_next(start: Callable[..., Studio], tmp
 
     again = start()  # shows what was worked on last, not the start page
     until(lambda: tabs(again) == ["One", "Two, not saved", "Three"], "the tabs are there again", 30)
-    assert not again.all("Put it back"), "nothing is asked after an end in order"
+    assert not again.all("Restore"), "nothing is asked after an end in order"
     until(lambda: "say Three" in shown(again), "the one that showed", 30)
 
 

@@ -29,7 +29,7 @@ def test_the_robots_of_the_last_start_come_back_until_they_are_put_away(start: C
 
     third = start()
     third.says("Pepper ready", 40)
-    third.choose("Robots", "Put the virtual robots away")
+    third.choose("Robots", "Remove virtual robots")
     until(lambda: not third.children("app.robots.simulated"), "its program has ended")
     assert third.quit() == 0
 

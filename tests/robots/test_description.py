@@ -93,7 +93,7 @@ def test_inputs_are_checked_with_sentences_for_people():
     turn, say, light = robot.action("turn"), robot.action("say"), robot.action("light")
     assert turn.check({"angle": 400}) == ("turn: angle must be between -360 and 360 °",)
     assert turn.check({"angle": "x"}) == ("turn: angle must be a number",)
-    assert turn.check({"angel": 3}) == ("turn: there is no “angel”; did you mean “angle”?",)
+    assert turn.check({"angel": 3}) == ("turn: unknown name “angel”; did you mean “angle”?",)
     assert turn.check({"direction": "up"}) == ("turn: direction must be left or right",)
     assert turn.check([]) == ("turn: the input must be an object with named values",)
     assert say.check({}) == ("say: text is missing",)
@@ -132,18 +132,18 @@ def broken(change) -> tuple[str, ...]:
         (lambda d: d["actions"]["turn"]["input"]["properties"]["angle"].update(default=400),
          "actions.turn.input.angle: the default must be between -360 and 360 °"),
         (lambda d: d["actions"]["turn"]["rb:block"]["text"].update(en="turn %wings"),
-         "actions.turn.rb:block.text.en uses %wings, which is not described"),
+         "actions.turn.rb:block.text.en uses %wings, which is not defined"),
         (lambda d: d["events"]["touched"].update({"rb:filter": ["where"]}),
          "events.touched.rb:filter names 'where', which is not in its data"),
         (lambda d: d["rb:safeStop"].update(action="halt"),
-         "rb:safeStop.action names 'halt', but there is no such action"),
+         "rb:safeStop.action names 'halt', which is not an action"),
         (lambda d: d["rb:safeStop"].update(action="say"),
          "'say' is the safe stop, so its input must not require anything"),
         (lambda d: d["actions"]["turn"]["input"].update({"$ref": "http://example.org"}),
-         "actions.turn.input uses $ref, which is not allowed here; write the part out"),
+         "actions.turn.input uses $ref, which is not supported; write the definition in place"),
         (lambda d: d.update({"rb:profile": 2}), "rb:profile must be 1"),
         (lambda d: d["events"].update(state={}),
-         "'state' names two things of one robot; its topics would be the same"),
+         "'state' is used for two things of one robot; their topics would be the same"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_a_sentence(change, sentence):
@@ -278,7 +278,7 @@ def test_what_is_shown_of_it_is_read_again(value):
         (NUMBERS, [1, "a"], "value 2 must be a number"),
         ({**NUMBERS, "minItems": 2}, [1], "must have at least 2 values"),
         ({**NUMBERS, "maxItems": 1}, [1, 2], "must have at most 1 value"),
-        ({"type": "array"}, [object()], "value 1 is nothing that a list can hold"),
+        ({"type": "array"}, [object()], "value 1 can't be an item of a list"),
         ({"type": "array", "items": NUMBERS}, [[1], ["b"]], "value 2 value 1 must be a number"),
         ({"type": "object", "additionalProperties": {"type": "integer"}}, {"a": 1.5},
          "“a” must be a whole number"),
@@ -317,7 +317,7 @@ def test_a_huge_description_is_refused_before_it_is_decoded():
     described = td_for(model("pepper"), "Pepper")
     described["description"] = "x" * 1_000_000
     message = message_of(json.dumps(described).encode())
-    with pytest.raises(DescriptionError, match=r"it has 1\.0 MB, and at most 1 MB are read"):
+    with pytest.raises(DescriptionError, match="it has 1\\.0 MB; the limit is 1 MB"):
         announced(message)
     assert message.decoded is UNDECODED
 

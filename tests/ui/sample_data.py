@@ -90,7 +90,7 @@ VALUES: Mapping[str, object] = {
 PROBLEMS = (
     Problem("warning", "b8", "robot", "wave", "NAO is not connected, so wave will be skipped.",
             "Show the robots", "connect:NAO", icon="hand"),
-    Problem("info", "b3", "control", "wait until", "wait until may wait for ever if nobody comes.",
+    Problem("info", "b3", "control", "wait until", "wait until waits forever if no one appears.",
             "Add a time limit", "add_time_limit", icon="hourglass"),
 )  # fmt: skip
 

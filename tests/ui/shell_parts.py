@@ -22,7 +22,7 @@ NAMES = {
     "robots": ("Robots", ()),
     "camera": ("Camera", ()),
     "image": ("Image", ("image",)),
-    "sensors": ("Sensors now", ()),
+    "sensors": ("Live sensors", ()),
     "health": ("Health", ()),
     "topics": ("Topics", ()),
     "inspector": ("Inspector", ("*",)),

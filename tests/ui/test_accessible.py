@@ -169,7 +169,7 @@ def test_an_alert_that_counts_on_is_no_news(qtbot, window, commands: Commands, s
     for count in (1, 2, 12):
         alerts.put("message:/bad", "warn", f"{count} messages can't be read.")
         window.tick()
-    assert said == ["1 messages can't be read."]
+    assert said == ["1 messages can't be decoded."]
     alerts.resolve("message:/bad")
     alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
     window.tick()

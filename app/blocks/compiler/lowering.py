@@ -137,7 +137,7 @@ class Lowering:
         text = " ".join((name, *(f"{_plain(each.name)} %{gap.name}" for each, gap in gaps)))
         made = replace(block, type=f"{block.type}:{placed.id}", text=text)
         if function is None:
-            sentence = _("The function “{name}” is not here. Define it, or delete this block.").format(
+            sentence = _("The function “{name}” is missing. Define it, or delete this block.").format(
                 name=name
             )
             made = replace(

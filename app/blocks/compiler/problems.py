@@ -59,7 +59,7 @@ class ProblemCollector:
         subject = pgettext("block", "when started")
         self._note(
             "warning", None, None, subject,
-            _("Nothing starts these blocks. Put “{start}” above them.").format(start=subject),
+            _("These blocks have no start. Put “{start}” above them.").format(start=subject),
             mend=_("Add “when started”"), mend_action=f"add:{_STARTER}",
         )  # fmt: skip
 
@@ -67,17 +67,17 @@ class ProblemCollector:
         """Blocks that hang under nothing."""
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
-            words = _("{block} is a value that nothing uses. Put it into a gap of another block.")
+            words = _("{block} isn't used. Drag it into an empty slot of another block.")
             self._note("info", placed, block, name, words.format(block=name))
             return
-        sentence = _("{block} does not run. Put it below “{start}”.")
+        sentence = _("{block} doesn't run. Put it below “{start}”.")
         start = pgettext("block", "when started")
         self._note("info", placed, block, name, sentence.format(block=name, start=start))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
         """A block where it can't stand; the editor does not let this happen, a file may."""
         name = self.label(placed, block)
-        sentence = _("{block} can't stand there. It is kept and skipped.")
+        sentence = _("{block} can't be used here. It is kept but skipped.")
         self._note("warning", placed, block, name, sentence.format(block=name))
 
     def too_deep(self, placed: Placed) -> None:
@@ -87,8 +87,7 @@ class ProblemCollector:
         self._note(
             "error", placed, block, name,
             _(
-                "{block} has too many blocks inside each other. Put inner parts into variables or scripts of "
-                "their own."
+                "{block} is nested too deeply. Move inner blocks to variables or scripts of their own."
             ).format(block=name),
         )  # fmt: skip
 
@@ -133,7 +132,7 @@ class ProblemCollector:
     def never_sent(self, placed: Placed, block: Block, name: str) -> None:
         """A script that waits for a broadcast which no block sends."""
         subject = f"“{name}”"
-        sentence = _("Nothing broadcasts {name}, so this script does not run.").format(name=subject)
+        sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
         self._note("info", placed, block, subject, sentence)
 
     def conflict(self, found: Conflict) -> None:
@@ -152,14 +151,14 @@ class ProblemCollector:
         )  # fmt: skip
         self._note(
             "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
-            mend=_("Put one after the other") if found.put else None,
+            mend=_("Run one after the other") if found.put else None,
             mend_action=f"after:{':'.join(found.put)}" if found.put else None,
         )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
         """A field with something that its block can't use."""
         name = self.label(placed, block)
-        sentence = _("{block} {what_is_wrong}. It is kept and skipped.")
+        sentence = _("{block} {what_is_wrong}. It is kept but skipped.")
         self._note("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
@@ -247,8 +246,8 @@ class ProblemCollector:
                 self._note(
                     "warning", placed, block, name,
                     _(
-                        "The file does not say the name of the variable in “{block}”. Name it, or choose "
-                        "another variable in the block."
+                        "The variable in “{block}” has no name in this file. Name it, or choose another "
+                        "variable in the block."
                     ).format(block=name),
                     mend=_("Name it"), mend_action=f"variable.rename:{id}",
                 )  # fmt: skip
@@ -289,7 +288,7 @@ class ProblemCollector:
             if (inner and inner[0].enabled) or not argument.is_there(placed.fields):
                 continue
             name = self.label(placed, block)
-            sentence = _("{block} needs {what}. Put one into the gap.").format(
+            sentence = _("{block} needs {what}. Drag one into its slot.").format(
                 block=name, what=_(_NEEDS[argument.check])
             )
             self._note("error", placed, block, name, sentence)
@@ -313,7 +312,7 @@ class ProblemCollector:
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
             who, name = listed(real), self.label(placed, block)
-            said = _("{block} on {topic} moves {robots}: you are asked before it does, and Stop stops it.")
+            said = _("{block} on {topic} moves {robots}. Studio asks before it does, and Stop stops it.")
             self._note("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
 
     def _for_ever(self, placed: Placed, block: Block) -> str:
@@ -321,8 +320,8 @@ class ProblemCollector:
         condition = placed.inputs["CONDITION"][0]
         words = reading(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
         if any(word in words for word in ("face", "person", "people")):
-            return _("{block} may wait for ever if nobody comes.").format(block=name)
-        return _("{block} may wait for ever if that never happens.").format(block=name)
+            return _("{block} waits forever if no one appears.").format(block=name)
+        return _("{block} waits forever if that never happens.").format(block=name)
 
     def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
         """What the robot would refuse, as far as it is written in the block."""

@@ -194,7 +194,7 @@ class ChoiceField(Field):
                 return value
         if self.source is not None:
             return "" if saved is None else str(saved)
-        raise FieldError(_("has no choice “{saved}”").format(saved=saved))
+        raise FieldError(_("has no option “{saved}”").format(saved=saved))
 
     def translated(self, say: Say) -> Argument:
         """What people choose from, unless these are names of robots."""
@@ -341,7 +341,7 @@ def _number(saved: object) -> int | float:
     except (ValueError, OverflowError):
         raise FieldError(_("needs a number")) from None
     if not math.isfinite(number):
-        raise FieldError(_("needs a number that is not endless"))
+        raise FieldError(_("needs a finite number"))
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
 
 

@@ -92,11 +92,13 @@ class Out:
             if self._left == 0:
                 self.send(
                     "print",
-                    text=_("nothing more is shown: {count} lines are enough").format(count=MOST_LINES),
+                    text=_("no more lines are shown: the limit of {count} is reached").format(
+                        count=MOST_LINES
+                    ),
                 )
         if self._dropped:
             self.send(
-                "print", text=_("{count} lines were left out: too many at once").format(count=self._dropped)
+                "print", text=_("{count} lines were dropped: too many at once").format(count=self._dropped)
             )
             self._dropped = 0
 
@@ -344,9 +346,9 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     except BehaviourError as error:
         out.send("error", block=error.block, sentence=error.sentence)
     except (AppError, NepError) as error:
-        out.send("error", block=None, sentence=_("The program can't begin: {error}.").format(error=error))
+        out.send("error", block=None, sentence=_("The program can't start: {error}.").format(error=error))
     except (KeyError, TypeError, ValueError, SyntaxError) as error:
-        out.send("error", block=None, sentence=_("The program can't be read: {error}.").format(error=error))
+        out.send("error", block=None, sentence=_("The program can't be loaded: {error}.").format(error=error))
     out.send("ended", ok=False, elapsed_s=0.0, silent=[])
     return 1
 

@@ -41,13 +41,13 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
     if isinstance(error, ZeroDivisionError):
         return BehaviourError(_("{name} can't divide by 0.").format(name=name), block)
     if isinstance(error, (OverflowError, MemoryError)):
-        return BehaviourError(_("{name} gives a value that is too large.").format(name=name), block)
+        return BehaviourError(_("The result of {name} is too large.").format(name=name), block)
     if isinstance(error, RecursionError):
-        return BehaviourError(_("{name} has too many blocks inside each other.").format(name=name), block)
+        return BehaviourError(_("{name} is nested too deeply.").format(name=name), block)
     if isinstance(error, TypeError):
         if "NoneType" in str(error):
             return BehaviourError(
-                _("{name} needs a value that is not known yet.").format(name=name), block, unknown=True
+                _("{name} needs a value, but it has none yet.").format(name=name), block, unknown=True
             )
         return BehaviourError(
             _("{name} can't do this with {kinds}.").format(name=name, kinds=_kinds(str(error))), block

@@ -159,8 +159,8 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobo
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
         _(
-            "{count} programs say that they are {robot}: {first} was first and is the robot; "
-            "{others} changes nothing."
+            "{count} programs announce themselves as {robot}. {first} was first and is used; {others} "
+            "is ignored."
         ).format(
             count=len(each.twins) + 1,
             robot=each.robot.name,
@@ -176,7 +176,7 @@ def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobo
         if claim is None:
             robots[name] = there[name]
         else:
-            claims.append(_("{claim}; {robot} is left out.").format(claim=claim, robot=name))
+            claims.append(_("{claim}; {robot} is ignored.").format(claim=claim, robot=name))
     owners = {
         each.robot.name: each.owner
         for each in asked.values()

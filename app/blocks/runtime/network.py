@@ -285,7 +285,7 @@ class Network:
 
     def stop_words(self, name: str) -> str:
         """What is wrong with the stop of a robot: its own words when it refused, without a full stop."""
-        return self._refused.get(name) or _("{robot} did not answer").format(robot=name)
+        return self._refused.get(name) or _("{robot} did not respond").format(robot=name)
 
     def _serving(self, robot: Robot) -> set[str]:
         """The nodes that must answer a stop: the robot's own, and others that answer its commands."""

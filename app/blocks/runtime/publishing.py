@@ -44,7 +44,7 @@ class PublishGuard:
             who = listed(names)
             raise BehaviourError(
                 _(
-                    "Publishing on {topic} would move {who}, and nobody was asked whether it may. Stop "
-                    "the behaviour and run it again."
+                    "Publishing on {topic} would move {who}, which has not been allowed. Stop the behaviour "
+                    "and run it again."
                 ).format(topic=topic, who=who)
             )

@@ -49,7 +49,7 @@ class Questions:
     def ask(self, words: object) -> None:
         """Ask and wait for the answer; BehaviourError where nobody can answer."""
         if self._asked is None:
-            raise BehaviourError(_("Nobody can answer: the behaviour runs outside of Studio."))
+            raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
         self.answer = as_value(self._answer_to(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
@@ -58,7 +58,7 @@ class Questions:
         BehaviourError where nobody can answer, and where there is nothing or too much to choose from.
         """
         if self._asked is None:
-            raise BehaviourError(_("Nobody can answer: the behaviour runs outside of Studio."))
+            raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
         offered = offers(choices)
         chosen = self._answer_to(text(words), tuple(offered))
         value = offered.get(chosen, "")
@@ -102,12 +102,12 @@ def offers(choices: object) -> dict[str, object]:
             found.setdefault(words, item)
         if len(found) > MOST_CHOICES:
             raise BehaviourError(
-                _("A question has room for {most} choices; this list has {count}.").format(
+                _("A question can have at most {most} choices; this list has {count}.").format(
                     most=MOST_CHOICES, count=len(choices)
                 )
             )
     if not found:
-        raise BehaviourError(_("There is nothing to choose from: the list of choices is empty."))
+        raise BehaviourError(_("The list of choices is empty."))
     return found
 
 

@@ -278,19 +278,19 @@ class RobotHandle:
         """Until the pause ends; a person reads that the rest of a move will be left out, and that it was."""
         names = {"robot": self._name, "action": action.title}
         saying = self._runtime.saying
-        ahead = _("{robot} does not tell how much of “{action}” is left; Go on leaves it out")
+        ahead = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
         saying.warn(ahead.format(**names) if unknown else "")
         self._runtime.scheduler.hold()
         saying.warn("")
         if unknown:
-            done = _("{robot} does not tell how much of “{action}” is left, so it was left out")
+            done = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
             self._runtime.write(done.format(**names))
 
     def _await(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
             raise BehaviourError(
-                _("{name} does not answer. {check}").format(name=self._name, check=_check(robot))
+                _("{name} is not responding. {check}").format(name=self._name, check=_check(robot))
             )
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
@@ -309,7 +309,7 @@ class RobotHandle:
                 self._runtime.saying.tell(_waiting(robot, call) if waits else words)
             said = self._broken(robot, call)
             if said is None and time.monotonic() >= until:
-                said = _("{name} has not ended “{title}” within {limit:g} s.").format(
+                said = _("{name} did not finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=limit
                 )
             if said is not None:
@@ -325,7 +325,7 @@ class RobotHandle:
         silence = time.monotonic() - call.heard_s
         if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
-        return _("{name} has stopped answering. {check}").format(name=self._name, check=_check(robot))
+        return _("{name} stopped responding. {check}").format(name=self._name, check=_check(robot))
 
     def _hold(self, call: RobotCall) -> None:
         """The pause takes the command back; a robot that does not end it is no longer under control."""
@@ -333,7 +333,7 @@ class RobotHandle:
         self._runtime.linked().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
             raise BehaviourError(
-                _("{name} does not hold still, so the behaviour was stopped.").format(name=self._name)
+                _("{name} did not pause, so the behaviour was stopped.").format(name=self._name)
             )
 
 
@@ -341,7 +341,7 @@ def _waiting(robot: Robot, call: RobotCall) -> str:
     """What the robot does first: "Pepper waits for “say”"."""
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
-    return _("{robot} waits for {actions}").format(robot=robot.name, actions=listed(titles))
+    return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=listed(titles))
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
@@ -392,7 +392,7 @@ def _check(robot: Robot) -> str:
     """What a person does about a robot that is silent."""
     if robot.virtual:
         return _("Start the virtual robot again.")
-    return _("Check that it is on and in the same Wi-Fi.")
+    return _("Check that it is switched on and on the same Wi-Fi.")
 
 
 def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:

@@ -210,7 +210,7 @@ class Runtime:
     def _stopped_outside(self, robot: str) -> None:
         self._fail(
             BehaviourError(
-                _("{robot} was stopped by somebody else, so the behaviour ended.").format(robot=robot)
+                _("{robot} was stopped by another program, so the behaviour ended.").format(robot=robot)
             )
         )
 
@@ -423,7 +423,7 @@ class Runtime:
 
     def _linked(self) -> ProgramLink:
         if self._link is None:
-            raise BehaviourError(_("the program has not begun yet."))
+            raise BehaviourError(_("the program has not started yet."))
         return self._link
 
 

@@ -333,7 +333,7 @@ class Scheduler:
         script = getattr(self._mine, "script", None)
         if isinstance(script, Script):
             return script
-        raise RuntimeError(_("only a script can do this; put it below “when started”"))
+        raise RuntimeError(_("this only works in a script; put it below “when started”"))
 
     def _leave(self, script: Script, *, then_park: bool = False) -> None:
         if self._owner is script:

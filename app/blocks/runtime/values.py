@@ -61,7 +61,7 @@ def join(first: object, second: object) -> str:
     one, other = text(first), text(second)
     if len(one) + len(other) > LONGEST_TEXT:
         raise BehaviourError(
-            _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+            _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
         )
     return one + other
 
@@ -101,12 +101,12 @@ def number(value: object, what: str) -> int | float:
     """The value, if it is a finite number; else BehaviourError, whose sentence begins with `what`."""
     if value is None:
         raise BehaviourError(
-            _("{what} needs a value that is not known yet.").format(what=_(what)), unknown=True
+            _("{what} needs a value, but it has none yet.").format(what=_(what)), unknown=True
         )
     if not isinstance(value, (int, float)):
         raise BehaviourError(_("{what} needs a number, not {value}.").format(what=_(what), value=kind(value)))
     if not math.isfinite(value):
-        raise BehaviourError(_("{what} needs a number that is not endless.").format(what=_(what)))
+        raise BehaviourError(_("{what} needs a finite number.").format(what=_(what)))
     return value
 
 

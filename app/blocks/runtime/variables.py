@@ -118,7 +118,7 @@ def _is_plain(value: object) -> bool:
 def brief(id: str, value: object) -> VariableValue:
     """A value in short. RuntimeError when somebody changes it meanwhile."""
     if value is None:
-        return VariableValue(id, "unknown", _("not known"))
+        return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
         items = tuple(words(each, LONGEST_ITEM) for each in value[:MOST_ITEMS])
         return VariableValue(id, "list", words(value, LONGEST_TEXT), items, len(value))

@@ -31,13 +31,13 @@ EXAMPLES: Mapping[str, str] = {
     "events_becomes_true": "For example: when “battery is below 20” becomes true, Pepper asks to be charged.",
     "control_wait": "For example: light on, wait 2 s, light off.",
     "control_wait_until": "For example: wait until Pepper sees a face, then say “Hello”.",
-    "control_wait_until_at_most": "For example: wait for an answer, but go on after 10 s without one.",
+    "control_wait_until_at_most": "For example: wait for an answer, but continue after 10 s without one.",
     "control_repeat": "For example: repeat 3 times: turn left, say “Here?”.",
     "control_forever": "For example: repeat forever: write the distance to the console, wait 1 s.",
     "control_while": "For example: repeat until the distance is below 0.5: move a little.",
     "control_if": "For example: if Pepper sees a face, say “Hello”.",
     "control_if_else": "For example: if the battery is above 20, dance; else say “I am tired”.",
-    "control_stop_script": "For example: if nobody is there, stop this script; the other scripts go on.",
+    "control_stop_script": "For example: if nobody is there, stop this script; the other scripts continue.",
     "control_stop_program": "For example: when the head is touched, stop the behaviour.",
     "values_number": "For example: 2, 0.5 or −10.",  # noqa: RUF001 (the sign that people read)
     "values_text": "For example: “Touch my head”.",
@@ -228,23 +228,23 @@ def _kind(argument: Argument) -> str:
 _PLAIN: Mapping[type[Argument], str] = {
     StatementInput: lazy("blocks"),
     TextField: lazy("a text, typed into the block"),
-    BroadcastField: lazy("the name of a message; choose one or make a new one"),
-    TopicField: lazy("the name of a topic; choose one or type it"),
-    PathField: lazy("the name of a field in the topic's messages"),
+    BroadcastField: lazy("name of a message; choose one or create a new one"),
+    TopicField: lazy("name of a topic; choose or type one"),
+    PathField: lazy("name of a field in the topic's messages"),
     ColourField: lazy("a colour; click on it to choose"),
     VariableField: lazy("one of the behaviour's variables"),
-    Items: lazy("as many gaps as you like"),
-    Inputs: lazy("what the function is given"),
+    Items: lazy("as many slots as you like"),
+    Inputs: lazy("inputs of the function"),
 }
 
 
 def _value(gap: ValueInput) -> str:
     words = _(_TAKES.get(gap.check or "", _ANY))
     if isinstance(gap.default, (int, float)) and not isinstance(gap.default, bool):
-        words = _("{kind}; {value} unless you change it").format(kind=words, value=f"{gap.default:g}")
+        words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
     if gap.only is None:
         return words
-    return _("{kind}; it is there for an item by its number").format(kind=words)
+    return _("{kind}; used to access an item by its number").format(kind=words)
 
 
 def _choice(field: ChoiceField) -> str:

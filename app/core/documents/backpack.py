@@ -27,7 +27,7 @@ MOST = 100
 """So many stacks of blocks."""
 MOST_BYTES = 4_000_000
 """So large is the file at most, in bytes of JSON."""
-FULL = lazy("the backpack holds at most {most} stacks; take something out of it first")
+FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
 _APART_S = 0.001
 _SPARE = 1_000_000  # what another Studio's file may have more and is read all the same
 
@@ -136,9 +136,7 @@ class Backpack:
     def _write(self, found: _Found, *, grows: bool) -> None:
         if grows and len(found.items) > MOST:
             raise BackpackError(
-                _("the backpack holds at most {most} stacks; take something out of it first").format(
-                    most=MOST
-                )
+                _("the backpack can hold at most {most} stacks; remove something first").format(most=MOST)
             )
         whole = {
             "backpack": VERSION,
@@ -147,7 +145,7 @@ class Backpack:
         data = deep_json.dumps(whole, ascii=True).encode()
         if grows and len(data) > MOST_BYTES:
             raise BackpackError(
-                _("the backpack holds at most {most} MB; take something out of it first").format(
+                _("the backpack can hold at most {most} MB; remove something first").format(
                     most=number(MOST_BYTES / 1e6, ".0f")
                 )
             )
@@ -155,7 +153,7 @@ class Backpack:
             write_atomically(self.path, data, durable=False, private=True)
         except OSError as error:
             raise BackpackError(
-                _("the backpack can't be kept in '{path}': {reason}").format(
+                _("can't save the backpack in '{path}': {reason}").format(
                     path=self.path, reason=error.strerror or str(error)
                 )
             ) from error
@@ -168,7 +166,7 @@ class Backpack:
             return _Found()
         except OSError as error:
             raise BackpackError(
-                _("the backpack can't be read from '{path}': {reason}").format(
+                _("can't read the backpack from '{path}': {reason}").format(
                     path=self.path, reason=error.strerror or str(error)
                 )
             ) from error
@@ -188,8 +186,8 @@ class Backpack:
         if unknown:
             self._tell(
                 ngettext(
-                    "{count} thing in the backpack can't be read here; it is kept in '{path}'",
-                    "{count} things in the backpack can't be read here; they are kept in '{path}'",
+                    "{count} item in the backpack can't be read here; it was saved in '{path}'",
+                    "{count} items in the backpack can't be read here; they were saved in '{path}'",
                     len(unknown),
                 ).format(count=len(unknown), path=self.path)
             )
@@ -204,8 +202,8 @@ class Backpack:
         if not self.path.exists():
             self._tell(
                 _(
-                    "the backpack in “{file}” is of a newer NEP Studio and is left as it is; what you put"
-                    " in here is kept beside it"
+                    "the backpack in “{file}” belongs to a newer NEP Studio and is unchanged; blocks you add "
+                    "here are saved separately"
                 ).format(file=newer.name)
             )
         return self._read()
@@ -221,15 +219,14 @@ class Backpack:
             replace_file(self.path, place)
         except OSError as error:
             raise BackpackError(
-                _("the backpack can't be read from '{path}': {reason}").format(
+                _("can't read the backpack from '{path}': {reason}").format(
                     path=self.path, reason=_("it is damaged")
                 )
             ) from error
         self._tell(
-            _(
-                "the backpack could not be read (it is damaged) and begins empty; the old one is kept in"
-                " '{path}'"
-            ).format(path=place)
+            _("the backpack is damaged, so a new one was created; the old one is in '{path}'").format(
+                path=place
+            )
         )
         return _Found()
 

@@ -165,7 +165,7 @@ class Document:
         """
         target = path if path is not None else self.path
         if target is None:
-            raise DocumentError(None, _("this behaviour has no file yet"), _("choose one"))
+            raise DocumentError(None, _("this behaviour is not saved to a file yet"), _("choose one"))
         name = name_of(target, self.name)
         write_file(target, BehaviourFile(name, self.workspace, self.robots, self.others))
         self.path, self.name = target, name
@@ -374,11 +374,11 @@ class Document:
         try:
             ended = written()
         except OSError as error:
-            self._journal_error = _("unsaved work can't be kept ({reason}); save the file now").format(
+            self._journal_error = _("can't back up unsaved work ({reason}); save the file now").format(
                 reason=error.strerror or error
             )
         except RecursionError:
-            self._journal_error = _("unsaved work can't be kept: {reason}; {advice}").format(
+            self._journal_error = _("can't back up unsaved work: {reason}; {advice}").format(
                 reason=_(TOO_DEEP), advice=_(DIVIDE)
             )
         else:

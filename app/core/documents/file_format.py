@@ -18,9 +18,9 @@ from nep.i18n import _, lazy, number
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
-TOO_DEEP = lazy("there are more than 4000 blocks in one stack")
-FROM_BEFORE = lazy("open a copy from before")
-DIVIDE = lazy("divide it into several scripts")
+TOO_DEEP = lazy("one stack has more than 4000 blocks")
+FROM_BEFORE = lazy("open an earlier copy")
+DIVIDE = lazy("split it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """What systems say of a disk, a file or a share of a disk that takes nothing more."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
@@ -48,10 +48,10 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
     try:
         data = read_whole(path)
     except OSError as error:
-        words = _("{file} can't be read ({reason})")
+        words = _("can't read {file} ({reason})")
         raise DocumentError(path, words.format(file=name, reason=error.strerror or error)) from error
     except ValueError as error:  # letters that no file's name has here
-        words = _("{file} can't be read (no file has such a name here)")
+        words = _("can't read {file} (file names like this aren't allowed here)")
         raise DocumentError(path, words.format(file=name)) from error
     return parse_file(data, path, name)
 
@@ -68,13 +68,13 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
         raise DocumentError(path, _("{file} is not a behaviour").format(file=name), what_behaviours_are())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise DocumentError(path, _("{file} does not say its version").format(file=name), _(FROM_BEFORE))
+        raise DocumentError(path, _("{file} has no format version").format(file=name), _(FROM_BEFORE))
     if version > VERSION:
-        newer = _("{file} was made by a newer NEP Studio (version {version}) and is left as it is")
+        newer = _("{file} was saved by a newer NEP Studio (version {version}) and is unchanged")
         raise DocumentError(path, newer.format(file=name, version=version), _("update this one"))
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
-        raise DocumentError(path, _("{file} has no blocks in it").format(file=name), _(FROM_BEFORE))
+        raise DocumentError(path, _("{file} has no blocks").format(file=name), _(FROM_BEFORE))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
     others = {name: value for name, value in content.items() if name not in OURS}
     called = content.get("name")
@@ -105,20 +105,20 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
         data = file_bytes(behaviour)
         if len(data) > LARGEST_BYTES:
             size, most = len(data) / 1e6, LARGEST_BYTES / 1e6
-            said = _("{file} would have {size} MB").format(file=path.name, size=number(size, ".1f"))
-            advice = _("at most {most} MB are read, use smaller pictures").format(most=number(most, ".0f"))
+            said = _("{file} would be {size} MB").format(file=path.name, size=number(size, ".1f"))
+            advice = _("at most {most} MB can be read; use smaller images").format(most=number(most, ".0f"))
             raise DocumentError(path, said, advice)
         write_atomically(path, data)
     except RecursionError as error:
-        words = _("{file} can't be written: {reason}").format(file=path.name, reason=_(TOO_DEEP))
+        words = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP))
         raise DocumentError(path, words, _(DIVIDE)) from error
     except OSError as error:
         reason = error.strerror or str(error)
-        words = _("{file} can't be written ({reason})").format(file=path.name, reason=reason)
+        words = _("can't write {file} ({reason})").format(file=path.name, reason=reason)
         advice = (
-            _("make room there or save it in another place")
+            _("free some space or choose another folder")
             if error.errno in FULL
-            else _("save it in another place")
+            else _("save it in another folder")
         )
         raise DocumentError(path, words, advice) from error
 

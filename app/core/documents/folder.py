@@ -55,7 +55,7 @@ def name_refusal(name: str) -> str:
     if name.startswith("."):
         return _("A name that begins with a full stop hides the file.")
     if RESERVED.fullmatch(name) or name.endswith((".", " ")):
-        return _("Some computers take no file of this name. Choose another one.")
+        return _("Some computers don't support this file name. Choose another one.")
     if len(name) > LONGEST_NAME:
         return _("This name is too long.")
     return ""

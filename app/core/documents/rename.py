@@ -40,12 +40,12 @@ def why_not(name: str, path: Path | None) -> str:
     if wanted.endswith(".") or wanted.startswith("."):
         return _("A file's name can't begin or end with a full stop.")
     if wanted.partition(".")[0].lower() in DEVICES:
-        return _("Windows keeps the name “{name}” for itself.").format(name=wanted)
+        return _("Windows reserves the name “{name}”.").format(name=wanted)
     if len(wanted.encode("utf-8", "surrogatepass")) > LONGEST_BYTES:
-        return _("That name is too long for a file.")
+        return _("The name is too long for a file.")
     new = path_named(path, wanted)
     if new != path and os.path.lexists(new) and not _same(new, path):
-        return _("There is a file “{name}” in {folder} already.").format(
+        return _("A file named “{name}” already exists in {folder}.").format(
             name=wanted, folder=path.parent.name or path.parent
         )
     return ""
@@ -59,7 +59,7 @@ def rename_file(old: Path, new: Path) -> None:
     """
     try:
         if not old.is_file():
-            raise FileNotFoundError(2, _("it is not there any more"), str(old))
+            raise FileNotFoundError(2, _("it no longer exists"), str(old))
         taken = not _same(new, old)
         if taken:
             os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
@@ -70,10 +70,10 @@ def rename_file(old: Path, new: Path) -> None:
                 new.unlink(missing_ok=True)
             raise
     except OSError as error:
-        words = _("{file} can't be renamed ({reason})")
+        words = _("can't rename {file} ({reason})")
         reason = error.strerror or str(error)
         raise DocumentError(
-            old, words.format(file=old.name, reason=reason), _("save it in another place")
+            old, words.format(file=old.name, reason=reason), _("save it in another folder")
         ) from error
 
 

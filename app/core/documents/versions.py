@@ -54,7 +54,7 @@ class Earlier:
             reason = getattr(error, "strerror", None) or error
             raise DocumentError(
                 self.path,
-                _("{file} can't be put back ({reason})").format(file=self.path.name, reason=reason),
+                _("can't restore {file} ({reason})").format(file=self.path.name, reason=reason),
                 _("open {copy}").format(copy=self.copy),
             ) from error
 
@@ -80,7 +80,7 @@ def keep_earlier(
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
         reason = error.strerror or error
-        words = _("{file} was not saved: what it said before can't be kept ({reason})")
+        words = _("{file} was not saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another Studio was quicker
         _thin_out(where, _mark(path))

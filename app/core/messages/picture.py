@@ -125,7 +125,9 @@ def _same_bytes(one: memoryview, other: memoryview) -> bool:
 def _short(error: BaseException) -> str:
     """The last part of OpenCV's long message."""
     return (
-        str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200] if str(error) else _("no memory")
+        str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200]
+        if str(error)
+        else _("not enough memory")
     )
 
 
@@ -144,12 +146,12 @@ def png_of(message: Message) -> bytes:
     if frame.dtype not in PNG_NUMBERS:
         raise EncodeError(
             "png",
-            _("picture of {dtype}").format(dtype=frame.dtype),
-            _("it has whole numbers of 8 or 16 bits alone"),
+            _("image of {dtype}").format(dtype=frame.dtype),
+            _("only integers of 8 or 16 bits are supported"),
         )
     good, data = cv2.imencode(".png", frame)
     if not good:
-        raise OSError(_("a picture of {shape} can't be written as PNG").format(shape=frame.shape))
+        raise OSError(_("an image of shape {shape} can't be written as PNG").format(shape=frame.shape))
     return bytes(data.tobytes())
 
 

@@ -59,15 +59,15 @@ class JsonQuery:
         """Understand it. Raises `QueryError` with the sentence that says what is wrong and where."""
         self.text = text.strip()
         if len(self.text) > LONGEST:
-            raise QueryError(_("a query has {most} letters at most").format(most=LONGEST))
+            raise QueryError(_("a query can have at most {most} characters").format(most=LONGEST))
         try:
             self._path = _environment().compile(self.text)
         except jsonpath.JSONPathError as error:
             raise QueryError(_sentence(error, self.text)) from error
         except OverflowError as error:
-            raise QueryError(_("the query has a number that is too large")) from error
+            raise QueryError(_("a number in the query is too large")) from error
         except (RecursionError, ValueError) as error:  # brackets a thousand deep; numbers no computer has
-            raise QueryError(_("the query can't be understood")) from error
+            raise QueryError(_("the query is not valid")) from error
 
     def answer(
         self, value: object, most_steps: int = MOST_STEPS, most_found: int = MOST_FOUND
@@ -82,15 +82,13 @@ class JsonQuery:
         try:
             for match in self._path.finditer(looked_through):
                 if len(found) >= most_found:
-                    cut = _("The first {count} are shown.").format(count=most_found)
+                    cut = _("Only the first {count} are shown.").format(count=most_found)
                     break
                 found[FoundPath.of(tuple(match.parts))] = _plain(match.obj)
         except _TooMany:
-            cut = _("It looks at more than {count} values; this was found until then.").format(
-                count=most_steps
-            )
+            cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
         except RecursionError:
-            cut = _("The message is nested too deep for it.")
+            cut = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:
             cut = _sentence(error, self.text)
         return QueryAnswer(found, cut)
@@ -109,8 +107,8 @@ def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
     reason, token = escaped(str(error.message or "")), error.token
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
-        return _("the query does not end well: {reason}").format(reason=reason)
-    said = _("the query can't be understood from {rest} on: {reason}")
+        return _("the query is incomplete: {reason}").format(reason=reason)
+    said = _("the query is not valid from {rest} on: {reason}")
     return said.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 

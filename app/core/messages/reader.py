@@ -38,7 +38,7 @@ def read(message: Message) -> Reading:
     except (NepError, ValueError) as error:
         return Reading(message, error=str(error))
     except MemoryError:
-        return Reading(message, error=_("there is not enough memory for it"))
+        return Reading(message, error=_("not enough memory"))
 
 
 class Reader(NewestOnly[Message, Reading]):

@@ -53,7 +53,7 @@ def save(message: Message, into: Path | None = None) -> Path:
             path.unlink(missing_ok=True)  # half a picture is none
             raise
         return path
-    raise FileExistsError(_("there are a thousand pictures named “{stem}”").format(stem=stem))
+    raise FileExistsError(_("there are already a thousand images named “{stem}”").format(stem=stem))
 
 
 def file_stem(message: Message) -> str:

@@ -118,7 +118,9 @@ class Doctor:
             words = _("The doctor could not finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
             )
-            return (doctor.Finding("doctor", "error", words, _("Tell the people who make NEP Studio.")),)
+            return (
+                doctor.Finding("doctor", "error", words, _("Report it to the developers of NEP Studio.")),
+            )
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:

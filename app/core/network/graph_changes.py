@@ -32,7 +32,7 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
             here.append((name, _here_with(name, len(new), original=original)))
             told.update(new)
         elif not new:
-            words = _("{node} is here (original NEP)") if original else _("{node} is here")
+            words = _("{node} joined (original NEP)") if original else _("{node} joined")
             here.append((name, words.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
@@ -41,11 +41,11 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
             more.append((name, words.format(topic=name, count=count)))
     left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _told(node)]
     return [
-        *_gathered(here, _("{count} nodes are here: {names} and {more} more")),
+        *_gathered(here, _("{count} nodes joined: {names} and {more} more")),
         *_gathered(more, _("{count} new topics: {names} and {more} more")),
         *_gathered(
-            [(name, _("{node} has left").format(node=name)) for name in left],
-            _("{count} nodes have left: {names} and {more} more"),
+            [(name, _("{node} left").format(node=name)) for name in left],
+            _("{count} nodes left: {names} and {more} more"),
         ),
     ]
 
@@ -61,12 +61,12 @@ def _gathered(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
 def _here_with(node: str, count: int, *, original: bool) -> str:
     words = (
         ngettext(
-            "{node} is here with {count} topic (original NEP)",
-            "{node} is here with {count} topics (original NEP)",
+            "{node} joined with {count} topic (original NEP)",
+            "{node} joined with {count} topics (original NEP)",
             count,
         )
         if original
-        else ngettext("{node} is here with {count} topic", "{node} is here with {count} topics", count)
+        else ngettext("{node} joined with {count} topic", "{node} joined with {count} topics", count)
     )
     return words.format(node=node, count=count)
 

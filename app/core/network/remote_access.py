@@ -73,16 +73,16 @@ class RemoteAccess:
             self._settings.set(KEPT, list(hosts))
         except SettingsError as error:
             words = (
-                _("They can't connect any more after the next start: {error}.")
+                _("Can't save this change: other computers can't connect after the next start ({error}).")
                 if hosts
-                else _("Other computers may connect again after the next start: {error}.")
+                else _("Can't save this change: other computers can connect after the next start ({error}).")
             )
             self._alerts.put(
                 NOT_KEPT,
                 "warn",
-                _("Who may connect can't be saved."),
+                _("The list of allowed connections can't be saved."),
                 words.format(error=error),
-                button=_("Choose again"),
+                button=_("Choose another"),
                 action="network.others",
                 count=0,
             )

@@ -197,7 +197,7 @@ class LiveSource:
         """Studio's node there. Raises `NepError` while nobody answers."""
         view = look(self.address, timeout_s=0.5)
         if view is None:
-            raise NepError(_("no master answers at {address}").format(address=self.address))
+            raise NepError(_("no master responds at {address}").format(address=self.address))
         return nep.node(_free_name(view), master=self.address)
 
     def look(self, node: Node) -> GraphView:

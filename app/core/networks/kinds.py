@@ -40,7 +40,7 @@ class NetworkKind:
     @property
     def not_known(self) -> str:
         """Why a figure is missing: "not known on ROS 2"."""
-        return _("not known on {network}").format(network=self.words)
+        return _("unknown on {network}").format(network=self.words)
 
 
 def _codec_of_ros_2(info: TopicInfo) -> str:
@@ -64,7 +64,7 @@ KINDS = (
         "ROS 1",
         lazy("Address of the master"),
         "127.0.0.1:11311",
-        lazy("A master on another computer: this one then listens in that network, too."),
+        lazy("A master on another computer. This computer then accepts connections from that network, too."),
         tells_figures=False,
         codec=lambda info: info.codec,
         reads=_reads_ros,
@@ -74,7 +74,7 @@ KINDS = (
         "ROS 2",
         lazy("Domain, 0 to 232"),
         "0",
-        lazy("Programs on this computer; others only when ROS_AUTOMATIC_DISCOVERY_RANGE says so."),
+        lazy("Programs on this computer; others only if ROS_AUTOMATIC_DISCOVERY_RANGE allows it."),
         tells_figures=False,
         codec=_codec_of_ros_2,
         reads=_reads_ros_2,
@@ -83,7 +83,7 @@ KINDS = (
     NetworkKind(
         "zenoh",
         "Zenoh",
-        lazy("Where its nodes meet"),
+        lazy("Address of its nodes"),
         "local",
         lazy("“local” is this computer; a router is written as tcp/192.168.1.5:7447."),
         tells_figures=True,

@@ -267,7 +267,7 @@ class Networks:
         self._alerts.put(
             id,
             "warn",
-            _("{network} can't be looked at now.").format(network=network.kind.words),
+            _("{network} can't be shown now.").format(network=network.kind.words),
             f"{network.sentence[:1].upper()}{network.sentence[1:]}.",
             button=_("Other networks"),
             action=LOOK_COMMAND,

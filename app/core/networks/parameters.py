@@ -162,7 +162,7 @@ class NodeParameters:
         self.revision += 1
         try:
             if message.size_bytes > READ_BYTES:
-                raise NepError(_("they are too large to be shown here; use nep param list"))
+                raise NepError(_("they are too large to show here; use nep param list"))
             told = parameters_in(message.payload)
         except NepError as error:  # also a `DecodeError`
             self.problem = str(error)
@@ -198,7 +198,7 @@ class NodeParameters:
             return
         self.refusal = refusal_of(node, parameter)
         if not self.refusal and not self._has_master():
-            self.refusal = _("no master answers, so its node can't be asked; try it again when one does")
+            self.refusal = _("no master responds, so the node can't be queried; try again later")
         if self.refusal:
             return
         try:
@@ -213,19 +213,19 @@ class NodeParameters:
 def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
     """Why a parameter can't be set from here; empty when it can."""
     if node.gone_s is not None:
-        return _("its node has gone")
+        return _("its node has disappeared")
     if len(parameter.text) > EDITED_LETTERS:
-        return _("it is too long to be changed here; use nep param set")
+        return _("it is too long to edit here; use nep param set")
     if not node.may_set:
-        return _("on this network parameters can be read only")
-    return _("only its own node may set it") if parameter.read_only else ""
+        return _("parameters on this network are read-only")
+    return _("only its own node can set it") if parameter.read_only else ""
 
 
 def parameters_in(state: object) -> tuple[ShownParameter, ...]:
     """What a node tells of its parameters. Raises `NepError` for anything else: anybody may publish there."""
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
-        raise NepError(_("this is no list of parameters"))
+        raise NepError(_("this is not a list of parameters"))
     told = [_parameter(each) for each in listed[:MOST] if isinstance(each, Mapping)]
     return tuple({each.name: each for each in told}.values())
 
@@ -278,11 +278,11 @@ def value_of(text: str, kind: str) -> object:
     except orjson.JSONDecodeError:
         value = None
     if kind == "bool" and not isinstance(value, bool):
-        raise ValueError(_("write true or false"))
+        raise ValueError(_("enter true or false"))
     if kind == "list" and not isinstance(value, list):
-        raise ValueError(_("write a list as JSON, such as [1, 2]"))
+        raise ValueError(_("enter a list as JSON, such as [1, 2]"))
     if kind == "dict" and not isinstance(value, dict):
-        raise ValueError(_("write a map as JSON, such as {example}").format(example='{"x": 1}'))
+        raise ValueError(_("enter an object as JSON, such as {example}").format(example='{"x": 1}'))
     return value
 
 
@@ -290,7 +290,7 @@ def _whole(said: str) -> int:
     try:
         return int(said)
     except ValueError:
-        raise ValueError(_("write a whole number")) from None
+        raise ValueError(_("enter a whole number")) from None
 
 
 def _decimal(said: str) -> float:
@@ -298,5 +298,5 @@ def _decimal(said: str) -> float:
         return parse_number(said)
     except TypedNumberError as error:
         if error.has_separators:
-            raise ValueError(_("write a number with at most one comma or point")) from None
-        raise ValueError(_("write a number")) from None
+            raise ValueError(_("enter a number with at most one comma or point")) from None
+        raise ValueError(_("enter a number")) from None

@@ -69,7 +69,7 @@ class RecordingChoice:
     def problem(self) -> str:
         """Why nothing can be recorded so, in a sentence; "" when it can."""
         if self.mode == "chosen" and not self.topics:
-            return _("No topic is chosen.")
+            return _("No topic is selected.")
         try:
             self.selection  # noqa: B018  it is asked whether it can be
         except BadTopicError as error:

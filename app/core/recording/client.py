@@ -162,7 +162,7 @@ class RecorderProcess:
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # lets the thread end that waits for orders
             writer.join(END_WAIT_S)
-        return "" if code == 0 else _tail(log) or _("it ended with the code {code}").format(code=code)
+        return "" if code == 0 else _tail(log) or _("it ended with exit code {code}").format(code=code)
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
@@ -347,7 +347,7 @@ class RecorderClient:
             self._alerts.put(
                 "recorder:ended",
                 "error",
-                _("The recording has ended: {reason}.").format(reason=problem),
+                _("The recording stopped: {reason}.").format(reason=problem),
                 _said(path),
             )
 
@@ -374,17 +374,17 @@ class RecorderClient:
         op, sentence = content.get("op"), str(content.get("sentence", ""))
         if op == "record":
             self._set(replace(self.state, phase="", path=None))
-            self._alerts.put("recorder:ended", "error", _("Nothing is recorded."), sentence)
+            self._alerts.put("recorder:ended", "error", _("Nothing is being recorded."), sentence)
         elif op == "keep":
             self._set(self._no_longer_keeping(_path(content)))
-            self._alerts.put("recorder:keep", "error", _("The last seconds could not be kept."), sentence)
+            self._alerts.put("recorder:keep", "error", _("The last seconds could not be saved."), sentence)
         elif op == "ring":
             self._ring = None
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
             self._tell_of_ring(sentence)
         elif op == "stop":
             self._set(replace(self.state, phase=""))
-            self._alerts.put("recorder:ended", "error", _("The recording could not be ended."), sentence)
+            self._alerts.put("recorder:ended", "error", _("The recording could not be closed."), sentence)
 
     def _on_gone(self, detail: str) -> None:
         """The process has ended by itself."""
@@ -393,10 +393,10 @@ class RecorderClient:
         self._again_s = min(2 * self._again_s, AGAIN_AT_MOST_S)
         self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, keeping=()))
         if before.phase:
-            title = _("The recorder has ended; what came until a second before is kept.")
+            title = _("The recorder stopped. Everything up to a second before that is saved.")
             self._alerts.put("recorder:ended", "error", title, detail or _said(before.path))
         if before.keeping:
-            title = _("The last seconds could not be kept.")
+            title = _("The last seconds could not be saved.")
             self._alerts.put("recorder:keep", "error", title, detail)
         if self._ring is not None:
             self._tell_of_ring(detail)
@@ -404,7 +404,7 @@ class RecorderClient:
     # ---- inside
 
     def _tell_of_ring(self, reason: str) -> None:
-        title = _("The flight recorder is off: the last seconds can't be kept.")
+        title = _("The flight recorder is off: the last seconds can't be saved.")
         self._alerts.put("recorder:ring", "warn", title, reason)
 
     def _warn(self) -> None:
@@ -414,15 +414,15 @@ class RecorderClient:
                 "recorder:low",
                 "warn",
                 _("The disk is nearly full."),
-                _("The recording ends by itself before it is; all that came is kept."),
+                _("The recorder will stop on its own before then; everything received is saved."),
                 count=0,
             )
         else:
             self._alerts.resolve("recorder:low")
         if state.phase and state.unkept:
             title = ngettext(
-                "{count} message is not in the recording: the disk is too slow.",
-                "{count} messages are not in the recording: the disk is too slow.",
+                "{count} message was not recorded: the disk is too slow.",
+                "{count} messages were not recorded: the disk is too slow.",
                 state.unkept,
             )
             self._alerts.put("recorder:unkept", "warn", title.format(count=state.unkept), count=0)
@@ -442,7 +442,7 @@ class RecorderClient:
             self._number += 1
             self._line = self._start(self._number, self._address, self._post_event)
         if not self._line.order(content):
-            self._on_problem({**content, "sentence": _("the recorder does not answer")})
+            self._on_problem({**content, "sentence": _("the recorder does not respond")})
 
     def _no_longer_keeping(self, path: Path | None) -> RecorderState:
         return replace(self.state, keeping=tuple(each for each in self.state.keeping if each != path))

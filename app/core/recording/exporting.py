@@ -79,7 +79,7 @@ class RecordingExport:
         if self.was_cancelled and not self.files:
             return _("The export was cancelled")
         if self.problem:
-            return _("It was not exported: {reason}").format(reason=self.problem)
+            return _("Not exported: {reason}").format(reason=self.problem)
         count = len(self.files)
         said = ngettext("Exported {count} file", "Exported {count} files", count).format(count=count)
         return said if not self.damage else f"{said}; {self.damage}"

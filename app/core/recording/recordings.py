@@ -115,17 +115,17 @@ class SessionRecordings:
             if not self._settings.get(FOLDER_KEY, ""):
                 folder.mkdir(parents=True, exist_ok=True)
             if not folder.is_dir():
-                problem = _("{folder} is not there.").format(folder=folder)
+                problem = _("{folder} does not exist.").format(folder=folder)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            problem = _("{folder} can't be made: {reason}.").format(folder=folder, reason=reason)
+            problem = _("Can't create {folder}: {reason}.").format(folder=folder, reason=reason)
         if not problem:
             self._alerts.resolve(NO_FOLDER)
             return folder
         self._alerts.put(
             NO_FOLDER,
             "error",
-            _("Nothing is recorded: the folder for recordings is missing."),
+            _("Not recording: the recordings folder is missing."),
             problem,
             button=_("Choose a folder"),
             action=CHOOSE_FOLDER,
@@ -160,12 +160,12 @@ class SessionRecordings:
         """
         choice = choice if choice is not None else self.choice
         if self.is_recording:
-            return _("A recording goes on already.")
+            return _("Already recording.")
         if choice.problem:
             return choice.problem
         folder = self._ready_folder()
         if folder is None:
-            return _("The folder for recordings is not there.")
+            return _("The recordings folder is missing.")
         stem = file_stem(name)
         path = (
             free_path(folder / f"{stem}{folders.SUFFIX}") if stem else folders.new_path(folder, self._now())
@@ -222,14 +222,14 @@ class SessionRecordings:
             return _("The flight recorder is off.")
         folder = self._ready_folder()
         if folder is None:
-            return _("The folder for recordings is not there.")
+            return _("The recordings folder is missing.")
         word = "alarm" if done is not None else "kept"
         path = folders.new_path(folder, self._now(), word)
         number = 2
         while path in self._keeping:
             path, number = path.with_stem(f"{path.stem}-{number}"), number + 1
         if not self.client.keep(path, seconds if seconds is not None else float(self.wish.seconds), note):
-            return _("The last seconds can't be kept now.")
+            return _("The last seconds can't be saved now.")
         self._keeping[path] = done
         return ""
 
@@ -238,7 +238,7 @@ class SessionRecordings:
         said = what_words(event.rule.condition, event.seen)
         why_not = self.keep(said, action.seconds, done)
         if why_not:
-            words = _("nothing was kept: {reason}")
+            words = _("nothing saved: {reason}")
             done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))
 
     # ---- what the session does
@@ -270,7 +270,7 @@ class SessionRecordings:
             if is_there:
                 self.on_made(path, "kept")
             if done is not None:
-                words = _("kept {file}") if is_there else _("nothing was kept: see the alerts")
+                words = _("saved {file}") if is_there else _("nothing saved: see the alerts")
                 done(is_there, words.format(file=path.name))
 
     def close(self) -> None:

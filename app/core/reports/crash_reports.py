@@ -30,15 +30,15 @@ _NAME = re.compile(
     r"(?P<new>\.new)?\.txt"
 )
 TITLES: dict[Part, str] = {
-    "studio": lazy("Studio ended unexpectedly last time."),
-    "behaviour": lazy("The program of a behaviour crashed last time."),
+    "studio": lazy("Studio closed unexpectedly last time."),
+    "behaviour": lazy("A behaviour's program crashed last time."),
     "robot": lazy("A virtual robot crashed last time."),
     "master": lazy("The master crashed last time."),
     "editor": lazy("The block editor crashed last time."),
 }
 HEADING = "Crash report of NEP Studio "
 OF_ANOTHER = lazy("That was NEP Studio {version}; this is {own}.")
-DETAIL = lazy("A report helps those who make Studio to mend it. Nothing is sent by itself.")
+DETAIL = lazy("A report helps us fix the problem. Nothing is sent automatically.")
 
 _log = logging.getLogger("studio.crashes")
 

@@ -103,7 +103,7 @@ class MissingLibraries:
     def start_remedy(self) -> str:
         """Say how to get a window."""
         if not self.command:
-            return _("Install what contains it, then start Studio again.")
+            return _("Install the package that contains it, then start Studio again.")
         words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
         return words.format(command=self.command)
 
@@ -122,7 +122,8 @@ class MissingLibraries:
         """Say how to get the block editor."""
         if not self.command:
             return _(
-                "Install what contains it, then start Studio again. The Developer layout works without it."
+                "Install the package that contains it, then start Studio again. The Developer layout works "
+                "without it."
             )
         return _(
             "On Debian and Ubuntu type “{command}” in a terminal, then start Studio again. "
@@ -172,7 +173,7 @@ def why_not_imported(
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]
         return _(
-            "NEP Studio needs packages that are not installed ({names}); install them with “{command}”"
+            "NEP Studio needs packages that are not installed ({names}). Install them with “{command}”"
         ).format(names=listed(missing), command="pip install 'nep-studio[studio]'")
     libraries = missing_libraries(error)
     return f"{libraries.start_title} {libraries.start_remedy}" if libraries is not None else ""

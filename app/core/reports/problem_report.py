@@ -87,23 +87,23 @@ def what_goes_in(parts: ReportParts) -> list[str]:
     """What a report has in it, a short line each, for the person who is to decide."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
-        _("The versions of Studio, of Python, of Qt and of this system, and the size of the screen"),
-        _("What went wrong in Studio lately: its log, {size} kB").format(size=number(size, ".1f"))
+        _("The versions of Studio, Python, Qt and this system, and the size of the screen"),
+        _("Recent errors in Studio: its log, {size} kB").format(size=number(size, ".1f"))
         if size
-        else _("What went wrong in Studio lately: its log, which is empty"),
-        _("What the connection doctor finds: the programs of NEP, and the addresses of this computer"),
-        _("Your settings, such as language and look"),
+        else _("Recent errors in Studio: its log, which is empty"),
+        _("Results of the connection doctor: programs of NEP, and the addresses of this computer"),
+        _("Your settings, such as language and theme"),
     ]
     crashed = len(parts.crashes.all())
     if crashed:
-        words = ngettext("{count} report of a crash", "{count} reports of crashes", crashed)
+        words = ngettext("{count} crash report", "{count} crash reports", crashed)
         lines.append(words.format(count=crashed))
     return lines
 
 
 def work_words(names: Sequence[str]) -> str:
     """Which behaviours would go in."""
-    return _("As they are now: {names}").format(names=listed([f"“{name}”" for name in names]))
+    return _("Current settings: {names}").format(names=listed([f"“{name}”" for name in names]))
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
@@ -134,7 +134,7 @@ def write_report(path: Path, data: bytes) -> None:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
         full = isinstance(error, OSError) and error.errno in FULL
-        advice = _("make room there or choose another place") if full else _("choose another place")
+        advice = _("free some space or choose another folder") if full else _("choose another folder")
         reason = getattr(error, "strerror", None) or str(error)
         raise ReportError(path, reason, advice) from error
 
@@ -168,7 +168,7 @@ class ReportWriter:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  a report of problems must not have one that nobody hears of
             _log.exception("can't make a report")
-            self.problem = _("the report can't be made: {error}").format(error=error_words(error))
+            self.problem = _("can't write the report: {error}").format(error=error_words(error))
 
 
 def _logs(folder: Path) -> list[Path]:

@@ -63,4 +63,4 @@ def used_here(values: Mapping[str, object]) -> str:
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
         for version, since_s in known(values)
     ]
-    return ", ".join(told) or "not known"
+    return ", ".join(told) or "unknown"

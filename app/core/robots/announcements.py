@@ -116,10 +116,10 @@ class Announcements:
             if known.twins and known.owner is not None:
                 name = known.robot.name if known.robot is not None else topic
                 found[topic] = Claim(
-                    _("{count} programs say that they are {robot}.").format(
+                    _("{count} programs announce themselves as {robot}.").format(
                         count=len(known.twins) + 1, robot=name
                     ),
-                    _("{first} was first and is the robot; {others} changes nothing. Close one.").format(
+                    _("{first} was first and is used; {others} is ignored. Close one of them.").format(
                         first=known.owner.words,
                         others=listed([twin.words for twin in known.twins[:MOST_CLAIMANTS]]),
                     ),
@@ -128,11 +128,11 @@ class Announcements:
                 found[topic] = known.wrong
         if self.left_out:
             title = ngettext(
-                "{count} more robot than the {most} that Studio shows is announced.",
-                "{count} more robots than the {most} that Studio shows are announced.",
+                "{count} more robot is on the network; Studio shows at most {most}.",
+                "{count} more robots are on the network; Studio shows at most {most}.",
                 len(self.left_out),
             ).format(count=len(self.left_out), most=MOST_ROBOTS)
-            found["robots"] = Claim(title, _("Find out which program announces them and close it."))
+            found["robots"] = Claim(title, _("Find out which program announces them, and close it."))
         return found
 
     def update(self, view: GraphView) -> None:
@@ -269,10 +269,10 @@ class Announcements:
             said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
             whose = known.owner.words if known.owner is not None else topic
             words = (
-                _("It comes from {program}, whose driver is to be mended.")
+                _("{program} announces it; its driver needs to be fixed.")
                 if known.robot is None
                 else _(
-                    "It comes from {program}, whose driver is to be mended. What it said before still counts."
+                    "{program} announces it; its driver needs to be fixed. The previous description is used."
                 )
             )
             known.wrong, known.is_unreadable = Claim(said, words.format(program=whose)), True
@@ -280,7 +280,7 @@ class Announcements:
         wrong = wrong_topic(robot, topic)
         known.robot = robot if wrong is None else None
         if wrong is not None:
-            known.wrong = Claim(f"{wrong}.", _("Find out what this program is and close it."))
+            known.wrong = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
 
 
 def _fairly(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:

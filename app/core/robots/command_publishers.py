@@ -37,7 +37,7 @@ class CommandPublishers:
             finally:
                 link.is_opening = False
 
-        self._submit(_("reach {robot}").format(robot=link.name), open_them)
+        self._submit(_("connect to {robot}").format(robot=link.name), open_them)
 
     def leave(self, link: RobotLink) -> None:
         """Close the publishers of topics that the robot's description does not name any more."""

@@ -429,7 +429,7 @@ class Fleet:
             return None
         return Claim(
             f"{why}.",
-            _("{robot} is left out. Find out what this program is and close it.").format(robot=robot.name),
+            _("{robot} is ignored. Find out what this program is, and close it.").format(robot=robot.name),
         )
 
     def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
@@ -467,7 +467,7 @@ class Fleet:
             return
         link.rejected, link.errors = ReportedCount(), ReportedCount()
         self._notes.append(
-            _("{robot} was started anew: it is {now} now, before {before}").format(
+            _("{robot} was restarted as {now}; it was {before}").format(
                 robot=link.name, now=identity.words, before=before.words
             )
         )
@@ -477,7 +477,7 @@ class Fleet:
     def _leave_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
         self._alive.rest(link.name)
-        self._tries.end_all(link, "failed", _("{robot} has changed; try it again").format(robot=link.name))
+        self._tries.end_all(link, "failed", _("{robot} has changed; try again").format(robot=link.name))
         if link.watch is not None:
             link.watch.close()
             link.watch = None
@@ -502,7 +502,7 @@ class Fleet:
         if self.permission.question is not None and link.name in self.permission.question.moves:
             self.permission.withdraw()
         self._tries.end_all(
-            link, "failed", _("{robot} has gone; check that it is on").format(robot=link.name)
+            link, "failed", _("{robot} disconnected; check that it is switched on").format(robot=link.name)
         )
         self.revision += 1
 

@@ -26,7 +26,7 @@ INSTALLATION = "installation"
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
 """Alerts of one robot; the name follows after a colon."""
 
-REAL = lazy("Check that it is on and in the same Wi-Fi.")
+REAL = lazy("Check that it is switched on and on the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
 
 
@@ -98,7 +98,7 @@ class Health:
                 self._alerts.put(
                     f"robot:{link.name}",
                     "error",
-                    _("{robot} does not answer.").format(robot=link.name),
+                    _("{robot} is not responding.").format(robot=link.name),
                     _("The behaviour uses it. {next_step}").format(
                         next_step=_(VIRTUAL if link.virtual else REAL)
                     ),
@@ -118,7 +118,7 @@ class Health:
         self._alerts.put(
             "journal",
             "error",
-            _("Your unsaved work is not kept."),
+            _("Your unsaved work is not backed up."),
             f"{sentence[0].upper()}{sentence[1:]}.",
             button=_("Save"),
             action="file.save",
@@ -137,9 +137,7 @@ class Health:
             GIVES_UP,
             "error",
             _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
-            _("{why}. If you close once more, it is lost.").format(
-                why=f"{sentence[0].upper()}{sentence[1:]}"
-            ),
+            _("{why}. Close again to discard it.").format(why=f"{sentence[0].upper()}{sentence[1:]}"),
             button=_("Save somewhere else"),
             action="file.save_as",
             count=0,
@@ -154,7 +152,7 @@ class Health:
         self._alerts.put(
             "settings",
             "warn",
-            _("What you choose now is forgotten when Studio ends."),
+            _("Settings you change now are lost when Studio closes."),
             f"{sentence[0].upper()}{sentence[1:]}.",
             count=0,
         )
@@ -166,7 +164,7 @@ class Health:
                 INSTALLATION,
                 "warn",
                 _("NEP Studio was updated while it was open."),
-                _("Save your behaviours and start it again: until then, parts of it may not open."),
+                _("Save your behaviours and restart Studio: until then, parts of it may not open."),
                 count=0,
             )
         elif fate == "gone":
@@ -174,7 +172,7 @@ class Health:
                 INSTALLATION,
                 "error",
                 _("NEP Studio was removed from this computer while it was open."),
-                _("Save your behaviours now: what is not open yet can't be opened any more, nor run."),
+                _("Save your behaviours now: behaviours that aren't open can no longer be opened or run."),
                 count=0,
             )
         else:
@@ -202,8 +200,8 @@ class Health:
             numbers = sorted(
                 {found.id.removeprefix("port:") for found in taken}, key=lambda port: (len(port), port)
             )
-            title = _("Ports {ports} are taken by other programs.").format(ports=listed(numbers))
-            detail = _("Programs of the original NEP can't join there. The connection doctor says why.")
+            title = _("Other programs are using ports {ports}.").format(ports=listed(numbers))
+            detail = _("Programs of the original NEP can't connect. The connection doctor shows the cause.")
         step = _(ASK_DOCTOR)
         self._alerts.put(
             PORTS, "warn", title, detail, button=step, action="help.doctor", count=0, for_developers=True
@@ -211,14 +209,14 @@ class Health:
 
     def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
         title = ngettext(
-            "{topic} sends what can't be read ({count} message).",
-            "{topic} sends what can't be read ({count} messages).",
+            "{topic} sends messages that can't be decoded ({count} message).",
+            "{topic} sends messages that can't be decoded ({count} messages).",
             bad.count,
         )
         detail = (
-            _("{why} Look at the raw bytes in the Inspector. {count} more came too fast to be tried.")
+            _("{why} See the raw bytes in the Inspector. {count} more came too fast to be decoded.")
             if bad.unchecked
-            else _("{why} Look at the raw bytes in the Inspector.")
+            else _("{why} See the raw bytes in the Inspector.")
         )
         why = f"{checked.sentence[:1].upper()}{checked.sentence[1:]}."
         self._alerts.put(
@@ -226,7 +224,7 @@ class Health:
             "warn",
             title.format(topic=topic, count=bad.count),
             detail.format(why=why, count=bad.unchecked),
-            button=_("Look at it"),
+            button=_("Show"),
             action=f"inspect:{topic}",
             count=checked.bad,
         )
@@ -240,11 +238,11 @@ class Health:
         self._alerts.put(
             f"robot:{link.name}",
             "warn",
-            (_("{robot} does not answer.") if link.virtual else _("{robot} has gone.")).format(
+            (_("{robot} is not responding.") if link.virtual else _("{robot} disconnected.")).format(
                 robot=link.name
             ),
             _(VIRTUAL if link.virtual else REAL),
-            button=_("Start it again") if link.virtual else _(ASK_DOCTOR),
+            button=_("Restart it") if link.virtual else _(ASK_DOCTOR),
             action=f"connect:{link.name}" if link.virtual else "help.doctor",
             count=0,
         )
@@ -272,7 +270,7 @@ class Health:
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():
-            said = _("{why}. It is tried again each second.").format(why=f"{why[:1].upper()}{why[1:]}")
+            said = _("{why}. Studio tries again every second.").format(why=f"{why[:1].upper()}{why[1:]}")
             title = _("Stop can't reach {robot}.").format(robot=name)
             self._alerts.put(f"stop:{name}", "error", title, said, count=0)
         self._unreachable = set(problems)
@@ -285,7 +283,7 @@ class Health:
         if not wrong:
             self._alerts.resolve(f"moving:{link.name}")
             return
-        said = _("Switch it off by hand if it does not stand still.")
+        said = _("Switch it off by hand if it is still moving.")
         self._alerts.put(
             f"moving:{link.name}",
             "error",
@@ -305,7 +303,7 @@ class Health:
                 ngettext(
                     "{robot} rejected {count} message.", "{robot} rejected {count} messages.", rejected.value
                 ),
-                _("They were too large, not readable or too many. Its log has the topics and reasons."),
+                _("They were too large, invalid or too many. The driver's log has the topics and reasons."),
             ),
             "errors": (
                 errors,
@@ -314,7 +312,7 @@ class Health:
                     "The driver of {robot} caught {count} exceptions.",
                     errors.value,
                 ),
-                _("Its log has the traceback."),
+                _("The traceback is in its log."),
             ),
         }
         for kind, (count, title, detail) in said.items():
@@ -343,10 +341,10 @@ class Health:
         self._alerts.put(
             id,
             "error",
-            _("The camera of {robot} has been silent for {seconds} s.").format(
+            _("The camera of {robot} has sent nothing for {seconds} s.").format(
                 robot=link.name, seconds=int(topic.silent_s)
             ),
-            _("Blocks that need its picture wait."),
+            _("Blocks that need its images are waiting."),
             button=_(ASK_DOCTOR),
             action="help.doctor",
             count=0,

@@ -24,8 +24,8 @@ WARM_C = 60
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
-REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver errors")
-LEFT_ALONE, SIGN_OF_LIFE = lazy("Left alone"), lazy("Sign of life")
+REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
+LEFT_ALONE, SIGN_OF_LIFE = lazy("When its program stops"), lazy("Last response")
 TOLD = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
 AgeWords = Callable[[float], str]
@@ -73,29 +73,35 @@ def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
     age = age_words(now - link.answered_s) if link.answered_s is not None else ""
     if not link.connected:
         if link.gone_s is None:
-            words = _("gone; start it again") if link.virtual else _("gone; check that it is on")
+            words = (
+                _("disconnected; restart it")
+                if link.virtual
+                else _("disconnected; check that it is switched on")
+            )
             return HealthFact(CONNECTION, "warn", words)
         words = (
-            _("gone for {age}; start it again") if link.virtual else _("gone for {age}; check that it is on")
+            _("disconnected {age} ago; restart it")
+            if link.virtual
+            else _("disconnected {age} ago; check that it is switched on")
         )
         return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
     if link.mute:
         return HealthFact(CONNECTION, "error", _mute(link, age))
-    words = _("last answer {age} ago").format(age=age) if age else _("connected; not asked yet")
+    words = _("last response {age} ago").format(age=age) if age else _("connected; no question sent yet")
     return HealthFact(CONNECTION, "ok", words)
 
 
 def _mute(link: RobotLink, age: str) -> str:
     if not age:
         return (
-            _("does not answer; start it again")
+            _("not responding; restart it")
             if link.virtual
-            else _("does not answer; check that it is on")
+            else _("not responding; check that it is switched on")
         )
     words = (
-        _("does not answer; its last answer is {age} old; start it again")
+        _("not responding for {age}; restart it")
         if link.virtual
-        else _("does not answer; its last answer is {age} old; check that it is on")
+        else _("not responding for {age}; check that it is switched on")
     )
     return words.format(age=age)
 
@@ -106,7 +112,7 @@ def _battery(link: RobotLink) -> Iterable[HealthFact]:
             continue
         value = finite(link.values.get(sensor.name))
         if value is None:
-            yield HealthFact(BATTERY, "off", _("not told yet"))
+            yield HealthFact(BATTERY, "off", _("not reported yet"))
         elif value < LOW_PERCENT:
             yield HealthFact(BATTERY, "warn", _("{percent} %; charge it soon").format(percent=f"{value:.0f}"))
         else:
@@ -122,7 +128,7 @@ def _temperature(link: RobotLink) -> Iterable[HealthFact]:
             yield HealthFact(
                 TEMPERATURE,
                 "warn",
-                _("{what} warm, {degrees} °C; let it rest").format(what=what, degrees=f"{value:.0f}"),
+                _("{what} warm, {degrees} °C; let it cool down").format(what=what, degrees=f"{value:.0f}"),
             )
         else:
             yield HealthFact(TEMPERATURE, "ok", f"{what} {value:.0f} °C")
@@ -146,12 +152,12 @@ def _stop(link: RobotLink) -> HealthFact:
     if link.may_move:
         return HealthFact(STOP, "error", link.may_move)
     if link.connected and not link.is_reached:
-        return HealthFact(STOP, "off", _("would not arrive yet; the robot is being connected"))
+        return HealthFact(STOP, "off", _("can't be sent yet: the robot is connecting"))
     if link.stopping:
-        return HealthFact(STOP, "off", _("told to stop; its answer is waited for"))
+        return HealthFact(STOP, "off", _("Stop sent; waiting for confirmation"))
     if link.last_stop is not None:
         return HealthFact(STOP, link.last_stop_status, link.last_stop)
-    said = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot cannot confirm")
+    said = _("not used yet") if link.can_confirm_stop else _("not used yet; this robot can't confirm")
     return HealthFact(STOP, "off", said)
 
 
@@ -164,12 +170,12 @@ def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[He
         yield HealthFact(CAMERA, "error", _("silent for {age}").format(age=age_words(topic.silent_s)))
     elif topic is not None and topic.rate_hz:
         yield HealthFact(
-            CAMERA, "ok", _("sends {rate} pictures a second").format(rate=f"{topic.rate_hz:.0f}")
+            CAMERA, "ok", _("sends {rate} images per second").format(rate=f"{topic.rate_hz:.0f}")
         )
     elif topic is not None and topic.gone_s is None and topic.heard_since is None:
-        yield HealthFact(CAMERA, "off", _("ready; nobody is watching"))
+        yield HealthFact(CAMERA, "off", _("ready (not in use)"))
     else:
-        yield HealthFact(CAMERA, "off", _("no picture yet"))
+        yield HealthFact(CAMERA, "off", _("no image yet"))
 
 
 def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
@@ -222,7 +228,7 @@ def _count(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]
 def _left_alone(link: RobotLink) -> HealthFact:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
-        return HealthFact(LEFT_ALONE, "off", _("does not stop by itself; stay near its switch"))
+        return HealthFact(LEFT_ALONE, "off", _("keeps moving: stay near its switch"))
     return HealthFact(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 

@@ -123,7 +123,7 @@ class Launcher:
         self.ended: frozenset[str] = frozenset()
         """The virtual robots started here whose processes have ended by themselves."""
         sentence = (
-            _("The master can't be started.") if is_loopback(address) else _("The master does not answer.")
+            _("The master can't be started.") if is_loopback(address) else _("The master does not respond.")
         )
         self._master = MasterStart(
             address, lambda why: post_event(LaunchFailed("master", sentence, why, False))
@@ -264,7 +264,7 @@ class Launcher:
                 self._post_event(
                     LaunchFailed(
                         name,
-                        _("The virtual robot {robot} has ended.").format(robot=name),
+                        _("The virtual robot {robot} ended.").format(robot=name),
                         said.strip()[-TAIL_LETTERS:] or _silent_end(code),
                     )
                 )
@@ -290,8 +290,8 @@ def _end(process: Process) -> None:
 def _silent_end(code: int) -> str:
     """What is known of a process that ended without a word; a negative code is the number of a signal."""
     if code < 0:
-        return _("Something else on this computer ended it.")
-    return _("It did not say why (exit code {code}).").format(code=code)
+        return _("Another program on this computer stopped it.")
+    return _("It gave no reason (exit code {code}).").format(code=code)
 
 
 def _tail(log: IO[bytes]) -> str:

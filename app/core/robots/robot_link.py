@@ -26,9 +26,9 @@ FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
 STATE_WORDS = {
     NOT_STOPPED: lazy("not stopped"),
     STOPPING: lazy("stopping"),
-    "away": lazy("away"),
+    "away": lazy("not running"),
     CONNECTING: lazy("connecting"),
-    "silent": lazy("silent"),
+    "silent": lazy("not responding"),
     "busy": lazy("busy"),
     "ready": lazy("ready"),
 }
@@ -166,13 +166,13 @@ class RobotLink:
         """How it is, as people read it: ``ready``, ``may still move``, ``does not answer``."""
         state = self.state
         if self.connected and self.mute and state == NOT_STOPPED and not self.not_stopped:
-            return _("does not answer")
+            return _("not responding")
         if state == NOT_STOPPED and (
             self.may_move or may_move(self.name, self.goes_on) or may_move(self.name, self.not_stopped)
         ):
             return _("may still move")
         if self.connected and state == "silent":
-            return _("does not answer") if self.mute else self.silent or _(STATE_WORDS[state])
+            return _("not responding") if self.mute else self.silent or _(STATE_WORDS[state])
         return _(STATE_WORDS[state])
 
     @property

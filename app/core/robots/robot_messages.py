@@ -99,6 +99,6 @@ class RobotMessages:
             return
         before, link.goes_on = link.goes_on, ""
         if answer["not_ended"]:
-            link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action has not ended"))
+            link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action is still running"))
         elif before and link.not_stopped:
             self._settled[link.name] = None

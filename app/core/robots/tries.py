@@ -53,7 +53,7 @@ class Tries:
                 link,
                 made,
                 "failed",
-                _("{robot} can't be reached; check that it is on").format(robot=link.name),
+                _("{robot} can't be reached; check that it is switched on").format(robot=link.name),
             )
         return made
 
@@ -105,13 +105,15 @@ class Tries:
         if robot.dialect == "native" and made.state == "sent":
             if now - made.started_s > FIRST_ANSWER_S:
                 self._mute(
-                    link, made, _("{robot} does not answer. Check that it is on.").format(robot=link.name)
+                    link,
+                    made,
+                    _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
         silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
         if silence is not None and now - link.heard_s > silence:
             said = _(
-                "{robot} has stopped answering. Check that it is on; Stop tells it to stand still."
+                "{robot} stopped responding. Check that it is switched on; press Stop to make it stand still."
             ).format(robot=link.name)
             self._mute(link, made, said)
             return

@@ -57,9 +57,7 @@ class ChildProcess:
                 start_new_session=os.name == "posix",  # a group of its own, which can be ended at once
             )
         except OSError as error:
-            raise RunnerError(
-                _("the program's process can't be started: {error}").format(error=error)
-            ) from error
+            raise RunnerError(_("can't start the program's process: {error}").format(error=error)) from error
         self._process = _process(self.popen.pid)
 
     @property

@@ -513,7 +513,7 @@ class Runs:
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
         if not event.ok and not self._run.errors:
-            self._alerts.put("program", "error", _("The behaviour ended by itself."), event.text)
+            self._alerts.put("program", "error", _("The behaviour ended unexpectedly."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         """Stop the robots ``names``, or all."""

@@ -132,7 +132,7 @@ class Runner:
         is slow motion (`set_pace`). RunnerError if its process can't be started.
         """
         if self._child is not None:
-            raise RunnerError(_("this runner has run its program; make another one"))
+            raise RunnerError(_("this runner has already run its program; create a new one"))
         self._child = child = ChildProcess(self._command, home(), most_bytes=self._most_bytes)
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
@@ -267,13 +267,13 @@ class Runner:
         """Say how much was not shown."""
         if events:
             text = ngettext(
-                "{count} line was left out: too many at once",
-                "{count} lines were left out: too many at once",
+                "{count} line was dropped: too many at once",
+                "{count} lines were dropped: too many at once",
                 events,
             ).format(count=events)
             self._on_event(RunnerEvent("print", self.run, text=text))
         if strange_bytes >= WORTH_TELLING:
-            text = _("{size} MB that no block wrote were left out").format(
+            text = _("{size} MB of unexpected output were discarded").format(
                 size=number(strange_bytes / 1e6, ".1f")
             )
             self._on_event(RunnerEvent("print", self.run, text=text))
@@ -305,7 +305,7 @@ class Runner:
     def _why(self, child: ChildProcess, *, hung: bool) -> str:
         """Why a process ended that did not say so."""
         if child.too_large:
-            return _("The program used more than {size} GB of memory and was ended.").format(
+            return _("The program used more than {size} GB of memory and was stopped.").format(
                 size=number(self._most_bytes / 1e9)
             )
         if hung:
@@ -320,7 +320,7 @@ class Runner:
         if code < 0:
             how = _("The program's process was killed (signal {signal})").format(signal=-code)
         else:
-            how = _("The program's process ended with code {code}").format(code=code)
+            how = _("The program's process ended with exit code {code}").format(code=code)
         return f"{how}: {words.strip()}." if words else f"{how}."
 
     def _read_errors(self, child: ChildProcess) -> None:

@@ -31,7 +31,10 @@ class StopNews:
         motions = (self._fleet.moved.motion(name) for name in report.silent)
         return (
             *(motion.sentence for motion in motions if motion is not None and motion.is_known),
-            *(_("Stop is sent to {robot} as soon as it is connected").format(robot=name) for name in pending),
+            *(
+                _("Stop will be sent to {robot} as soon as it is connected").format(robot=name)
+                for name in pending
+            ),
         )
 
     def tell_person(self, report: StopReport, origin: str) -> None:
@@ -41,7 +44,7 @@ class StopNews:
                 program=program, robot=name
             )
             self._console.add("error", origin, said)
-            detail = _("Find out what this program is and close it.")
+            detail = _("Find out what this program is, and close it.")
             self._alerts.put(f"stranger:{name}", "error", f"{said}.", detail)
         words = result_words(report)
         if not report.unproven:

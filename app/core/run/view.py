@@ -13,8 +13,8 @@ MOST_NAMED = 4
 WIDEST_NAMES = 24
 """Longer names of robots are not repeated on the button beside the sentence that has them."""
 APPLIES_LATER = lazy("Your changes apply at the next Run")
-NOTHING = lazy("Take “when started” from Events and put blocks below it")
-RUN, GO_ON, RESTART = lazy("Run"), lazy("Go on"), lazy("Restart")
+NOTHING = lazy("Drag “when started” from Events and put blocks below it")
+RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 
@@ -135,7 +135,7 @@ def _tried(view: RunView, run: RunState) -> RunView:
         detail = view.detail
         if run.finished:
             words = _("Tried “{block}”")
-            detail = _("It came to its end") if run.value is None else run.value
+            detail = _("Finished") if run.value is None else run.value
         title = words.format(block=run.trying)
         compact = view.compact if view.result else title
         return replace(view, title=title, detail=detail, compact=compact)
@@ -156,7 +156,9 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
         if not run.begun:
             return replace(view, title=_("{name} is starting").format(name=run.name))
         elapsed = run.elapsed_s if run.state == "stopping" and run.elapsed_s is not None else run.elapsed(now)
-        return replace(view, title=_("{name} runs, {time}").format(name=run.name, time=seconds(elapsed)))
+        return replace(
+            view, title=_("{name} is running, {time}").format(name=run.name, time=seconds(elapsed))
+        )
     if view.state == "paused":
         if run.paused_at:
             words = _("{name} is paused at “{block}”")
@@ -209,7 +211,7 @@ def _ended_without_robots(run: RunState) -> bool:
 def _running(run: RunState, now: float) -> RunView:
     title, compact = _("Starting"), _("{name} is starting")
     if run.begun:
-        title, compact = _("Running, {time}"), _("{name} runs, {time}")
+        title, compact = _("Running, {time}"), _("{name} is running, {time}")
     time_words = seconds(run.elapsed(now))
     return RunView(
         "running",
@@ -243,7 +245,7 @@ def _paused(run: RunState, _now: float) -> RunView:
 
 
 def _paused_detail(run: RunState) -> str:
-    return run.warning or _("Robots hold still; the clock stands")
+    return run.warning or _("Robots and timers are paused")
 
 
 def _stopping_early(run: RunState, now: float) -> RunView:
@@ -281,10 +283,10 @@ _ENDED = {
     ("stopped", False, False): lazy("Stopped"),
     ("stopped", True, True): lazy("{name} stopped after {time}"),
     ("stopped", True, False): lazy("{name} stopped"),
-    ("problem", False, True): lazy("Stopped by a problem after {time}"),
-    ("problem", False, False): lazy("Stopped by a problem"),
-    ("problem", True, True): lazy("{name} stopped by a problem after {time}"),
-    ("problem", True, False): lazy("{name} stopped by a problem"),
+    ("problem", False, True): lazy("Stopped after {time} because of an error"),
+    ("problem", False, False): lazy("Stopped because of an error"),
+    ("problem", True, True): lazy("{name} stopped after {time} because of an error"),
+    ("problem", True, False): lazy("{name} stopped because of an error"),
     ("finished", False, True): lazy("Finished after {time}"),
     ("finished", False, False): lazy("Finished"),
     ("finished", True, True): lazy("{name} finished after {time}"),
@@ -296,11 +298,11 @@ _ENDED = {
 def _proven(run: RunState, _now: float) -> RunView:
     report = run.report if run.report is not None and run.report.robots else None
     words = result_words(report) if report is not None else ""
-    title, detail = _ended_title(run), _("The dashed outline shows where") if run.dashed else ""
+    title, detail = _ended_title(run), _("The dashed block is where it stopped") if run.dashed else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
     elif run.finished:
-        detail = _("Every script came to its end")
+        detail = _("All scripts finished")
     return RunView(
         "proven",
         title,
@@ -345,7 +347,7 @@ def seconds(value: float) -> str:
 def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
     """The line under Ready; of robots that are being started while there is none yet."""
     if not names and coming:
-        words = ngettext("{robots} is coming", "{robots} are coming", len(coming))
+        words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
         return words.format(robots=listed(coming))
     if not names:
         return _("No robot is connected")
@@ -362,10 +364,10 @@ def result_words(report: StopReport) -> str:
     if not names:
         return _("nothing to stop")
     if not still:
-        return _("stop sent; {robots} cannot confirm").format(robots=listed(unsure))
+        return _("stop sent; {robots} can't confirm").format(robots=listed(unsure))
     time_ms = max(1, round(report.elapsed_ms))
     if unsure:
-        words = _("{robots} stopped ({elapsed} ms); {others} cannot confirm")
+        words = _("{robots} stopped ({elapsed} ms); {others} can't confirm")
         return words.format(robots=listed(still), elapsed=time_ms, others=listed(unsure))
     if len(names) == 1:
         return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms)
@@ -374,7 +376,7 @@ def result_words(report: StopReport) -> str:
 
 def _some_stopped(stopped: int, count: int) -> str:
     if count == 1:
-        return _("1 robot stopped") if stopped else _("not stopped yet")
+        return _("1 robot stopped") if stopped else _("Stop not confirmed")
     return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 
@@ -401,9 +403,9 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
         )
     count, title = len(report.silent), _wrong_words(report)
     switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
-    still_words = ngettext("{robots} is still", "{robots} are still", count).format(robots=names)
+    still_words = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
     if len(names) > WIDEST_NAMES:  # the sentence beside the button must have room
-        still_words = ngettext("It is still", "They are still", count)
+        still_words = ngettext("It isn't moving", "They aren't moving", count)
     return title, detail, switch.format(wrong=title), still_words
 
 
@@ -416,7 +418,7 @@ def _wrong_words(report: StopReport) -> str:
         silent = [*silent[:MOST_NAMED], _("{count} more").format(count=len(silent) - MOST_NAMED)]
     wrong = [*told, *untold]
     if silent:
-        words = ngettext("{robots} did not answer", "{robots} did not answer", len(silent))
+        words = ngettext("{robots} did not respond", "{robots} did not respond", len(silent))
         wrong.append(words.format(robots=listed(silent)))
     left = len(wrong) - MOST_NAMED
     if left > 0:
@@ -428,15 +430,15 @@ def _wrong_words(report: StopReport) -> str:
 def stop_words(robot: RobotStop, clock: str) -> str:
     """What one robot did with a stop, for its health: ``answered in 41 ms, at 8:40``."""
     if not robot.can_confirm:
-        return _("sent at {time}; this robot cannot confirm").format(time=clock)
+        return _("sent at {time}; this robot can't confirm").format(time=clock)
     if robot.answered:
         elapsed = max(1, round(robot.elapsed_ms or 0))
-        return _("answered in {elapsed} ms, at {time}").format(elapsed=elapsed, time=clock)
+        return _("confirmed in {elapsed} ms, at {time}").format(elapsed=elapsed, time=clock)
     if robot.error:
         return _("{wrong}, at {time}").format(wrong=robot.wrong, time=clock)
     if robot.program:
         return _("“{program}” has not answered, at {time}").format(program=robot.program, time=clock)
-    return _("not answered, at {time}").format(time=clock)
+    return _("not confirmed, at {time}").format(time=clock)
 
 
 def clock_words(now: time.struct_time) -> str:

@@ -27,7 +27,7 @@ class UnwritableFolderError(AppError):
     def __init__(self, folder: Path, reason: str) -> None:
         self.folder, self.reason = folder, reason
         super().__init__(
-            _("the folder '{folder}' can't be written ({reason}); choose another one").format(
+            _("can't write to the folder '{folder}' ({reason}); choose another one").format(
                 folder=folder, reason=reason
             )
         )

@@ -74,7 +74,7 @@ class SelfTest:
             )
         else:
             if code != 0:
-                self.fail(_("Studio ended with the code {code}").format(code=code))
+                self.fail(_("Studio ended with exit code {code}").format(code=code))
         if not self.report.why:
             self.seen()  # it has closed
         self._end_processes()
@@ -103,7 +103,7 @@ class SelfTest:
         if self.report.why:
             end_family()
             return
-        self.begin("processes", _("every process of the test has ended"))
+        self.begin("processes", _("every process of the test exits"))
         family = [each for each in children() if not is_web(each) and not is_of_windows(each)]
         masters = [each for each in family if is_master(each)]
         for each in masters:
@@ -112,7 +112,7 @@ class SelfTest:
         _gone, left = psutil.wait_procs(family, timeout=bounds.STEP_S["processes"])
         if left:
             names = listed([f"{each.pid} ({' '.join(command(each)[:4])})" for each in left])
-            self.fail(_("These processes did not end: {names}").format(names=names))
+            self.fail(_("These processes did not exit: {names}").format(names=names))
             end_family()
         else:
             self.seen()
@@ -129,7 +129,9 @@ class SelfTest:
             while (left := min(self._step_until, self._all_until + bounds.GRACE_S) - time.monotonic()) > 0:
                 self._news.wait(left)
             what = self._what
-        self.fail(_("Studio did not answer in time, and was ended. It waited for: {what}").format(what=what))
+        self.fail(
+            _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
+        )
         self.report.end()
         with suppress(OSError, ValueError):  # it is closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)

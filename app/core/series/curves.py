@@ -120,7 +120,7 @@ class Curves:
         there = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in there]
         if not sources:
-            raise CurveError(_("{text} has no elements now").format(text=text))
+            raise CurveError(_("{text} is empty now").format(text=text))
         if len(self.all) + len(new) > MOST_CURVES:
             raise CurveError(_("a plot has at most {count} curves").format(count=MOST_CURVES))
         made = []
@@ -207,10 +207,10 @@ class Curves:
         if found is MISSING:
             near = meant_field(curve.of.path, payload)
             if near is None:
-                return _("There is no {field}.").format(field=curve.text)
+                return _("{field} does not exist.").format(field=curve.text)
             meant = FieldSource(curve.of.topic, FieldPath.parse(near))
-            return _("There is no {field}. Did you mean {near}?").format(field=curve.text, near=meant)
-        return _("{field} is no number, text or yes or no. Choose one of its fields.").format(
+            return _("{field} does not exist. Did you mean {near}?").format(field=curve.text, near=meant)
+        return _("{field} is not a number, text or boolean. Choose one of its fields.").format(
             field=curve.text
         )
 

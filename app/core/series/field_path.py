@@ -76,11 +76,11 @@ class FieldPath:
             found = _STEP.match(text, at)
             bare = found is not None and found["name"] is not None and bool(steps) and text[at] != "."
             if found is None or bare or len(steps) >= MOST_STEPS or len(text) > LONGEST:
-                raise CurveError(_("'{path}' is no path to a field").format(path=text[:80]))
+                raise CurveError(_("'{path}' is not a field path").format(path=text[:80]))
             steps.append(_step_of(found))
             at = found.end()
         if not steps:
-            raise CurveError(_("a field is missing behind the topic"))
+            raise CurveError(_("the field after the topic is missing"))
         return cls(tuple(steps))
 
     @property
@@ -135,7 +135,7 @@ def _step_of(found: re.Match[str]) -> Step:
     try:
         key = json.loads(found["key"])
     except ValueError:
-        raise CurveError(_("'{path}' is no path to a field").format(path=found["key"][:80])) from None
+        raise CurveError(_("'{path}' is not a field path").format(path=found["key"][:80])) from None
     return str(key)
 
 

@@ -114,7 +114,7 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     """
     text = text.strip()
     if not text or len(text) > LONGEST:
-        raise CurveError(_("type a field, as /odom.speed, or something to calculate from fields"))
+        raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
     found = address(text, topics)
     return found if found is not None else _Reader(text, topics).read()
 
@@ -141,12 +141,12 @@ class _Reader:
         try:
             tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
-            raise CurveError(_("'{text}' can't be read").format(text=self._text[:80])) from None
+            raise CurveError(_("'{text}' can't be parsed").format(text=self._text[:80])) from None
         if sum(1 for _node in ast.walk(tree)) > MOST_NODES:
-            raise CurveError(_("this is too much for one curve; make curves of its parts"))
+            raise CurveError(_("this is too complex for one curve; use several curves"))
         source = self._source(tree.body)
         if source is None:
-            raise CurveError(_("a field is missing: this is the same number always"))
+            raise CurveError(_("the formula has no field, so its value never changes"))
         return source
 
     def _without_fields(self) -> str:
@@ -166,7 +166,7 @@ class _Reader:
                 place, wants_value = duration.end(), False
                 continue
             if letter == "_" and wants_value:
-                raise CurveError(_("'{text}' can't be read").format(text=self._text[:80]))
+                raise CurveError(_("'{text}' can't be parsed").format(text=self._text[:80]))
             out.append("**" if letter == "^" else letter)
             if not letter.isspace():
                 wants_value = letter in "(,+-*/%^"
@@ -182,10 +182,10 @@ class _Reader:
             raise unknown_topic(unknown[0] if unknown is not None else rest[:40], self._topics)
         path = _FIELD.match(rest, len(topic))
         if path is None:
-            raise CurveError(_("a field is missing behind {topic}").format(topic=topic))
+            raise CurveError(_("the field after {topic} is missing").format(topic=topic))
         found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
         if found.path.has_every:
-            raise CurveError(_("[*] means several curves; calculate with one of them"))
+            raise CurveError(_("[*] means several curves; use one of them in a formula"))
         self._fields.append(found)
         return place + path.end()
 
@@ -206,14 +206,14 @@ class _Reader:
             raise CurveError(_("{name} is written as {example}").format(name=kind, example=example))
         of = self._source(node.args[0])
         if of is None:
-            raise CurveError(_("a field is missing: this is the same number always"))
+            raise CurveError(_("the formula has no field, so its value never changes"))
         window_s = 0.0
         if kind == "mean":
             window = node.args[1]
             if isinstance(window, ast.Constant) and type(window.value) in {int, float}:
                 window_s = float(window.value)  # type: ignore[arg-type]
             if not 0 < window_s <= LONGEST_WINDOW_S:
-                raise CurveError(_("a mean is taken over more than 0 and at most 600 s"))
+                raise CurveError(_("a mean needs a duration above 0 and up to 600 s"))
         return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
 
     def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
@@ -252,11 +252,11 @@ class _Reader:
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
         if not is_field and not (isinstance(node, ast.Call) and name in WINDOWED):
             near = nearest(name, [*FUNCTIONS, *WINDOWED])
-            said = _("there is no '{name}'; {hint}")
+            said = _("'{name}' does not exist; {hint}")
             hint = (
                 _("did you mean '{near}'?").format(near=near)
                 if near
-                else _("topics begin with a slash, as /odom.speed")
+                else _("topics begin with a slash, such as /odom.speed")
             )
             raise CurveError(said.format(name=name[:40], hint=hint))
         source = self._source(node)
@@ -283,5 +283,5 @@ def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
     """The sentence for a topic that is not there, with the nearest one."""
     near = nearest(name, list(topics))
     if near is None:
-        return CurveError(_("there is no topic {topic}").format(topic=name))
-    return CurveError(_("there is no topic {topic}; did you mean {near}?").format(topic=name, near=near))
+        return CurveError(_("topic {topic} does not exist").format(topic=name))
+    return CurveError(_("topic {topic} does not exist; did you mean {near}?").format(topic=name, near=near))

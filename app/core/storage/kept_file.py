@@ -48,7 +48,7 @@ def read_kept(
     try:
         value, problem = parse(data)
     except newer as error:
-        said = _("The file is left as it is, and what you change is not kept: {reason}.")
+        said = _("Your changes are not being saved: {reason}. The file is unchanged.")
         return KeptFile(None, said.format(reason=error), is_newer=True)
     except NepError as error:
         return KeptFile(None, _put_aside(path, str(error)))
@@ -63,4 +63,4 @@ def _put_aside(path: Path, reason: str, data: bytes | None = None) -> str:
             replace_file(path, beside)
         else:
             write_atomically(beside, data, durable=False, private=True)
-    return _("The file is kept as “{file}”: {reason}.").format(file=beside.name, reason=reason)
+    return _("The file was saved as “{file}”: {reason}.").format(file=beside.name, reason=reason)

@@ -220,8 +220,8 @@ class Settings:
         if self.path.exists():
             return self._read()
         self.notice = _(
-            "The settings in “{file}” are of a newer NEP Studio (format {format}). They are left as they are;"
-            " what you choose here is kept beside them."
+            "The settings in “{file}” belong to a newer NEP Studio (format {format}) and are "
+            "unchanged. Settings you change here are saved separately."
         ).format(file=found, format=_format_of(newer))
         return {name: value for name, value in newer.items() if name != "format"}
 
@@ -246,7 +246,7 @@ class Settings:
             self.damaged = None
             return {}
         self.notice = _(
-            "The settings could not be read, so Studio starts with new ones. The file is kept as “{file}”."
+            "The settings could not be read, so Studio uses defaults. The old file was kept as “{file}”."
         ).format(file=self.damaged.name)
         return {}
 

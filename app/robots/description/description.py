@@ -51,7 +51,7 @@ def announced(message: Message) -> Robot:
     """
     size = len(message.data)
     if size > LARGEST_BYTES:
-        said = _("it has {size} MB, and at most {LARGEST_BYTES} MB are read").format(
+        said = _("it has {size} MB; the limit is {LARGEST_BYTES} MB").format(
             size=number(size / 1000000.0, ".1f"), LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
         )
         raise DescriptionError(message.topic, (said,))

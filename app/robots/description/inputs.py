@@ -218,7 +218,7 @@ def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[Input
     problems = []
     for name in unknown[:_MAX_UNKNOWN_NAMED]:
         close = near_miss(str(name), known)
-        words = _("there is no “{word}”; did you mean “{close}”?") if close else _("there is no “{word}”")
+        words = _("unknown name “{word}”; did you mean “{close}”?") if close else _("unknown name “{word}”")
         problems.append(InputProblem("", words.format(word=quotable(name), close=close)))
     if len(unknown) > _MAX_UNKNOWN_NAMED:
         count = len(unknown) - _MAX_UNKNOWN_NAMED
@@ -284,7 +284,7 @@ def _wrong_list(parameter: Parameter, value: object, place: str) -> str | None:
         inner = _("{place} value {number}").format(place=place, number=at + 1)
         wrong = None if held is None else wrong_value(held, item, inner)
         if held is None and not _is_json(item):
-            wrong = _("{place} is nothing that a list can hold").format(place=inner)
+            wrong = _("{place} can't be an item of a list").format(place=inner)
         if wrong is not None:
             return wrong
     return None

@@ -63,9 +63,7 @@ def validate(model: object) -> tuple[str, ...]:
     control = control_in(str(model.get("title")))
     if control:
         problems.append(
-            _("title: '{control}' can't be used in a name, which would look like another one").format(
-                control=control
-            )
+            _("title: '{control}' can't be used in a name because it is invisible").format(control=control)
         )
     if not problems:
         problems = list(_contradictions(model))
@@ -116,7 +114,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
         )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
-        return _("{place} is no usable number").format(place=path)
+        return _("{place} is not a usable number").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
         return None
     return _("{place} is not JSON: {kind}").format(place=path, kind=type(value).__name__)
@@ -126,7 +124,9 @@ def _bad_key(key: object, place: str) -> str | None:
     if not isinstance(key, str):
         return _("{place} has a name that is not text: {name}").format(place=place, name=repr(key))
     if key == "$ref":
-        return _("{place} uses $ref, which is not allowed here; write the part out").format(place=place)
+        return _("{place} uses $ref, which is not supported; write the definition in place").format(
+            place=place
+        )
     return None
 
 
@@ -157,7 +157,7 @@ _RULES = {
     "maxProperties": _LONG,
     "anyOf": lazy("{place} has the wrong form"),
 }
-NOT_UNDERSTOOD = lazy("{place} can not be understood")
+NOT_UNDERSTOOD = lazy("{place} is not valid")
 WHOLE = lazy("the description")
 
 
@@ -177,7 +177,7 @@ def _sentence(error: ValidationError) -> str:
         return _("{place} must be {value}").format(place=place, value=limit)
     if rule == "pattern":
         shown = _shortened(error.instance)
-        return _("{place}: {value} can't be used here; use letters, digits, - and _ without spaces").format(
+        return _("{place}: {value} is not allowed; use letters, digits, - and _ without spaces").format(
             place=place, value=shown
         )
     return _(_RULES.get(rule, NOT_UNDERSTOOD)).format(place=place, limit=limit)
@@ -196,12 +196,14 @@ def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
     properties = part(model, "properties")
     stop = bounded_str(part(model, "rb:safeStop").get("action"))
     if stop not in actions:
-        yield _("rb:safeStop.action names '{stop}', but there is no such action").format(stop=stop)
+        yield _("rb:safeStop.action names '{stop}', which is not an action").format(stop=stop)
     elif part(part(actions, stop), "input").get("required"):
         yield _("'{stop}' is the safe stop, so its input must not require anything").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
     for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
-        yield _("'{name}' names two things of one robot; its topics would be the same").format(name=name)
+        yield _("'{name}' is used for two things of one robot; their topics would be the same").format(
+            name=name
+        )
     for name, action in actions.items():
         yield from _of_action(name, as_part(action), resources_named, properties)
     for name, sensor in properties.items():
@@ -225,7 +227,7 @@ def _of_action(
     yield from _of_fields(f"actions.{name}.input", fields)
     for field in names(part(action, "input").get("required")):
         if field not in fields:
-            yield _("actions.{name}.input requires '{field}', which it does not describe").format(
+            yield _("actions.{name}.input requires '{field}', which it does not define").format(
                 name=name, field=field
             )
     for used in names(action.get("rb:uses")):
@@ -237,7 +239,7 @@ def _of_action(
         source = as_part(data).get("rb:optionsFrom")
         if source is not None and source not in properties:
             yield _(
-                "actions.{name}.input.{field} takes its options from '{source}', which is no property"
+                "actions.{name}.input.{field} takes its options from '{source}', which is not a property"
             ).format(name=name, field=field, source=source)
     yield from _of_texts(f"actions.{name}", action, fields)
 
@@ -245,7 +247,7 @@ def _of_action(
 def _of_fields(place: str, fields: Mapping[str, object]) -> Iterator[str]:
     for name, data in fields.items():
         if name == "robot":
-            yield _("{place}: 'robot' is taken; name the value differently").format(place=place)
+            yield _("{place}: the name 'robot' is reserved; use another one").format(place=place)
         yield from _of_data(f"{place}.{name}", as_part(data))
 
 
@@ -267,7 +269,7 @@ def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, obje
             used = PLACEHOLDER.findall(str(text))
             for name in used:
                 if name != "robot" and name not in fields:
-                    yield _("{place}.rb:block.{kind}.{language} uses %{name}, which is not described").format(
+                    yield _("{place}.rb:block.{kind}.{language} uses %{name}, which is not defined").format(
                         place=place, kind=kind, language=language, name=name
                     )
             if kind == "text" and len(used) != len(set(used)):

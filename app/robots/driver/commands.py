@@ -119,7 +119,7 @@ class CommandHandler:
         elif operation == "invoke":
             self._invoke(wanted, message, program, publisher, epoch)
         else:
-            error = _("there is no “{operation}”; a command is invoke, cancel, stop or alive").format(
+            error = _("unknown operation “{operation}”; use invoke, cancel, stop or alive").format(
                 operation=quotable(operation)
             )
             self._answering(wanted, quotable(operation), "")(Answer("failed", error=error))
@@ -159,7 +159,7 @@ class CommandHandler:
                 return spec.returns.told(returned)
             except RobotValueError as error:
                 raise Failed(
-                    _("{name} was done, but its result is wrong: {error}").format(
+                    _("{name} finished, but its result is invalid: {error}").format(
                         name=action.name, error=error
                     )
                 ) from error
@@ -226,7 +226,7 @@ class CommandHandler:
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
         if error is not None and wanted in self._open and error == NOTHING_RUNS:
-            error = _("only who asked for “{action}” can cancel it; a stop is for everybody").format(
+            error = _("only the program that started “{action}” can cancel it; anyone can stop").format(
                 action=name or wanted
             )
         if error is not None:

@@ -295,7 +295,7 @@ class Kind:
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
         twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
         return [
-            _("{found}: '{name}' is there twice, first in line {number}").format(
+            _("{found}: '{name}' is defined twice, first in line {number}").format(
                 found=found[-1], name=name, number=found[0].number
             )
             for name, found in twice
@@ -303,7 +303,7 @@ class Kind:
 
     def _members(self) -> list[tuple[str, object]]:
         if not isinstance(self.body, type):
-            raise DescriptionError(self.model, (_("a robot is declared by a class"),))
+            raise DescriptionError(self.model, (_("a robot is declared as a class"),))
         found: dict[str, object] = {}
         for owner in reversed(self.body.__mro__):
             found.update(vars(owner))
@@ -345,12 +345,12 @@ class Kind:
 def _check_function(function: Callable[..., object]) -> None:
     """TypeError for a function that could not be called, or that would not run when it is."""
     if inspect.isgeneratorfunction(function) or inspect.isasyncgenfunction(function):
-        raise TypeError(
-            _("it has a yield, so a call would run nothing; tell what happens with call.feedback")
-        )
+        raise TypeError(_("actions can't be generators (yield); report progress with call.feedback"))
     names = list(inspect.signature(function).parameters)
     if names[1:2] != ["call"]:
-        raise TypeError(_("after 'self' an action takes its call; write def NAME(self, call: Call, ...)"))
+        raise TypeError(
+            _("the parameter after 'self' must be the call; write def NAME(self, call: Call, ...)")
+        )
 
 
 def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema:

@@ -55,7 +55,7 @@ class Driver:
             raise DescriptionError(
                 name,
                 (
-                    _("it is larger than {LARGEST_BYTES} MB; nobody would read it").format(
+                    _("it is larger than {LARGEST_BYTES} MB, the limit").format(
                         LARGEST_BYTES=number(LARGEST_BYTES / 1000000.0, ".0f")
                     ),
                 ),
@@ -301,7 +301,7 @@ class EventLoop:
             call.on_cancel(partial(self._soon, waited.cancel))
         if not waited.ended.wait(within_s) and within_s is not None:
             self._soon(waited.cancel)
-            raise TimeoutError(_("it has not ended within {seconds} s").format(seconds=number(within_s)))
+            raise TimeoutError(_("it has not ended after {seconds} s").format(seconds=number(within_s)))
         if waited.error is not None:
             raise waited.error
         return waited.result
@@ -324,10 +324,8 @@ class EventLoop:
                 if asyncio.iscoroutine(work):
                     work.close()
                 if self._closed:
-                    raise RuntimeError(_("a coroutine can't be run here; the robot has ended"))
-                raise RuntimeError(
-                    _("a coroutine can't be run here; use await: this is the event loop itself")
-                )
+                    raise RuntimeError(_("a coroutine can't run here: the robot has ended"))
+                raise RuntimeError(_("use await: this code runs in the event loop itself"))
             if self._loop is None:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"

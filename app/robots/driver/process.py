@@ -37,9 +37,9 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     invalid arguments.
     """
     parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
-    parser.add_argument("--name", default=kind.title, help=_("the robot's name; its topics begin with it"))
-    parser.add_argument("--master", default=None, help=_("the master's address (default: $NEP_MASTER)"))
-    parser.add_argument("--owner-pid", type=int, default=None, help=_("end when this process is gone"))
+    parser.add_argument("--name", default=kind.title, help=_("robot name; its topics begin with it"))
+    parser.add_argument("--master", default=None, help=_("master address (default: $NEP_MASTER)"))
+    parser.add_argument("--owner-pid", type=int, default=None, help=_("exit when this process has ended"))
     chosen = parser.parse_args(arguments)
     ended = threading.Event()
     say_where_it_crashes()
@@ -111,9 +111,7 @@ def _wait_for_master(
     has_waited = False
     while not _started(driver):
         if not has_waited:
-            words = _(
-                "{robot}: no master answers at {address}; waiting for one, start Studio or `nep master`"
-            )
+            words = _("{robot}: no master at {address}; waiting for one. Start Studio or `nep master`")
             say(words.format(robot=name, address=address))
         has_waited = True
         if is_over():

@@ -93,12 +93,12 @@ class MessageQueue:
         if has_room:
             self._post(partial(self._decode, message, use))
         else:
-            self._rejected.add(self._topic, _("messages come faster than they are handled"))
+            self._rejected.add(self._topic, _("messages arrive faster than they are handled"))
         return True
 
     def too_large(self, message: Message) -> str:
         """The sentence for a message that is too large."""
-        return _("the message has {size} kB; at most {limit} kB are read").format(
+        return _("the message has {size} kB; the limit is {limit} kB").format(
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
         )
 

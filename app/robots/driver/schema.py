@@ -125,7 +125,7 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
         return {"type": "object"} | ({} if free else {"additionalProperties": _held(arguments[1], inside)})
     if annotation in inside:
         raise TypeError(
-            _("a robot's value can't hold itself: {annotation}").format(annotation=shown(annotation))
+            _("a robot's value can't contain itself: {annotation}").format(annotation=shown(annotation))
         )
     fields = fields_of(annotation)
     if fields is not None:
@@ -198,7 +198,7 @@ def _noted(note: object, schema: Schema) -> Schema:
         return {"pattern": "^#[0-9a-fA-F]{6}$", "rb:widget": "colour"}
     if isinstance(note, _PictureText):
         return {"format": "uri-reference", "contentMediaType": "image/jpeg", "rb:widget": "image"}
-    raise TypeError(_("{note} says nothing about a robot's value").format(note=repr(note)))
+    raise TypeError(_("{note} is not a valid annotation for a robot's value").format(note=repr(note)))
 
 
 def _given(found: Mapping[str, object]) -> Schema:
@@ -215,12 +215,10 @@ def _check_unit(unit: object) -> None:
         )
     sign = _UNIT_WORDS.get(unit.lower())
     if sign is not None:
-        raise TypeError(_("there is no unit {unit}; write {sign}").format(unit=repr(unit), sign=repr(sign)))
+        raise TypeError(_("unknown unit {unit}; write {sign}").format(unit=repr(unit), sign=repr(sign)))
     if not unit or len(unit) > _LONGEST_UNIT or not unit.isprintable() or " " in unit:
         raise TypeError(
-            _("there is no unit {unit}; write it as UCUM does: 'm', 'deg', 's', 'm/s', '%'").format(
-                unit=repr(unit)
-            )
+            _("unknown unit {unit}; use UCUM: 'm', 'deg', 's', 'm/s', '%'").format(unit=repr(unit))
         )
 
 
@@ -235,17 +233,17 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
             continue
         if parameter.kind is parameter.VAR_POSITIONAL or parameter.kind is parameter.VAR_KEYWORD:
             raise TypeError(
-                _("'{name}' can't stand for any number of values; name each, or take a list").format(
+                _("'{name}' can't take a variable number of values; name each one, or use a list").format(
                     name=name
                 )
             )
         if parameter.kind is parameter.POSITIONAL_ONLY:
-            raise TypeError(_("'{name}' must be given by its name; leave out the '/'").format(name=name))
+            raise TypeError(_("'{name}' can't be positional-only; remove the '/'").format(name=name))
         if name not in hints:
             words = (
-                _("{function}: '{value}' has no type; after 'self' an action takes 'call: Call'")
+                _("{function}: '{value}' has no type; the first parameter after 'self' must be 'call: Call'")
                 if place < 2 and "call" not in {each.name for each in parameters}
-                else _("{function}: '{value}' has no type; robots need to know it")
+                else _("{function}: '{value}' needs a type annotation")
             )
             raise TypeError(words.format(function=function.__qualname__, value=name))
         found[name] = hints[name]

@@ -215,13 +215,13 @@ def plain(value: object, depth: int = 0) -> object:
         return {str(name): plain(item, depth + 1) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item, depth + 1) for item in value]
-    raise RobotValueError(lazy("{place} must be what JSON has, not {value}"), value=_shown_value(value))
+    raise RobotValueError(lazy("{place} must be a JSON value, not {value}"), value=_shown_value(value))
 
 
 def check_sendable(value: object) -> None:
     """RobotValueError when a message can't hold a JSON value: an endless number, half a letter."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
-        raise RobotValueError(lazy("{place} must be text of whole letters"))
+        raise RobotValueError(lazy("{place} must be valid Unicode text"))
     if isinstance(value, float) and not math.isfinite(value):
         raise RobotValueError(lazy("{place} must be a finite number, not {value}"), value=value)
     if isinstance(value, Mapping):

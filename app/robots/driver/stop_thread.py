@@ -91,7 +91,7 @@ class StopThread:
                 self._thread.start()
 
     def _run(self, run: int) -> None:
-        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("its stop broke off"))
+        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("its stop failed"))
         try:
             error = self._call_stop()
         finally:
@@ -106,7 +106,7 @@ class StopThread:
             why = bounded_str(failed, ERROR_MOST)
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            why = _("its stop broke off: {error}").format(error=bounded_str(failed, ERROR_MOST))
+            why = _("its stop failed: {error}").format(error=bounded_str(failed, ERROR_MOST))
         else:
             return None
         return _(MAY_MOVE).format(robot=self._name, why=why)

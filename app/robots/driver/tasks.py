@@ -34,7 +34,7 @@ _LONGEST_QUEUE = 50
 _MOST_RUNNING = 50
 """What uses nothing runs side by side, each in a thread of its own."""
 THE_STOP = lazy("the stop itself")
-NOTHING_RUNS = lazy("nothing with this id runs")
+NOTHING_RUNS = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
 _JOIN_S = 2.0
 _log = logging.getLogger(__name__)
@@ -193,7 +193,7 @@ class Tasks:
             self._take_unasked(answer)
             stopped.set()
 
-        self.stop(take, _("the driver ends"))
+        self.stop(take, _("the driver is ending"))
         stopped.wait(self._patience_s + _GRACE_S)
         self._stop_thread.close()
         self._dispatcher.close()
@@ -217,13 +217,13 @@ class Tasks:
             self._tell(task.finish, Answer("failed", error=busy))
             return
         if len(self._running) >= _MOST_RUNNING:
-            full = _("{action}: {count} other actions run already").format(
+            full = _("{action}: {count} other actions are already running").format(
                 action=task.action, count=_MOST_RUNNING
             )
             self._tell(task.finish, Answer("failed", error=full))
             return
         if len(self._queue) >= _LONGEST_QUEUE:
-            full = _("{action}: {count} other actions are waiting already").format(
+            full = _("{action}: {count} other actions are already waiting").format(
                 action=task.action, count=_LONGEST_QUEUE
             )
             self._tell(task.finish, Answer("failed", error=full))
@@ -235,7 +235,7 @@ class Tasks:
         replaces = tuple(dict.fromkeys(other.action for other in ended))
         self._tell(task.answer, Answer("accepted", waits_for=waits_for, replaces=replaces))
         replaced = Answer(
-            "canceled", error=_("{action} took its place").format(action=task.title or task.action)
+            "canceled", error=_("replaced by {action}").format(action=task.title or task.action)
         )
         self._drop([other for other in ended if other in self._queue], replaced)
         for other in ended:
@@ -250,7 +250,7 @@ class Tasks:
             return NOTHING_RUNS
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
-            return _("{action} can't be cancelled; it ends by itself").format(action=stubborn[0].action)
+            return _("{action} can't be cancelled; it ends on its own").format(action=stubborn[0].action)
         self._drop([task for task in found if task in self._queue], Answer("canceled"))
         for task in found:
             self._end(task, Answer("canceled"))
@@ -362,7 +362,7 @@ class Tasks:
         if self._watchdog.bites(self._clock.now(), acting):
             self.stop(
                 self._take_unasked,
-                _("no sign of life from its program for {seconds} s").format(
+                _("its program has been silent for {seconds} s").format(
                     seconds=number(self._watchdog.patience_s or 0.0)
                 ),
             )
@@ -461,9 +461,7 @@ class Tasks:
         return Answer("succeeded", output=output if isinstance(output, Mapping) else {})
 
     def _broke_off(self, task: Task, error: BaseException) -> str:
-        return _("{action} broke off: {error}").format(
-            action=task.action, error=bounded_str(error, ERROR_MOST)
-        )
+        return _("{action} failed: {error}").format(action=task.action, error=bounded_str(error, ERROR_MOST))
 
     def _ended(self, task: Task, done: Answer) -> None:
         if task.thread is not None:
@@ -515,11 +513,11 @@ class Tasks:
 
 
 def _stopped_before() -> Answer:
-    return Answer("canceled", error=_("the robot was stopped before this began"))
+    return Answer("canceled", error=_("the robot was stopped before this started"))
 
 
 def still_moving(name: str, actions: Sequence[str]) -> str:
     """The sentence about functions that go on although they were told to end."""
-    why = ngettext("{actions} has not ended", "{actions} have not ended", len(actions))
+    why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
     told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
     return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))

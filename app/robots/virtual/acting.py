@@ -128,9 +128,9 @@ class Acting(Senses):
         found = self._life.seen.get("faces" if target == "face" else "balls", [])
         if not found:
             raise Failed(
-                _("look at: there is no face in the picture")
+                _("look at: no face in the picture")
                 if target == "face"
-                else _("look at: there is no ball in the picture")
+                else _("look at: no ball in the picture")
             )
         left, down = angles_to(lens_of(self._life.body), found[0].middle)
         body = self._life.body

@@ -29,8 +29,8 @@ class AlertsPanel(PanelWidget):
         self.empty = EmptyState(
             self.theme,
             "circle-check",
-            _("All is well"),
-            _("What goes wrong appears here, with its next step."),
+            _("No problems"),
+            _("Problems and how to fix them appear here."),
         )
         self.pages = PanelRows(self.empty, _("Alerts"))
         self.pages.fill(self)

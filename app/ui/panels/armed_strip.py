@@ -51,7 +51,7 @@ class ArmedStrip(QWidget):
             self._flow.addWidget(widget)
         self.question = label("", "small", role="warn", wrap=True)
         self.question.setMinimumWidth(0)
-        self.let = Button(self._theme, _("Let it be sent"), size="small")
+        self.let = Button(self._theme, _("Arm sending"), size="small")
         self.cancel = Button(self._theme, _("Cancel"), size="small")
         self.let.clicked.connect(lambda: self.acting.answer(let=True))
         self.cancel.clicked.connect(lambda: self.acting.answer(let=False))
@@ -96,7 +96,7 @@ class ArmedStrip(QWidget):
         self.switch.setChecked(arming.is_on)
         can_arm = self.for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
-        nothing = self.off_words() if can_arm else _("Nothing is sent while a recording shows")
+        nothing = self.off_words() if can_arm else _("Sending is off while a recording is open")
         self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
@@ -112,7 +112,7 @@ class ArmedStrip(QWidget):
 
     def off_words(self) -> str:
         """What is so while it is switched off."""
-        return _("Nothing is sent")
+        return _("Sending is off")
 
     def arm(self) -> str:
         """Switch it on; why it can't be, as a sentence."""
@@ -137,7 +137,7 @@ class ArmedStrip(QWidget):
         for target in targets:
             token = LinkButton(self._theme, self.token_words(target), "x")
             token.setProperty("target", target.name)
-            token.setAccessibleName(_("Send nothing to {name} any more").format(name=target.name))
+            token.setAccessibleName(_("Stop sending to {name}").format(name=target.name))
             token.setToolTip(plain.tip(token.accessibleName()))
             token.clicked.connect(lambda _on=False, target=target: self.acting.forbid(target))
             self._flow.addWidget(token)

@@ -86,9 +86,9 @@ class Hindrance:
 def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
     """A panel of this title holds what it shows."""
     return Hindrance(
-        _("{panel} is paused: it keeps what it shows, whatever comes.").format(panel=panel),
+        _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
-        _("Let it go on"),
+        _("Resume"),
         go_on,
     )
 
@@ -96,7 +96,7 @@ def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
 def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hindrance:
     """A panel of this title shows only what has these words."""
     return Hindrance(
-        _("{panel} shows only what has “{words}”.").format(panel=panel, words=words),
+        _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
         "",
         _("Clear the filter"),
         clear,

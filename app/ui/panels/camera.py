@@ -47,10 +47,10 @@ class CameraPanel(OneRobotPanel):
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
         self.view = PictureView(self.theme, fill=True, labelled=False)
-        self.view.setAccessibleName(_("What the robot sees"))
+        self.view.setAccessibleName(_("Robot camera"))
         title, text = (
-            _("No pictures yet"),
-            _("Pictures appear here as soon as a robot with a camera is there."),
+            _("No images yet"),
+            _("Images appear here as soon as a robot with a camera is connected."),
         )
         start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "camera", title, text, [start])
@@ -105,8 +105,8 @@ class CameraPanel(OneRobotPanel):
         self.view.clear()
         self._rates.clear()
         self.set_title(_("Camera"), self._topic)
-        said = _("The next picture of {robot} appears here.").format(robot=link.name)
-        self.empty.say(_("No pictures yet"), said)
+        said = _("The next image from {robot} appears here.").format(robot=link.name)
+        self.empty.say(_("No images yet"), said)
         self.empty.set_actions([])
         self.pages.setCurrentWidget(self.empty)
 

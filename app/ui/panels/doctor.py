@@ -60,21 +60,21 @@ class DoctorPanel(PanelWidget):
         self.shown: list[Finding] = []  # each in the row of its place
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.again = IconButton(self.theme, "refresh-cw", _("Look again"), size=26)
+        self.again = IconButton(self.theme, "refresh-cw", _("Check again"), size=26)
         self.again.clicked.connect(self.session.doctor.look)
         self.header = [self.again]
         self._copy = QAction(_("Copy the report"), self)
         self._copy.triggered.connect(self.copy_report)
         self.empty = EmptyState(
-            self.theme, "stethoscope", _("Looking at the connections"), _("This takes a second or two.")
+            self.theme, "stethoscope", _("Checking connections"), _("This takes a second or two.")
         )
         self.pages = PanelRows(self.empty, _("Connection doctor"))
-        self.missed = ComboBox(self.theme, name=_("I miss"))
+        self.missed = ComboBox(self.theme, name=_("What is missing?"))
         self.missed.activated.connect(self._choose_missed)
         self._arrange()
 
     def _arrange(self) -> None:
-        about = label(_("I miss"), "body", role="textSecondary")
+        about = label(_("What is missing?"), "body", role="textSecondary")
         about.setBuddy(self.missed)
         self.looked = ElidedLabel("small", "textTertiary", least=40)
         top = QHBoxLayout()
@@ -182,8 +182,10 @@ class DoctorPanel(PanelWidget):
         ask = (_("Why do I see nothing?"), lambda: self.context.why(panel, topic))
         known = live.topics.get(topic)
         if split_key(topic)[0] or (known is not None and known.publisher_nodes):
-            return Hindrance(_("{panel} waits for {topic}: nothing has come.").format(**names), "", *ask)
-        sentence = _("{panel} waits for {topic}. Nobody sends it.").format(**names)
+            return Hindrance(
+                _("{panel} is waiting for {topic}; no message has arrived.").format(**names), "", *ask
+            )
+        sentence = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
         if topic not in self._near:  # thousands of names take long to be compared
             sent = [each.key for each in live.topics if each.publisher_nodes]
             self._near = {topic: nearest(topic, sent[:MOST_OFFERED])}
@@ -197,10 +199,10 @@ class DoctorPanel(PanelWidget):
 
     def _replay_hides(self, topic: str) -> Hindrance:
         recorded = not topic or self.session.topics.get(topic) is not None
-        sentence = _("A recording is open, so panels show what was recorded, not what comes now.")
+        sentence = _("A recording is open, so panels show recorded data instead of live data.")
         if not recorded:
-            sentence = _("A recording is open, and {topic} is not in it.").format(topic=topic_words(topic))
-        mend = _("What is found below is about the live network.")
+            sentence = _("A recording is open and {topic} is not in it.").format(topic=topic_words(topic))
+        mend = _("The checks below are about the live network.")
         return Hindrance(sentence, mend, _("Back to live"), lambda: self.context.run("replay.live"))
 
     def _network_hides(self, topic: str, lost: str) -> Iterator[Hindrance]:
@@ -208,7 +210,7 @@ class DoctorPanel(PanelWidget):
         unread = self.session.live.networks.unread(topic)
         words = lost or (f"{topic_words(topic)}: {unread}." if unread else "")
         if words:
-            mend = _("Look at its address, and at its password or key where it asks for one.")
+            mend = _("Check its address, and its password or key if it needs one.")
             yield Hindrance(words, mend, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
 
     def _offer_topics(self) -> None:
@@ -220,7 +222,7 @@ class DoctorPanel(PanelWidget):
         self._offered = facts
         names = [topic.key for topic in (*live.topics, *live.networks.topics)]
         self.missed.clear()
-        self.missed.addItem(_("no topic in particular"), "")
+        self.missed.addItem(_("nothing specific"), "")
         for name in sorted({*names[:MOST_OFFERED], missed} - {""}):
             self.missed.addItem(topic_words(name), name)
         self.missed.set_value(missed)
@@ -231,11 +233,11 @@ class DoctorPanel(PanelWidget):
         doctor = self.session.doctor
         done, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
         if not is_done:
-            self.looked.setText(_("Looking: {done} of {count}").format(done=done, count=count))
+            self.looked.setText(_("Checking: {done} of {count}").format(done=done, count=count))
             return
-        words = ngettext("{count} thing looked at", "{count} things looked at", doctor.looked_at)
+        words = ngettext("{count} check done", "{count} checks done", doctor.looked_at)
         if all(each.severity not in BAD for each in self.shown):
-            words = ngettext("{count} thing is well", "All {count} things are well", doctor.looked_at)
+            words = ngettext("{count} check passed", "All {count} checks passed", doctor.looked_at)
         self.looked.setText(words.format(count=done))
 
     def _show(self, found: Sequence[Finding]) -> None:
@@ -254,7 +256,7 @@ class DoctorPanel(PanelWidget):
         if bad:
             self.chip.set(str(len(bad)), STATUS[bad[0]])
         elif is_done:
-            self.chip.set(_("all is well"), "ok")
+            self.chip.set(_("no problems"), "ok")
         else:
             self.chip.set("", "info")
 
@@ -288,7 +290,7 @@ class DoctorPanel(PanelWidget):
             )
         run = {
             "topic:closed": (_("Let other computers connect"), "network.others"),
-            "topic:unreadable": (_("Look at its bytes"), f"inspect:{self.session.doctor.missed}"),
+            "topic:unreadable": (_("Show the bytes"), f"inspect:{self.session.doctor.missed}"),
             "topic:name": (_("Choose a topic"), "panel:topics"),
         }.get(finding.id)
         if run is not None:
@@ -305,7 +307,7 @@ class DoctorPanel(PanelWidget):
         step.run()
         if finding.id.startswith("studio:"):
             self.session.doctor.look()
-            self.context.toast(_("Done, looking again"))
+            self.context.toast(_("Done. Checking again"))
 
     def _use(self, topic: str) -> None:
         """Show the topic that was meant where the other one was missed."""
@@ -314,7 +316,7 @@ class DoctorPanel(PanelWidget):
         else:
             self.context.open_topic(topic)
         self.session.doctor.miss(topic)
-        self.context.toast(_("Showing {topic}, looking again").format(topic=topic))
+        self.context.toast(_("Opened {topic}. Checking again").format(topic=topic))
 
     def _start_master(self) -> None:
         self.session.launcher.ensure_master()
@@ -332,7 +334,7 @@ class DoctorPanel(PanelWidget):
     def copy_report(self) -> None:
         """Put everything that was found on the clipboard, to be sent to somebody."""
         missed = self.session.doctor.missed
-        about = _("Missed: {topic}").format(topic=topic_words(missed)) + "\n" if missed else ""
+        about = _("Missing: {topic}").format(topic=topic_words(missed)) + "\n" if missed else ""
         QGuiApplication.clipboard().setText(about + report(self.shown))
         self.context.toast(_("Copied the report"))
 

@@ -83,15 +83,15 @@ class HealthPanel(OneRobotPanel):
         self.rows: list[HealthRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        title, text = _("No robot is connected"), _("Its health appears here as soon as it is connected.")
+        title, text = _("No robot is connected"), _("Its status appears here once it is connected.")
         steps = [
             EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot"),
-            EmptyAction(_("Find out why"), lambda: context.run("help.doctor"), "stethoscope"),
+            EmptyAction(_("Find the cause"), lambda: context.run("help.doctor"), "stethoscope"),
         ]
         self.empty = EmptyState(self.theme, "bot", title, text, steps)
         self._no_robot = NoRobot(self.empty, title, text, steps)
         self._no_robot.tell(self.session.coming)
-        self.step = Button(self.theme, _("Start it again"), "rotate-ccw", size="small")
+        self.step = Button(self.theme, _("Restart it"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()
         self._column = QVBoxLayout(inside)
@@ -105,7 +105,7 @@ class HealthPanel(OneRobotPanel):
         self._column.addWidget(self._below)
         self._column.addStretch(1)
         self._scroll = Scrolled(inside)
-        self._scroll.setAccessibleName(_("How the robot is"))
+        self._scroll.setAccessibleName(_("Robot status"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.pages = self.show_one_of(self.empty, self._scroll)
@@ -135,9 +135,9 @@ class HealthPanel(OneRobotPanel):
             row.show_fact(fact)
         wrong = [fact for fact in facts if fact.to_look_at]
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
-        said = ngettext("{count} to look at", "{count} to look at", len(wrong)).format(count=len(wrong))
+        said = ngettext("{count} warning", "{count} warning", len(wrong)).format(count=len(wrong))
         self.chip.set(said if wrong else "", worst)
-        self.step.setText(_("Start it again") if link.virtual else _("Find out why"))
+        self.step.setText(_("Restart it") if link.virtual else _("Find the cause"))
         self._below.setVisible(not link.connected or link.mute)
 
     def _make_rows(self, count: int) -> None:

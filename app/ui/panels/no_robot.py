@@ -23,7 +23,7 @@ class NoRobot:
             return
         self._coming = coming
         if coming:
-            self._empty.say(connected_words((), coming), _("A virtual robot takes some seconds to start."))
+            self._empty.say(connected_words((), coming), _("A virtual robot takes a few seconds to start."))
             self._empty.set_actions(())
         else:
             self._empty.say(self._title, self._text)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 STATUS = {"error": "error", "warning": "warn", "info": "info"}
 SEVERITIES = {"error": lazy("error"), "warning": lazy("warning"), "info": lazy("info")}
 MOST_ROWS = 60
-NOTHING = lazy("Nothing to mend.\nProblems appear here while you build.")
+NOTHING = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
@@ -124,7 +124,7 @@ class ProblemsPanel(PanelWidget):
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
-        self.checked = label(_("Checked while you build"), "body", role="textSecondary")
+        self.checked = label(_("Checked as you build"), "body", role="textSecondary")
         self.header = [self.checked]
         self._scroll = ScrollColumn(_("Problems"), margins=(0, 4, 0, 4))
         self._column = self._scroll.column
@@ -146,7 +146,7 @@ class ProblemsPanel(PanelWidget):
         if program is self._program and of_editor == self._of_editor:
             return
         self._program, self._of_editor = program, of_editor
-        self.checked.setText(_("Checked while you build"))
+        self.checked.setText(_("Checked as you build"))
         found = listed(
             program.problems,
             document.workspace if program.absent else {},  # parsed only when somebody is missing
@@ -181,9 +181,7 @@ class ProblemsPanel(PanelWidget):
         for place, row in enumerate(self.rows):
             self._column.insertWidget(place, row)
         more = max(0, len(found) - MOST_ROWS)
-        said = ngettext(
-            "and {count} more, when these are mended", "and {count} more, when these are mended", more
-        )
+        said = ngettext("{count} more after these are fixed", "{count} more after these are fixed", more)
         self.others.setText(said.format(count=more))
         paint.show_when(self.others, more > 0)
         self.pages.setCurrentIndex(1 if found else 0)

@@ -33,25 +33,25 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
     """What can be done with a topic, by the name that it has among those of all networks (`key_of`)."""
     network, name = split_key(key)
     actions = [
-        RowAction(_("Show its messages"), "list-tree", lambda: show_messages(context, key)),
-        RowAction(_("Show it in one more panel"), "plus", lambda: context.open_beside(key)),
+        RowAction(_("Show messages"), "list-tree", lambda: show_messages(context, key)),
+        RowAction(_("Open in another panel"), "plus", lambda: context.open_beside(key)),
     ]
     if has_fields(context, key):
-        actions.append(RowAction(_("Plot a field of it"), "chart-line", lambda: context.plot(key, "")))
+        actions.append(RowAction(_("Plot a field"), "chart-line", lambda: context.plot(key, "")))
     if not network:  # messages, alarms and recordings are of Studio's own network
         if has_fields(context, key):
-            actions.append(RowAction(_("Publish to it"), "send", lambda: context.run(f"publish.topic:{key}")))
+            actions.append(
+                RowAction(_("Publish to this topic"), "send", lambda: context.run(f"publish.topic:{key}"))
+            )
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.topic:{key}")))
-        actions.append(
-            RowAction(_("Record this topic"), "circle-dot", lambda: context.run(f"record.topic:{key}"))
-        )
+        actions.append(RowAction(_("Record topic"), "circle-dot", lambda: context.run(f"record.topic:{key}")))
     return [*actions, copies(context, name)]
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
     """What can be done with a service of Studio's own network."""
     return [
-        RowAction(_("Call it"), "play", lambda: context.run(f"service.call:{name}")),
+        RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
         copies(context, name),
     ]
 
@@ -71,7 +71,7 @@ def copies(context: PanelContext, name: str) -> RowAction:
         QGuiApplication.clipboard().setText(name)
         context.toast(_("Copied {path}").format(path=name))
 
-    return RowAction(_("Copy its name"), "copy", copy)
+    return RowAction(_("Copy name"), "copy", copy)
 
 
 def show_messages(context: PanelContext, key: str) -> None:

@@ -90,11 +90,11 @@ class SensorsPanel(OneRobotPanel):
     """The sensors of the robot that is shown."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, _("Sensors now"))
+        super().__init__(context, _("Live sensors"))
         self.rows: list[SensorRow] = []
         self._scroll = ScrollColumn(_("Sensors"), margins=(0, 6, 0, 6))
         self._column = self._scroll.column
-        title, text = _("No robot, no sensors"), _("Connect a robot to see what it feels and sees.")
+        title, text = _("No robot connected"), _("Connect a robot to see its sensors.")
         self.empty = EmptyState(self.theme, "eye", title, text)
         self._no_robot = NoRobot(self.empty, title, text)
         self._no_robot.tell(self.session.coming)
@@ -130,7 +130,7 @@ class SensorsPanel(OneRobotPanel):
         self.pages.setCurrentIndex(1 if self.rows else 0)
         if not self.rows:
             title = _("{robot} has no sensors").format(robot=link.name)
-            self.empty.say(title, _("Its description names none."))
+            self.empty.say(title, _("The robot's description has no sensors."))
 
     def _fit_rows(self) -> None:
         """Leave the rest below the last whole row empty; the others are scrolled to, row by row."""
@@ -169,4 +169,4 @@ def _shown(link: RobotLink) -> list[Sensor]:
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 
 
-PANEL = Panel("sensors", lazy("Sensors now"), "eye", (), SensorsPanel)
+PANEL = Panel("sensors", lazy("Live sensors"), "eye", (), SensorsPanel)

@@ -52,12 +52,12 @@ class SentPanel(PanelWidget):
         self.acting = context.session.acting
         self._seen: object = None
         self._ticks = 0
-        self.filter = FilterField(self.theme, _("Filter what was sent"))
-        self.again = IconButton(self.theme, "repeat", _("Send or call the chosen one again"), size=26)
+        self.filter = FilterField(self.theme, _("Filter sent messages"))
+        self.again = IconButton(self.theme, "repeat", _("Send or call the selected entry again"), size=26)
         self.header = [self.filter, self.again]
         self.model: TableModel[SentRecord] = TableModel(_columns(), lambda each: str(each.number))
         self.table = TableView(self.theme, self.model)
-        self.table.setAccessibleName(_("What was sent, newest first"))
+        self.table.setAccessibleName(_("Sent messages, newest first"))
         self.foot = ElidedLabel("small", "textTertiary")
         self.total = ElidedLabel("small", "textTertiary")
         self.empty = EmptyState(self.theme, "send", "", "")
@@ -117,14 +117,14 @@ class SentPanel(PanelWidget):
         self.table.tell_visible_changed()
         self.pages.setCurrentIndex(1 if rows else 0)
         if words and log.records:
-            self.empty.say(_("Nothing fits"), _("Clear the filter to see all that was sent."), "search")
+            self.empty.say(_("No matches"), _("Clear the filter to see all sent messages."), "search")
             self.empty.set_actions([EmptyAction(_("Clear the filter"), self.filter.clear, "x")])
         else:
-            said = _("What you publish, call, replay and click in a picture is listed here.")
-            self.empty.say(_("Nothing was sent yet"), said, "send")
+            said = _("Messages you publish, calls, replays and clicks in images are listed here.")
+            self.empty.say(_("Nothing sent yet"), said, "send")
             publish = EmptyAction(_("Publish a message"), lambda: self.context.run("publish.new"), "send")
             self.empty.set_actions([publish])
-        self.foot.setText(_("What is sent and called by hand is written here"))
+        self.foot.setText(_("Messages and calls you send by hand are listed here"))
         self.total.setText(self._total_words())
         self._offer_again()
 
@@ -206,7 +206,7 @@ class SentPanel(PanelWidget):
             actions.append(RowAction(copies, "braces", lambda: self._to_clipboard(record.text, copied)))
         if record.name:
             is_call = record.asker == "service"
-            shows = _("Show the service") if is_call else _("Show its messages")
+            shows = _("Open the service") if is_call else _("Show messages")
             actions.append(RowAction(shows, "spline" if is_call else "list-tree", lambda: self.show_row(key)))
         return filled(menu, self.theme, actions)
 
@@ -265,9 +265,9 @@ def _columns() -> tuple[Column[SentRecord], ...]:
         Column("at", lazy("Time"), 92, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),
         Column("sign", "", 34, sign, words=lazy("Kind")),
         Column("name", lazy("Sent to"), 112, to, tip=lambda each: each.name),
-        Column("what", lazy("What came of it"), 110, what, stretch=True, tip=tip),
-        Column("count", lazy("Times"), 60, count, figures=True, yields=1),
-        Column("asker", lazy("Asked in"), 90, asked, yields=2),
+        Column("what", lazy("Result"), 110, what, stretch=True, tip=tip),
+        Column("count", lazy("Count"), 60, count, figures=True, yields=1),
+        Column("asker", lazy("Called in"), 90, asked, yields=2),
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 WORDS = TableWords(
     title=lazy("Variables"),
     filter=lazy("Filter variables"),
-    nothing_fits=lazy("No variable has these words"),
+    nothing_fits=lazy("No matching variables"),
     clear_the_filter=lazy("Clear the filter to see all variables."),
 )
 FRESH_S = 0.8
@@ -193,7 +193,7 @@ class VariablesPanel(TablePanel[VariableRow]):
     def _when(self, *, over: bool) -> str:
         if not self._variables or not self._values:
             return ""
-        return _("When it ended") if over else _("Now")
+        return _("Final values") if over else _("Live")
 
     def show_table(self, any_rows: bool, filtered: bool) -> None:
         if any_rows or filtered:
@@ -206,7 +206,7 @@ class VariablesPanel(TablePanel[VariableRow]):
     def say_empty(self) -> None:
         self.empty.say(
             _("No variables yet"),
-            _("A variable keeps a number, a text or a list under a name. Here you see what it holds."),
+            _("A variable stores a number, a text or a list under a name. You see its value here."),
             "variable",
         )
         new = EmptyAction(_("New variable"), lambda: self.context.run("variable.new"), "plus", primary=True)
@@ -241,9 +241,9 @@ class VariablesPanel(TablePanel[VariableRow]):
         runs = self.session.runs
         running = runs.active and runs.document is self.session.document
         for words, icon, command, possible in (
-            (_("Show beside the blocks"), "eye", "variable.watch", True),
+            (_("Show next to the blocks"), "eye", "variable.watch", True),
             (_("Show where it is used"), "search", "variable.find", bool(row.variable.python)),
-            (_("Give it another value"), "pencil", "variable.put", running and bool(row.variable.python)),
+            (_("Change the value"), "pencil", "variable.put", running and bool(row.variable.python)),
             (_("Rename"), "text-cursor-input", "variable.rename", True),
             (_("Delete"), "trash-2", "variable.delete", True),
         ):

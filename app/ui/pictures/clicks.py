@@ -16,7 +16,7 @@ from nep.i18n import _, lazy
 MARK_MS = 1200
 RING_PX, REACH_PX = 7.0, 12.0
 FAR = 10  # pixels with Shift
-KEYS_WORDS = lazy("The arrow keys point at a pixel, Enter publishes it.")
+KEYS_WORDS = lazy("Use the arrow keys to point at a pixel and Enter to publish it.")
 BESIDE = (16, 16, -16, -16)
 BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.LeftButton: "left",

@@ -40,7 +40,7 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
     if arriving_hz is None:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
-    return _("shown {shown} of {arriving}/s").format(shown=round(shown), arriving=round(arriving_hz))
+    return _("{arriving} fps ({shown} shown)").format(shown=round(shown), arriving=round(arriving_hz))
 
 
 class RateWords:
@@ -165,9 +165,9 @@ class PictureView(QWidget):
             self._age, self._aged_s = _age_words(stream.stamped_s), now
         self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
         if stream.held:
-            self._state = _("Frozen, {age} old").format(age=age_words(stream.age_s))
+            self._state = _("Frozen {age} ago").format(age=age_words(stream.age_s))
         elif self._silent:
-            self._state = _("Last picture, {age} old").format(age=age_words(stream.age_s))
+            self._state = _("Last image {age} ago").format(age=age_words(stream.age_s))
         else:
             self._state = ""
         if picture is not self._picture and picture is not None:

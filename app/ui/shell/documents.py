@@ -150,7 +150,7 @@ class DocumentController:
 
         def reopened() -> None:
             if self._documents.reopen() is None:
-                self._say(_("No tab was closed"))
+                self._say(_("No closed tabs"))
 
         self.with_newest(lambda: self._show(reopened))
 
@@ -243,7 +243,7 @@ class DocumentController:
             return
         then = _("{name}, before").format(name=document.name)
         said = words.format(name=document.name)
-        self._say(said, _("Open that"), lambda: self.copy(earlier.copy, then))
+        self._say(said, _("Open"), lambda: self.copy(earlier.copy, then))
 
     def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
         """What of others the file says that is written over, and the words for it, with the hole ``name``.
@@ -253,16 +253,16 @@ class DocumentController:
         """
         own = document.path
         if path is not None and (own is None or path.resolve() != own.resolve()):
-            return keep_earlier(path), _("Saved {name}. The file that was there is kept.")
+            return keep_earlier(path), _("Saved {name}. The previous file is under Earlier versions.")
         if own is not None and document.changed_outside:
             return keep_earlier(own), _(
-                "Saved {name}. Another program had changed the file; what it wrote is kept."
+                "Saved {name}. Another program had changed the file; its version is under Earlier versions."
             )
         if own is not None and document.dirty:
             try:
                 keep_earlier(own)
             except DocumentError as error:
-                words = _("No earlier version: {error}").format(error=error)
+                words = _("No earlier versions: {error}").format(error=error)
                 self._session.console.add("warn", "studio", words)
         return None, ""
 
@@ -294,7 +294,7 @@ class DocumentController:
             return None
         if document.path is not None:
             self._remember(document.path, name)
-        words = _("Saved {name}") if path is not None else _("Kept {name} in Recent")
+        words = _("Saved {name}") if path is not None else _("Closed {name}. You'll find it under Recent.")
         return Closed(document, words.format(name=name), earlier)
 
     def _tell_closed(self, closed: Sequence[Closed]) -> None:

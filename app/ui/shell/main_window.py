@@ -59,8 +59,8 @@ BLOCK_KEYS = {
 MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
 DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
 BOOKMARK = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
-SOON_WORDS = {"behaviour": lazy("Getting the blocks ready.")}
-OTHER_SOON_WORDS = lazy("Getting the panels ready.")
+SOON_WORDS = {"behaviour": lazy("Loading blocks.")}
+OTHER_SOON_WORDS = lazy("Loading panels.")
 
 
 @runtime_checkable
@@ -422,17 +422,17 @@ class MainWindow(QMainWindow):
         began = time.perf_counter()
         self._ticks += 1
         guarded = self.session.guarded
-        with guarded(lazy("take over what is new")):
+        with guarded(lazy("apply changes")):
             self.session.tick()
-        with guarded(lazy("show how it is")):
+        with guarded(lazy("show its state")):
             self._show_session()
         with guarded(lazy("ask a question")):
             self.question.refresh()
-        with guarded(lazy("show another source")):
+        with guarded(lazy("switch the source")):
             self._follow_source()
-        with guarded(lazy("let panels rest")):
+        with guarded(lazy("pause panels")):
             self._follow_panels()
-        with guarded(lazy("show the panels")):
+        with guarded(lazy("show panels")):
             if self.bench is not None:
                 self.bench.refresh()
         spent = (time.perf_counter() - began) * 1000
@@ -457,9 +457,9 @@ class MainWindow(QMainWindow):
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
         if self._ticks % FACTS_EVERY == 0:
-            with self.session.guarded(lazy("show the figures")):
+            with self.session.guarded(lazy("show figures")):
                 self._show_facts()
-        with self.session.guarded(lazy("show the alerts")):
+        with self.session.guarded(lazy("show alerts")):
             self._show_alerts()
 
     def _show_facts(self) -> None:
@@ -532,7 +532,7 @@ class MainWindow(QMainWindow):
     def restart(self) -> str:
         """Close the window and start Studio again; why that can't be done now, "" when it is done."""
         if self._may_move():
-            return _("Press Stop first: Studio can restart when no program runs and no robot moves")
+            return _("Press Stop first. Studio can restart when no program is running and no robot is moving")
         self.wants_restart = True
         self.close()
         return ""
@@ -567,7 +567,7 @@ class MainWindow(QMainWindow):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
-        self.toast.say(_("Studio stays open: unsaved work would be lost"))
+        self.toast.say(_("Studio can't close: unsaved work would be lost"))
         return False
 
     def _keep(self) -> None:

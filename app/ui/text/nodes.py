@@ -8,7 +8,7 @@ from nep.i18n import _, lazy, number
 
 GENERATIONS = {
     "native": lazy("native"),
-    "A": lazy("NEP to 0.5.4.5"),
+    "A": lazy("NEP up to 0.5.4.5"),
     "B": "NEP 0.5.4.8",
 }
 

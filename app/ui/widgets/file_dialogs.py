@@ -74,7 +74,7 @@ def pictures_folder() -> str:
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
-PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
+PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
 """What a dialog offers, in words, and the patterns of the names."""
 
 
@@ -93,7 +93,7 @@ class SystemDialogs:
         dialog.show()
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Save the behaviour"), str(Path(suggestion).parent), take, BEHAVIOURS)
+        dialog = self._dialog(_("Save behaviour"), str(Path(suggestion).parent), take, BEHAVIOURS)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix(SUFFIX.lstrip("."))
         dialog.selectFile(Path(suggestion).name)
@@ -122,7 +122,7 @@ class SystemDialogs:
         dialog.show()
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        dialog = self._dialog(_("Choose a picture"), folder or pictures_folder(), take, PICTURES)
+        dialog = self._dialog(_("Choose an image"), folder or pictures_folder(), take, PICTURES)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 

@@ -190,7 +190,7 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     if codec == "image" and ros_type == _COMPRESSED and _magic(data):
         known = picture_info(data)
         if known is None:
-            raise EncodeError("image", type(data).__name__, _("they are no picture that can be read"))
+            raise EncodeError("image", type(data).__name__, _("they are not a readable image"))
         return to_ros(ros_type, codec, Encoded(data, known))
     if codec in {"ros", "image"}:
         return bytes(data)

@@ -73,4 +73,4 @@ def test_a_block_of_an_old_file_and_one_that_says_nonsense_is_as_its_kind(
 def test_a_million_branches_are_no_million() -> None:
     assert Branches.of({"elseIfs": 10**6}, has_else=False) == Branches(20)
     empty = compile_behaviour(workspace(started(chosen({"elseIfs": 1}))), [])
-    assert [each.sentence for each in empty.problems] == ["if needs a condition. Put one into the gap."]
+    assert [each.sentence for each in empty.problems] == ["if needs a condition. Drag one into its slot."]

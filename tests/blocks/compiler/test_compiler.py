@@ -117,7 +117,7 @@ def test_the_problems_of_the_picture():
     assert (first.subject, first.sentence) == ("wave", "NAO is not connected, so wave will be skipped.")
     assert (first.mend, first.mend_action) == ("Show the robots", "connect:NAO")
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
-    assert second.sentence == "wait until may wait for ever if nobody comes."
+    assert second.sentence == "wait until waits forever if no one appears."
     assert (second.subject, second.mend, second.mend_action) == ("wait until", "Add a time limit", "limit:w")
 
 
@@ -177,14 +177,14 @@ def test_a_connected_robot_that_cannot_do_it():
 @pytest.mark.parametrize(
     ("it", "sentence"),
     [
-        (block("control_wait"), "wait needs a number. Put one into the gap."),
-        (block("control_if"), "if needs a condition. Put one into the gap."),
+        (block("control_wait"), "wait needs a number. Drag one into its slot."),
+        (block("control_if"), "if needs a condition. Drag one into its slot."),
         (
             block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="left"),
-            "turn needs a number. Put one into the gap.",
+            "turn needs a number. Drag one into its slot.",
         ),
-        (block("messages_publish", TOPIC="/x"), "publish needs a value. Put one into the gap."),
-        (write(block("values_not")), "not needs a condition. Put one into the gap."),
+        (block("messages_publish", TOPIC="/x"), "publish needs a value. Drag one into its slot."),
+        (write(block("values_not")), "not needs a condition. Drag one into its slot."),
     ],
 )
 def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
@@ -199,7 +199,7 @@ def test_an_empty_gap_is_an_error_and_the_program_stops_there(it, sentence):
 
 def test_a_hat_with_an_empty_gap_does_not_start():
     saved = workspace(stack(block("events_becomes_true"), say("Hi")), started())
-    assert sentences(saved) == [("error", "when needs a condition. Put one into the gap.")]
+    assert sentences(saved) == [("error", "when needs a condition. Drag one into its slot.")]
     assert compile_behaviour(saved, [robot()]).starts == 1
 
 
@@ -215,7 +215,7 @@ def test_what_the_robot_would_refuse_is_told_before_run():
         (block("messages_publish", VALUE=text("x"), TOPIC="two words"), "needs a topic without spaces"),
         (
             block("robot_pepper_do_turn", ROBOT="Pepper", DIRECTION="up", ANGLE=number(1)),
-            "has no choice “up”",
+            "has no option “up”",
         ),
         (block("robot_pepper_do_light", ROBOT="Pepper", WHERE="eyes", COLOUR="blue"), "needs a colour"),
         (write(number("three")), "needs a number"),
@@ -231,8 +231,8 @@ def test_a_field_that_holds_nonsense_skips_its_block(it, end):
 def test_blocks_without_a_start():
     saved = workspace(say("Hi"))
     assert sentences(saved) == [
-        ("warning", "Nothing starts these blocks. Put “when started” above them."),
-        ("info", "say does not run. Put it below “when started”."),
+        ("warning", "These blocks have no start. Put “when started” above them."),
+        ("info", "say doesn't run. Put it below “when started”."),
     ]
     assert sentences(workspace()) == []
     assert [severity for severity, _ in sentences(workspace(started(), say("Hi")))] == ["info"]

@@ -34,7 +34,7 @@ def when(*body: Saved) -> Saved:
 
 def test_two_started_scripts_that_move_the_base() -> None:
     (problem,) = conflicts(started(turn("t")), started(home("h")))
-    assert (problem.block_id, problem.subject, problem.mend) == ("h", "go home", "Put one after the other")
+    assert (problem.block_id, problem.subject, problem.mend) == ("h", "go home", "Run one after the other")
     assert problem.sentence == (
         "“turn” and “go home” both move Pepper at the same time: one replaces the other."
     )

@@ -201,7 +201,7 @@ def test_a_message_needs_a_name(name):
         for p in compile_behaviour(workspace(started(broadcast(name))), []).problems
         if p.severity == "error"
     ]
-    assert problem.sentence == "broadcast needs the name of a message. It is kept and skipped."
+    assert problem.sentence == "broadcast needs the name of a message. It is kept but skipped."
 
 
 @pytest.mark.parametrize(
@@ -226,5 +226,5 @@ def test_what_nothing_receives_is_a_problem_with_a_button_that_receives_it():
 
 def test_what_nothing_sends_is_told():
     (problem,) = compile_behaviour(workspace(started(), received("quiz", write(text("x")))), []).problems
-    assert problem.sentence == "Nothing broadcasts “quiz”, so this script does not run."
+    assert problem.sentence == "Nothing broadcasts “quiz”, so this script doesn't run."
     assert problem.severity == "info"

@@ -171,7 +171,7 @@ def test_a_call_of_nothing_is_an_error_with_its_mend() -> None:
     saved = workspace(started(call("greet", id="c", who=text("Ada"))))
     run = play(saved)
     (problem,) = run.program.errors
-    sentence = "The function “greet” is not here. Define it, or delete this block."
+    sentence = "The function “greet” is missing. Define it, or delete this block."
     assert (problem.sentence, problem.block_id, problem.mend) == (sentence, "c", "Define it")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
@@ -196,8 +196,8 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_said() -> Non
         [],
     )
     sentences = [problem.sentence for problem in program.problems]
-    assert "“who” only works inside its own function. It is kept and skipped." in sentences
-    assert sum(sentence.endswith("can't stand there. It is kept and skipped.") for sentence in sentences) == 2
+    assert "“who” only works inside its own function. It is kept but skipped." in sentences
+    assert sum(sentence.endswith("can't stand there. It is kept but skipped.") for sentence in sentences) == 2
     assert "write('after')" in program.source
 
 

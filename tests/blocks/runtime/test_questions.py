@@ -120,7 +120,7 @@ def test_where_nobody_can_answer_a_sentence_says_so():
     run = play(workspace(started(ask("Name?") | {"id": "q"})))
     assert run.runtime.error is not None
     assert run.runtime.error.block == "q"
-    assert run.runtime.error.sentence == "Nobody can answer: the behaviour runs outside of Studio."
+    assert run.runtime.error.sentence == "No one can answer: the behaviour runs outside Studio."
 
 
 @pytest.mark.parametrize(
@@ -230,11 +230,11 @@ def test_questions_of_both_kinds_wait_for_each_other():
 @pytest.mark.parametrize(
     ("choices", "sentence"),
     [
-        (block("lists_empty"), "There is nothing to choose from: the list of choices is empty."),
-        (list_of(text(""), text(" ")), "There is nothing to choose from: the list of choices is empty."),
+        (block("lists_empty"), "The list of choices is empty."),
+        (list_of(text(""), text(" ")), "The list of choices is empty."),
         (
             list_of(*(number(each) for each in range(MOST_CHOICES + 1))),
-            "A question has room for 12 choices; this list has 13.",
+            "A question can have at most 12 choices; this list has 13.",
         ),
         (get("pets"), "A question with choices needs a list of them, not a number."),
     ],
@@ -251,4 +251,4 @@ def test_what_nobody_can_choose_from_is_a_sentence_on_the_block(choices, sentenc
 def test_choices_too_need_somebody_who_answers():
     run = play(workspace(started(choose(list_of(text("a"))))))
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "Nobody can answer: the behaviour runs outside of Studio."
+    assert run.runtime.error.sentence == "No one can answer: the behaviour runs outside Studio."

@@ -44,7 +44,7 @@ def test_the_loser_is_told_at_its_block_and_goes_on(fight: Fight) -> None:
     play = fight.begin(started(turn("t"), say("on")), started(turn("t2"), say("on")))
     fight.asked(2)
     loser, winner = fight.link.calls
-    fight.link.answer(loser, "canceled", error="turn took its place")
+    fight.link.answer(loser, "canceled", error="replaced by turn")
     until(lambda: len(fight.link.calls) == 3)
     fight.link.answer(winner, "succeeded")
     play.end()

@@ -93,7 +93,7 @@ def test_a_robot_that_does_not_answer_is_named(monkeypatch):
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
     assert run.runtime.error is not None
     assert run.runtime.error.block == "x"
-    assert run.runtime.error.sentence == "Pepper does not answer. Start the virtual robot again."
+    assert run.runtime.error.sentence == "Pepper is not responding. Start the virtual robot again."
 
 
 def test_an_action_that_never_ends_is_canceled(monkeypatch):
@@ -102,7 +102,7 @@ def test_an_action_that_never_ends_is_canceled(monkeypatch):
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "Pepper has not ended “say” within 30 s."
+    assert run.runtime.error.sentence == "Pepper did not finish “say” within 30 s."
     assert link.canceled == link.calls
 
 
@@ -172,7 +172,7 @@ def test_a_robot_that_is_stopped_by_somebody_else_ends_the_program(running):
     link.stopped_outside("Pepper")
     run.end()
     assert run.runtime.error is not None
-    assert run.runtime.error.sentence == "Pepper was stopped by somebody else, so the behaviour ended."
+    assert run.runtime.error.sentence == "Pepper was stopped by another program, so the behaviour ended."
     assert len(link.calls) == 1
 
 
@@ -332,7 +332,7 @@ def test_wait_until_takes_the_unknown_for_not_so(running):
                 RELATION="<",
                 B=number(0),
             ),
-            "“is below” needs a value that is not known yet.",
+            "“is below” needs a value, but it has none yet.",
         ),
         (
             block("values_arithmetic", "v", A=text("a"), SIGN="+", B=text("b")),

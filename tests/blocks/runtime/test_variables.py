@@ -34,7 +34,7 @@ from tests.blocks.samples import block, get, number, started, workspace, write
         ("", "text", ""),
         ("two\nlines", "text", "two lines"),
         ("🤖" * 3, "text", "🤖🤖🤖"),
-        (None, "unknown", "not known"),
+        (None, "unknown", "unknown"),
         ([], "list", "[]"),
         ([1, "two", None, [True]], "list", "[1, two, , [yes]]"),
         ({"x": 1, "y": [2]}, "other", "{x: 1, y: [2]}"),

@@ -58,6 +58,6 @@ def test_a_robot_that_stops_telling_that_it_lives_is_an_error_at_the_block(monke
     assert error is not None
     assert (error.block, error.sentence) == (
         "x",
-        "Pepper has stopped answering. Start the virtual robot again.",
+        "Pepper stopped responding. Start the virtual robot again.",
     )
     assert link.canceled == link.calls  # should it wake up

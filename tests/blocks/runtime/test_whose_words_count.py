@@ -27,10 +27,8 @@ class Program:
 
     told: ClassVar = {
         "another topic": r".*/Evil/description says that it is Pepper.*",
-        "two programs": r"2 programs say that they are Pepper: “Pepper”.*“evil”.*",
-        "foreign topic": (
-            r"Evil says that /Pepper/LEAF is its own, which belongs to Pepper; Evil is left out\."
-        ),
+        "two programs": "2 programs announce themselves as Pepper: “Pepper”.*“evil”.*",
+        "foreign topic": ("Evil claims /Pepper/LEAF, which belongs to Pepper; Evil is left out\\."),
     }
 
     def __init__(self, node: nep.Node) -> None:

@@ -35,7 +35,7 @@ def test_the_help_of_a_robots_block_comes_from_its_description() -> None:
     told = help_of(CATALOGUE.blocks["robot_pepper_do_turn"])
     assert told["title"] == "(robot) turn (direction) by (angle) °"
     assert told["example"] == "For example: Pepper turn left by 90 °."
-    assert ["angle", "a number; 90 unless you change it, from 0 to 360 °"] in told["gaps"]  # type: ignore[operator]
+    assert ["angle", "a number; 90 by default, from 0 to 360 °"] in told["gaps"]  # type: ignore[operator]
     assert ["direction", "“left” or “right”"] in told["gaps"]  # type: ignore[operator]
 
 
@@ -43,5 +43,5 @@ def test_gaps_are_named_in_words() -> None:
     told = help_of(CATALOGUE.blocks["lists_get"])
     assert told["title"] == "(where) (number) of (list)"
     assert told["gaps"][1] == [  # type: ignore[index]
-        "number", "a number; 1 unless you change it; it is there for an item by its number",
+        "number", "a number; 1 unless you change it; used to access an item by its number",
     ]  # fmt: skip

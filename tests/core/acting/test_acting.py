@@ -31,11 +31,11 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         is_there, first = heard.listen(timeout_s=20.0)
         assert is_there
         tick_until(session, lambda: "a" in acting.last)
-        assert result_words(acting.last["a"]) == "heard by 1"
+        assert result_words(acting.last["a"]) == "received by 1"
         assert acting.call("sum", '{"a": 2, "b": 3}', 20.0) == ""
         tick_until(session, lambda: acting.calls.waiting is None)
         assert acting.calls.records[-1].answer == {"sum": 5}
-        assert call_words(acting.calls.records[-1]).startswith("answered in ")
+        assert call_words(acting.calls.records[-1]).startswith("confirmed in ")
         assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
         sent, called = list(acting.sent.records)[1:]
         assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, heard by 1")
@@ -58,7 +58,7 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         assert acting.outbox.all_repeated == ()
         while heard.receive(0.0) is not None:
             pass
-        assert acting.repeat(sent.number) == "Not armed for /cmd_vel: nothing is sent."
+        assert acting.repeat(sent.number) == "Not armed for /cmd_vel: sending is off."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
         tick_until(session, lambda: any(" sent" in each.words for each in acting.sent.records))
@@ -77,7 +77,7 @@ def test_what_is_wrong_is_a_sentence_and_arms_nothing(session: Session) -> None:
             "Line 1, column 6: a value is missing after the colon.",
         ),
         (KeptMessage("b", "Open", "/t", "json", '{"a": {yaw}}'), "Fill in “yaw” first."),
-        (KeptMessage("b", "Picture", "/t", "image"), "Messages of the type image can't be written by hand."),
+        (KeptMessage("b", "Picture", "/t", "image"), "Messages of type image can't be edited by hand."),
     ):
         assert acting.send(message) == sentence
     assert acting.call("sum", '{"a"', 1.0) == "Line 1, column 5: a colon is missing after the name."
@@ -98,7 +98,7 @@ def test_the_shelf_is_kept_in_its_file_and_damage_is_told(tmp_path: Path) -> Non
     path.write_text(json.dumps({**told, "messages": [*told["messages"], 7]}), "utf-8")
     third = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
     assert third.acting.shelf.messages == (STILL,)
-    assert any("1 message could not be read" in each.detail for each in third.alerts.active)
+    assert any("1 message can't be read" in each.detail for each in third.alerts.active)
     assert (tmp_path / "messages.damaged.json").is_file()
     third.close()
 
@@ -117,11 +117,11 @@ def test_a_file_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
 def test_how_it_ended_in_words() -> None:
     order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
-        (SendResult(order, "sent", heard=2), "heard by 2"),
-        (SendResult(order, "sent"), "nobody hears it"),
+        (SendResult(order, "sent", heard=2), "received by 2"),
+        (SendResult(order, "sent"), "no subscribers"),
         (SendResult(order, "began"), "began"),
-        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 left out, being late"),
-        (SendResult(order, "failed", "not sent: no master was there"), "not sent: no master was there"),
+        (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late message skipped"),
+        (SendResult(order, "failed", "not sent: there was no master"), "not sent: there was no master"),
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
         (SendResult(order, "ended"), "0 sent"),
     ):

@@ -69,19 +69,19 @@ def test_what_the_server_raises_is_a_refusal_with_its_words(bench) -> None:
     bench.node.new_server("/sum", refuse, threads=1)
     bench.call()
     record = bench.end()
-    assert (record.state, record.sentence) == ("failed", "refused: no face in sight")
+    assert (record.state, record.sentence) == ("failed", "rejected: no face in sight")
 
 
 def test_nobody_serves_it(bench) -> None:
     bench.call(timeout_s=0.1)
-    assert bench.end().sentence == "nobody serves it"
+    assert bench.end().sentence == "no server"
 
 
 def test_no_answer_in_time_and_giving_up(bench) -> None:
     go_on = threading.Event()
     bench.node.new_server("/sum", lambda _asked: go_on.wait(30), threads=2)
     bench.call(timeout_s=0.2)
-    assert bench.end().sentence == "no answer in 0.2 s"
+    assert bench.end().sentence == "no reply within 0.2 s"
     bench.call()
     with pytest.raises(NepError, match="Wait for the answer of /sum first"):
         bench.call()
@@ -89,7 +89,7 @@ def test_no_answer_in_time_and_giving_up(bench) -> None:
     assert bench.calls.waited_s == 3
     bench.calls.give_up()
     last = bench.calls.records[-1]
-    assert (last.state, last.took_s) == ("given up", 3)
+    assert (last.state, last.took_s) == ("canceled", 3)
     assert bench.calls.waiting is None
     go_on.set()
 
@@ -99,7 +99,7 @@ def test_what_is_not_armed_is_not_called(bench) -> None:
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.arming.disarm()
     bench.call()
-    assert bench.end().sentence == "not called: it was no longer armed"
+    assert bench.end().sentence == "not called: no longer armed"
     assert asked == []
 
 
@@ -111,7 +111,7 @@ def test_without_a_master_it_ends_and_is_not_called_later(bench) -> None:
     assert bench.calls.tick() == []
     bench.now += 2.1
     (record,) = bench.calls.tick()
-    assert record.sentence == "no master was there within 2 s"
+    assert record.sentence == "no master was found within 2 s"
     (job,) = bench.waiting
     job(bench.node)
     assert bench.calls.tick() == []

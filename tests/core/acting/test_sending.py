@@ -69,7 +69,7 @@ def test_what_is_not_armed_is_not_sent(bench) -> None:
     bench.arm("/other")
     bench.outbox.send(order())
     assert [(each.kind, each.sentence) for each in bench.outbox.take()] == [
-        ("failed", "not sent: it was no longer armed")
+        ("failed", "not sent: no longer armed")
     ] * 2
     assert heard.receive(0.0) is None
 
@@ -87,7 +87,7 @@ def test_what_waited_for_a_master_is_not_sent_when_it_is_late_or_no_longer_armed
     bench.now += LATE_S + 1
     second(bench.node)
     said = [each.sentence for each in bench.outbox.take()]
-    assert said == ["not sent: it was no longer armed", "not sent: no master was there"]
+    assert said == ["not sent: no longer armed", "not sent: there was no master"]
     assert heard.receive(0.0) is None
 
 

@@ -15,7 +15,7 @@ def test_the_same_again_is_one_entry_with_a_count_and_the_newest_message() -> No
         log.put(entry(at_s, text=text, source='{"id": {new id}}'), 1)
     (only,) = log.records
     assert (only.number, only.count, only.at_s, only.text) == (1, 2, 2.0, '{"id": "b"}')
-    log.put(entry(3.0, "Still, nobody hears it", source='{"id": {new id}}'), 1)
+    log.put(entry(3.0, "Still, no subscribers", source='{"id": {new id}}'), 1)
     log.put(entry(4.0, source='{"id": 7}'), 1)
     log.put(entry(5.0, source='{"id": 8}'), 1)
     assert [(each.number, each.count) for each in log.records] == [(1, 2), (2, 1), (3, 1), (4, 1)]

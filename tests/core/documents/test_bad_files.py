@@ -56,8 +56,8 @@ def test_without_room_the_old_file_is_whole_and_the_work_is_kept(tmp_path: Path)
         capture_output=True, text=True, timeout=60, check=True, cwd=ROOT,
     )  # fmt: skip
     told = json.loads(done.stdout)
-    assert told["said"].startswith("Mine.nepb can't be written (")
-    assert told["said"].endswith("make room there or save it in another place")
+    assert told["said"].startswith("can't write Mine.nepb (")
+    assert told["said"].endswith("free some space or choose another folder")
     assert told["dirty"] is True
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir() if each.suffix == ".part"] == [], "no half file is left"
@@ -74,7 +74,7 @@ def test_a_file_cut_at_every_byte_is_a_sentence(tmp_path: Path) -> None:
         with pytest.raises(DocumentError) as told:
             parse_file(whole[:length], Path("x.nepb"))
         assert told.value.reason == "x.nepb is damaged or not a behaviour"
-        assert told.value.advice == "open a copy from before"
+        assert told.value.advice == "open an earlier copy"
 
 
 def test_bytes_that_were_changed_are_a_sentence_or_open(tmp_path: Path) -> None:

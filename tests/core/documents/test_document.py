@@ -183,7 +183,7 @@ def test_a_failed_save_keeps_the_work_unsaved_and_journalled(
 ) -> None:
     document.edited(STARTED)
     (tmp_path / "folder.nepb").mkdir()
-    with pytest.raises(DocumentError, match="save it in another place"):
+    with pytest.raises(DocumentError, match="save it in another folder"):
         document.save(tmp_path / "folder.nepb")
     assert document.dirty
     assert len(list(journals.glob("*.json"))) == 1
@@ -235,7 +235,7 @@ def test_a_huge_file_is_refused_unread(document: Document, tmp_path: Path) -> No
 def test_one_that_would_be_too_large_to_read_again_is_not_written(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "large.nepb"
     document.edited({"blocks": {"x": "y" * LARGEST_BYTES}})
-    with pytest.raises(DocumentError, match="at most 10 MB are read, use smaller pictures"):
+    with pytest.raises(DocumentError, match="at most 10 MB can be read; use smaller images"):
         document.save(path)
     assert not path.exists()
 
@@ -250,8 +250,8 @@ def test_a_stack_too_long_for_json_is_a_sentence_and_stays_open(document: Docume
     until(lambda: document.journal_error is not None)
     assert not document.is_kept
     assert document.journal_error is not None
-    assert "divide it into several scripts" in document.journal_error
-    with pytest.raises(DocumentError, match="divide it into several scripts"):
+    assert "split it into several scripts" in document.journal_error
+    with pytest.raises(DocumentError, match="split it into several scripts"):
         document.save(tmp_path / "long.nepb")
     document.edited(STARTED)
     assert document.is_kept
@@ -335,9 +335,9 @@ def test_work_that_was_saved_is_no_longer_told_as_lost(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("number", "then"),
     [
-        (errno.ENOSPC, "; make room there or save it in another place"),
-        (errno.EROFS, "; save it in another place"),
-        (errno.EACCES, "; save it in another place"),
+        (errno.ENOSPC, "; free some space or choose another folder"),
+        (errno.EROFS, "; save it in another folder"),
+        (errno.EACCES, "; save it in another folder"),
     ],
 )
 def test_only_on_a_full_disk_room_is_asked_for(

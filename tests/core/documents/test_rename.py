@@ -77,7 +77,7 @@ def test_another_file_is_never_written_over(opened: Documents, tmp_path: Path) -
     document = opened.open(file(tmp_path / "Greeting.nepb"))
     other = file(tmp_path / "Quiz.nepb")
     content = other.read_bytes()
-    with pytest.raises(DocumentError, match="There is a file “Quiz” in "):
+    with pytest.raises(DocumentError, match="A file named “Quiz” already exists in "):
         opened.rename(document, "Quiz")
     with pytest.raises(DocumentError, match="can't be renamed"):
         rename_file(tmp_path / "Greeting.nepb", other)  # one that came there just now

@@ -69,19 +69,19 @@ def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("$.people[", "the query does not end well: "),
-        ("$.people[?@.age >]", "the query can't be understood from "),
-        ("people", "the query can't be understood from people on: "),
-        ("", "the query does not end well: "),
-        ("$[?match(@.name, '(a+)+$')]", "the query can't be understood from match(@.name, '(a+)+"),
-        ("$[?search(@.name, 'a')]", "the query can't be understood from search("),
-        ("$[99999999999999999999999]", "the query can't be understood from 9999"),
+        ("$.people[", "the query is incomplete: "),
+        ("$.people[?@.age >]", "the query is not valid from "),
+        ("people", "the query is not valid from people on: "),
+        ("", "the query is incomplete: "),
+        ("$[?match(@.name, '(a+)+$')]", "the query is not valid from match(@.name, '(a+)+"),
+        ("$[?search(@.name, 'a')]", "the query is not valid from search("),
+        ("$[99999999999999999999999]", "the query is not valid from 9999"),
         ("$." + "x" * LONGEST, f"a query has {LONGEST} letters at most"),
         ("$[?" + "(" * 400, "the query "),
         ("$\x00", "the query "),
-        ("$[?@.x > 1e9999]", "the query has a number that is too large"),
-        ("$[?@.x == -1e9999]", "the query has a number that is too large"),
-        ("$.a\x1b[2J b", "the query can't be understood from \\x1b[2J b on: "),
+        ("$[?@.x > 1e9999]", "a number in the query is too large"),
+        ("$[?@.x == -1e9999]", "a number in the query is too large"),
+        ("$.a\x1b[2J b", "the query is not valid from \\x1b[2J b on: "),
     ],
 )
 def test_a_wrong_query_is_a_sentence(text, sentence) -> None:
@@ -106,7 +106,7 @@ MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
 )
 def test_a_query_that_multiplies_itself_ends_with_what_it_found(text) -> None:
     answer = JsonQuery(text).answer(MANY, most_steps=5000)
-    assert answer.cut == "It looks at more than 5000 values; this was found until then."
+    assert answer.cut == "Search stopped after 5000 values; these were found so far."
 
 
 def test_comparing_long_lists_counts_what_is_compared() -> None:
@@ -117,7 +117,7 @@ def test_comparing_long_lists_counts_what_is_compared() -> None:
 
 def test_so_many_are_shown_and_a_deep_message_says_so() -> None:
     answer = JsonQuery("$..age").answer(MANY, most_found=10)
-    assert (len(answer.found), answer.cut) == (10, "The first 10 are shown.")
+    assert (len(answer.found), answer.cut) == (10, "Only the first 10 are shown.")
     deep: dict[str, object] = {}
     for _each in range(500):
         deep = {"a": deep}

@@ -18,7 +18,7 @@ def graph(**nodes: list[str]) -> GraphView:
 
 
 def test_a_robot_is_one_line_not_one_for_each_topic() -> None:
-    assert arrivals(graph(), graph(Pepper=["/a", "/b", "/c"])) == ["Pepper is here with 3 topics"]
+    assert arrivals(graph(), graph(Pepper=["/a", "/b", "/c"])) == ["Pepper joined with 3 topics"]
 
 
 def test_a_single_topic_is_named_with_its_publishers() -> None:
@@ -27,7 +27,7 @@ def test_a_single_topic_is_named_with_its_publishers() -> None:
 
 
 def test_a_node_without_new_topics_and_one_that_left() -> None:
-    assert arrivals(graph(one=["/a"]), graph(two=["/a"])) == ["two is here", "one has left"]
+    assert arrivals(graph(one=["/a"]), graph(two=["/a"])) == ["two is here", "one left"]
 
 
 def test_nothing_new_is_no_line() -> None:
@@ -58,8 +58,8 @@ def test_many_at_once_are_one_line_with_their_number() -> None:
         "1000 new topics: /t0000, /t0001, /t0002 and 997 more"
     ]
     crowd: dict[str, list[str]] = {f"n{number}": [] for number in range(200)}
-    assert arrivals(graph(), graph(**crowd)) == ["200 nodes are here: n0, n1, n2 and 197 more"]
-    assert arrivals(graph(**crowd), graph()) == ["200 nodes have left: n0, n1, n2 and 197 more"]
+    assert arrivals(graph(), graph(**crowd)) == ["200 nodes joined: n0, n1, n2 and 197 more"]
+    assert arrivals(graph(**crowd), graph()) == ["200 nodes left: n0, n1, n2 and 197 more"]
 
 
 def test_a_few_at_once_are_named_each() -> None:

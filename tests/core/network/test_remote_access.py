@@ -109,7 +109,7 @@ def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
         assert world.asked[-1][0] == tuple(hosts)
         assert reach.hosts == tuple(hosts)
         (alert,) = alerts.active
-        assert alert.title == "Who may connect can't be saved."
+        assert alert.title == "The list of allowed connections can't be saved."
         assert alert.detail.startswith(words)
     (tmp_path / "settings.json").rmdir()
     reach.listen_at(["192.168.1.20"])

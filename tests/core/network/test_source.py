@@ -48,7 +48,7 @@ def test_a_second_studio_has_a_name_of_its_own(
         until(lambda wanted=wanted: names(master.address) == wanted, f"{wanted} are there")
     assert not master.view().alerts
     sources[1].close()
-    until(lambda: names(master.address) == ["studio", "studio 3"], "the second has left")
+    until(lambda: names(master.address) == ["studio", "studio 3"], "the second left")
     begin(master.address, events, sources)
     until(lambda: names(master.address) == ["studio", "studio 2", "studio 3"], "its name is used again")
 

@@ -138,7 +138,7 @@ def test_a_network_that_does_not_answer_is_grey_with_a_sentence_until_it_is_back
     assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [True]
     assert lost_words(network) == "ROS 1: no ROS master answers."
     (alert,) = world.alerts.active
-    assert (alert.title, alert.detail) == ("ROS 1 can't be looked at now.", "No ROS master answers.")
+    assert (alert.title, alert.detail) == ("ROS 1 can't be shown now.", "No ROS master answers.")
     assert world.networks.revision > revision
     world.networks.age(100.0, 0)
     assert [topic.name for topic in network.topics] == ["/a"], "it may be there: who is connected goes on"

@@ -93,11 +93,11 @@ def test_one_is_set_and_a_refusal_is_in_the_words_of_the_node(
         assert said in settled(session, shown)
     for text in ("", "fast", "nan", "inf", "1e999", "true", "[1]"):
         shown.set("speed", text)
-        assert (shown.refusal, shown.setting) == ("write a number", "")
+        assert (shown.refusal, shown.setting) == ("enter a number", "")
     shown.set("gait", "fly")
     assert "use 'walk' or 'run'" in settled(session, shown)
     shown.set("serial", "8")
-    assert (shown.refusal, shown.setting) == ("only its own node may set it", "")
+    assert (shown.refusal, shown.setting) == ("only its own node can set it", "")
     shown.set("no such", "8")
     assert (robot.parameters["speed"], robot.parameters["gait"], robot.parameters["serial"]) == (
         1.0,
@@ -133,7 +133,7 @@ def test_a_node_that_ends_while_it_is_asked_is_told_in_words(
     robot.close()
     tick_until(session, lambda: entry_of(session, robot).gone_s is not None)
     shown.set("speed", "1")
-    assert (shown.refusal, shown.setting) == ("its node has gone", "")
+    assert (shown.refusal, shown.setting) == ("its node has disappeared", "")
     assert values(shown)["serial"] == "7", "what was known stays to be read"
 
 
@@ -164,7 +164,7 @@ def test_whatever_a_stranger_publishes_there_is_said_or_read(
         for payload in ("words", 7, {"parameters": None}, {}):
             loud.publish(payload)
         tick_until(session, lambda: _refreshed(shown).problem)
-        assert shown.problem == "this is no list of parameters"
+        assert shown.problem == "this is not a list of parameters"
         assert "speed" in values(shown), "what the node told stays"
         loud.publish({"parameters": [1, {"name": ["x"], "type": 5, "min": "a", "choices": 3, "value": None}]})
         tick_until(session, lambda: not _refreshed(shown).problem)
@@ -232,6 +232,6 @@ def test_what_is_no_value_of_its_type_is_refused_with_the_next_step(text: str, k
 def test_where_parameters_can_only_be_read_it_is_said() -> None:
     (parameter,) = parameters_in({"parameters": [{"name": "gain", "value": 1, "type": "int"}]})
     node = NodeEntry("a", "arm", network="zenoh", has_parameters=True)
-    assert refusal_of(node, parameter) == "on this network parameters can be read only"
+    assert refusal_of(node, parameter) == "parameters on this network are read-only"
     node.may_set = True
     assert refusal_of(node, parameter) == ""

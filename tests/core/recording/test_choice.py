@@ -42,7 +42,7 @@ def test_what_is_left_out_wins_and_none_wanted_is_all():
 
 
 def test_what_can_not_be_recorded_says_why():
-    assert RecordingChoice("chosen").problem == "No topic is chosen."
+    assert RecordingChoice("chosen").problem == "No topic is selected."
     assert RecordingChoice("chosen", topics=("/a",)).problem == ""
     assert RecordingChoice("pattern").problem == ""
     assert RecordingChoice("pattern", patterns=("/a\x00b",)).problem.endswith(".")

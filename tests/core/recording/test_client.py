@@ -129,20 +129,20 @@ def test_alerts_of_the_disk_come_and_go(made):
         made.say("figures", recording=status(unkept=3), ring=None, free_bytes=900_000_000)
     assert made.told() == {
         "recorder:low": ("warn", "The disk is nearly full."),
-        "recorder:unkept": ("warn", "3 messages are not in the recording: the disk is too slow."),
+        "recorder:unkept": ("warn", "3 messages were not recorded: the disk is too slow."),
     }
     made.say("figures", recording=status(unkept=3), ring=None, free_bytes=2_000_000_000)
     assert "recorder:low" not in made.told()
     made.say("ended", path="a.mcap", status=status(problem="the disk is full; what came before is kept"))
     assert made.told()["recorder:ended"] == (
         "error",
-        "The recording has ended: the disk is full; what came before is kept.",
+        "The recording stopped: the disk is full; what came before is kept.",
     )
     assert made.client.state.phase == ""
     made.client.record(Path("b.mcap"))
     assert not made.told()
     made.say("problem", op="record", sentence="no such folder", path="b.mcap")
-    assert made.told()["recorder:ended"][1] == "Nothing is recorded."
+    assert made.told()["recorder:ended"][1] == "Nothing is being recorded."
     assert made.client.record(Path("c.mcap"))
 
 

@@ -36,7 +36,7 @@ def test_what_fails_is_a_sentence(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing of the kind")
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     eventually(lambda: job.is_over)
-    assert job.words().startswith("It was not exported: ")
+    assert job.words().startswith("Not exported: ")
     assert not job.files
 
 

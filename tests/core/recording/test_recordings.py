@@ -60,7 +60,7 @@ def test_a_recording_begins_with_the_last_choice_and_ends(made):
     (order,) = made.lines[0].orders
     assert order["path"] == str(made.home / "Recordings" / "Aiko greets.mcap")
     assert (order["topics"], order["left_out"], order["note"]) == (["/arm/*"], ["/arm/raw"], "second try")
-    assert recordings.record() == "A recording goes on already."
+    assert recordings.record() == "Already recording."
     made.say("recording")
     made.now += 42.5
     assert (recordings.is_recording, recordings.elapsed_s) == (True, 42.5)
@@ -99,7 +99,7 @@ def test_a_choice_for_one_time_is_not_kept(made):
 
 def test_what_can_not_be_is_a_sentence_and_starts_nothing(made):
     made.recordings.choose(RecordingChoice("chosen"))
-    assert made.recordings.record() == "No topic is chosen."
+    assert made.recordings.record() == "No topic is selected."
     assert made.recordings.keep() == "The flight recorder is off."
     assert made.lines == []
 
@@ -116,7 +116,7 @@ def test_a_chosen_folder_that_is_away_is_not_made_anew_but_said(made):
     away = made.home / "stick" / "films"
     made.recordings.set_folder(away)
     assert made.again().folder == away
-    assert made.recordings.record() == "The folder for recordings is not there."
+    assert made.recordings.record() == "The recordings folder is missing."
     (alert,) = made.alerts.active
     assert (alert.id, alert.action) == (NO_FOLDER, CHOOSE_FOLDER)
     assert not away.exists()
@@ -128,7 +128,7 @@ def test_a_chosen_folder_that_is_away_is_not_made_anew_but_said(made):
 
 def test_a_folder_that_can_not_be_made_is_said(made):
     (made.home / "Recordings").write_bytes(b"a file in its place")
-    assert made.recordings.record() == "The folder for recordings is not there."
+    assert made.recordings.record() == "The recordings folder is missing."
     assert made.alerts.has(NO_FOLDER)
 
 
@@ -174,7 +174,7 @@ def test_an_alarm_is_told_why_nothing_was_kept(made):
         told.append((well, words))
 
     made.recordings.carry(*alarm(), done)
-    assert told == [(False, "nothing was kept: the flight recorder is off")]
+    assert told == [(False, "nothing saved: the flight recorder is off")]
     made.recordings.set_wish(RingWish(is_on=True))
     made.say("ring")
     for _each in range(3):  # within one second: three names
@@ -183,7 +183,7 @@ def test_an_alarm_is_told_why_nothing_was_kept(made):
     assert len(set(paths)) == 3
     made.say("problem", op="keep", path=paths[0], sentence="the disk is full")
     made.recordings.on_event(RecorderGone(len(made.lines), "killed"))
-    assert told[1:] == [(False, "nothing was kept: see the alerts")] * 3
+    assert told[1:] == [(False, "nothing saved: see the alerts")] * 3
     assert made.made == []
     assert made.alerts.has("recorder:keep")
 

@@ -233,7 +233,7 @@ def test_the_outbox_sends_what_is_allowed_in_its_turn_and_counts_what_it_leaves_
     jobs.pop()(node)
     outbox.offer(messages, [0.0, 0.0, LATE_S + 0.01])
     assert (sent.count, sent.skipped, sent.heard) == (1, 1, 2)
-    assert sent_words(sent) == "1 sent, 1 left out, being late"
+    assert sent_words(sent) == "1 sent, 1 late message skipped"
     assert node.made[0].made == ("/test", "json", True)
     assert node.made[0].sent == [(bytes(messages[0].data), None)]
     typed = Message("/a", b'{"x":1}', "json", "geometry_msgs/Point")
@@ -280,7 +280,7 @@ def test_it_is_heard_on_the_network_under_its_new_name_until_stop(
         heard: list[Message] = []
         node.new_sub("**", sink=heard.extend)
         replay, sending = open_and_know(session, path)
-        assert acting.arm() == "A recording shows: go back to live to send."
+        assert acting.arm() == "A recording is open. Return to live to send."
         assert sending.arm() == "Choose a topic first."
         assert sending.choose("/a", "two words") != ""
         assert sending.choose("/nowhere", "") == ""
@@ -306,7 +306,7 @@ def test_it_is_heard_on_the_network_under_its_new_name_until_stop(
         session.tick()
         assert sending.outbox.going == ()
     said = [each.text for each in session.console.records]
-    assert "/test/a: /a of the recording, is sent as it is played" in said
+    assert "/test/a: /a of the recording, sent as it is played" in said
     assert f"/test/a: /a of the recording, {sent_words(going[0])}" in said
     assert f"/camera: {sent_words(going[1])}" in said
 

@@ -111,7 +111,7 @@ def test_a_robot_whose_process_crashes_is_reported_and_its_own_words_are_told(cr
 
 
 def test_one_that_says_nothing_else_is_told_as_before(crashes, world: World) -> None:
-    assert died(world, TRACE, -11).detail == "Something else on this computer ended it."
+    assert died(world, TRACE, -11).detail == "Another program on this computer stopped it."
     assert len(crashes()) == 1
 
 

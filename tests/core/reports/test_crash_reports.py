@@ -135,7 +135,7 @@ def test_the_next_start_offers_the_worst_once(reports: CrashReports) -> None:
     offer(alerts, reports)
     told = alerts.active[0]
     assert (told.title, told.button, told.action) == (
-        "Studio ended unexpectedly last time.",
+        "Studio closed unexpectedly last time.",
         "Report a problem",
         "help.report",
     )

@@ -132,8 +132,8 @@ def test_a_place_that_takes_nothing_is_said_and_nothing_is_left(tmp_path: Path) 
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(ReportError) as raised:
         write_report(tmp_path / "file" / "report.zip", b"zip")
-    assert str(raised.value).startswith("report.zip can't be written (")
-    assert str(raised.value).endswith("; choose another place")
+    assert str(raised.value).startswith("can't write report.zip (")
+    assert str(raised.value).endswith("; choose another folder")
     writer = ReportWriter(tmp_path / "file" / "report.zip", lambda: b"zip")
     assert writer.wait(60)
     assert writer.problem == str(raised.value)
@@ -145,7 +145,7 @@ def test_a_full_disk_has_its_own_advice(tmp_path: Path, monkeypatch: pytest.Monk
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("app.core.reports.problem_report.write_atomically", full)
-    with pytest.raises(ReportError, match="make room there or choose another place"):
+    with pytest.raises(ReportError, match="free some space or choose another folder"):
         write_report(tmp_path / "report.zip", b"zip")
 
 
@@ -155,5 +155,5 @@ def test_what_goes_wrong_while_it_is_made_is_said(tmp_path: Path) -> None:
 
     writer = ReportWriter(tmp_path / "report.zip", fails)
     assert writer.wait(60)
-    assert writer.problem == "the report can't be made: KeyError: 'Name'"
+    assert writer.problem == "can't write the report: KeyError: 'Name'"
     assert not list(tmp_path.iterdir())

@@ -54,7 +54,7 @@ def test_of_many_the_newest_are_kept() -> None:
 )  # fmt: skip
 def test_what_is_damaged_is_no_version(damaged: object) -> None:
     assert known({KEY: damaged}) == []
-    assert used_here({KEY: damaged}) == "not known"
+    assert used_here({KEY: damaged}) == "unknown"
     assert with_this_version({KEY: damaged}, 1.0, is_first=True, version="0.1.0") == [
         {"version": "0.1.0", "since_s": 1.0}
     ]

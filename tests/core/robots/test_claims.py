@@ -77,8 +77,8 @@ class Studio:
 
     told: ClassVar = {
         "another topic": r".*/Evil/description says that it is Pepper.*",
-        "two programs": r"2 programs say that they are Pepper\..*“Pepper” on .*“evil” on .*",
-        "foreign topic": r".*Evil says that /Pepper/LEAF is its own, which belongs to Pepper.*",
+        "two programs": "2 programs announce themselves as Pepper\\..*“Pepper” on .*“evil” on .*",
+        "foreign topic": ".*Evil claims /Pepper/LEAF, which belongs to Pepper.*",
     }
 
     def __init__(self, session: Session) -> None:
@@ -226,7 +226,7 @@ def test_who_takes_the_name_of_a_robot_in_motion_does_not_prove_its_stop(
         tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
-        assert session.runs.view().title == "Pepper (“Pepper”) did not answer"
+        assert session.runs.view().title == "Pepper (“Pepper”) did not respond"
         assert thief.heard("stop")
         session.runs.confirm_still()
         session.tick()  # 33 ms later nobody waits for the old one any more
@@ -386,7 +386,7 @@ def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts
 ) -> None:
     the_link(session)
     wrong = described("Rover")
-    wrong["actions"] = {"do it": {}}
+    wrong["actions"] = {"perform it": {}}
     announcement = announce(evil, "/Rover/description", wrong)
     said = claimed(session, "/Rover/description")
     assert "The description of 'Rover' can't be used: actions" in said

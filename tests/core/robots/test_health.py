@@ -48,7 +48,7 @@ def test_bad_messages_are_one_alert_with_the_exact_count(case: Case) -> None:
     (alert,) = case.alerts.active
     assert (alert.id, alert.count, alert.action) == ("message:/a", 990, "inspect:/a")
     assert "990 messages" in alert.title
-    assert alert.detail == "No json. Look at the raw bytes in the Inspector."
+    assert alert.detail == "No json. See the raw bytes in the Inspector."
 
 
 def test_what_was_not_tried_is_said(case: Case) -> None:
@@ -138,7 +138,7 @@ def test_a_real_robot_that_has_gone_is_told_after_a_while_and_cured_when_it_is_b
     case.health.check()
     alert = case.alert()
     assert alert is not None
-    assert (alert.id, alert.title, alert.action) == ("robot:Rover", "Rover has gone.", "help.doctor")
+    assert (alert.id, alert.title, alert.action) == ("robot:Rover", "Rover disconnected.", "help.doctor")
     case.health.check(used={"Rover"})
     used = case.alert()
     assert used is not None
@@ -160,7 +160,7 @@ def test_a_virtual_robot_is_told_of_only_while_its_process_runs_here(case: Case)
     case.health.check(started={"Rover"})
     alert = case.alert()
     assert alert is not None
-    assert (alert.title, alert.action) == ("Rover does not answer.", "connect:Rover")
+    assert (alert.title, alert.action) == ("Rover is not responding.", "connect:Rover")
 
 
 @pytest.mark.parametrize("kind", ["rejected", "errors"])
@@ -220,5 +220,5 @@ def test_of_two_robots_the_one_that_is_not_shown_is_not_silent(case: Case) -> No
     case.health.check()
     alert = case.alert()
     assert alert is not None, "the one that is looked at is silent"
-    assert alert.title == "The camera of Pepper has been silent for 4 s."
+    assert alert.title == "The camera of Pepper has sent nothing for 4 s."
     assert [link.silent for link in case.links] == ["camera silent", None]

@@ -29,7 +29,7 @@ class Case:
             "Pepper",
             PEPPER,
             answered_s=NOW - 3,
-            last_stop="answered in 41 ms, at 8:40",
+            last_stop="confirmed in 41 ms, at 8:40",
             last_stop_status="ok",
         )
         self.link.values["battery"] = 84
@@ -56,13 +56,13 @@ def case() -> Case:
 
 def test_a_robot_that_is_well(case: Case) -> None:
     assert [(fact.title, fact.status, fact.words) for fact in case.facts()] == [
-        ("Connection", "ok", "last answer 3 s ago"),
+        ("Connection", "ok", "last response 3 s ago"),
         ("Battery", "ok", "84 %"),
-        ("Stop", "ok", "answered in 41 ms, at 8:40"),
-        ("Camera", "ok", "sends 15 pictures a second"),
+        ("Stop", "ok", "confirmed in 41 ms, at 8:40"),
+        ("Camera", "ok", "sends 15 images per second"),
         ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} send"),
-        ("Left alone", "ok", "stops by itself after 1 s"),
-        ("Sign of life", "ok", f"every {PEPPER.beat_s:g} s while it works"),
+        ("When its program stops", "ok", "stops by itself after 1 s"),
+        ("Last response", "ok", f"every {PEPPER.beat_s:g} s while it works"),
     ]
     assert not any(fact.to_look_at for fact in case.facts())
 
@@ -71,32 +71,34 @@ def test_what_is_not_known_yet_is_no_warning(case: Case) -> None:
     case.link.answered_s = case.link.last_stop = None
     case.link.values.clear()
     case.topics.clear()
-    assert case.says("Connection") == ("ok", "connected; not asked yet")
-    assert case.says("Battery") == ("off", "not told yet")
+    assert case.says("Connection") == ("ok", "connected; no question sent yet")
+    assert case.says("Battery") == ("off", "not reported yet")
     assert case.says("Stop") == ("off", "not used yet")
-    assert case.says("Camera") == ("off", "no picture yet")
+    assert case.says("Camera") == ("off", "no image yet")
     assert not any(fact.to_look_at for fact in case.facts())
 
 
 def test_a_camera_that_nobody_looks_at_sends_nothing_and_is_well(case: Case) -> None:
     (camera,) = [sensor.topic for sensor in PEPPER.sensors if sensor.is_image]
     case.topics[camera] = Topic(camera, subscribers=0)
-    assert case.says("Camera") == ("off", "ready; nobody is watching")
+    assert case.says("Camera") == ("off", "ready (not in use)")
     case.topics[camera] = Topic(camera, age_s=15.0)
-    assert case.says("Camera") == ("off", "ready; nobody is watching"), "it sent while somebody looked"
+    assert case.says("Camera") == ("off", "ready (not in use)"), "it sent while somebody looked"
     case.topics[camera] = Topic(camera, subscribers=1, heard_since=NOW)
-    assert case.says("Camera") == ("off", "no picture yet")
+    assert case.says("Camera") == ("off", "no image yet")
 
 
 def test_one_that_does_not_answer_says_since_when_and_what_to_do(case: Case) -> None:
     case.link.mute = True
-    assert case.says("Connection") == ("error", "does not answer; its last answer is 3 s old; start it again")
+    assert case.says("Connection") == ("error", "not responding for 3 s; restart it")
     case.link.answered_s = None
     case.link.robot = replace(PEPPER, virtual=False)
-    assert case.says("Connection") == ("error", "does not answer; check that it is on")
+    assert case.says("Connection") == ("error", "not responding; check that it is switched on")
 
 
-@pytest.mark.parametrize(("title", "kind"), [("Rejected messages", "rejected"), ("Driver errors", "errors")])
+@pytest.mark.parametrize(
+    ("title", "kind"), [("Rejected messages", "rejected"), ("Driver exceptions", "errors")]
+)
 def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
     case: Case, title: str, kind: str
 ) -> None:
@@ -114,8 +116,13 @@ def test_what_the_driver_rejected_or_caught_is_a_warning_while_it_grows(
 
 def test_of_one_that_has_gone_nothing_old_is_said(case: Case) -> None:
     case.link.connected, case.link.gone_s = False, NOW - 12
-    assert case.says("Connection") == ("warn", "gone for 12 s; start it again")
-    assert [fact.title for fact in case.facts()] == ["Connection", "Stop", "Left alone", "Sign of life"]
+    assert case.says("Connection") == ("warn", "disconnected 12 s ago; restart it")
+    assert [fact.title for fact in case.facts()] == [
+        "Connection",
+        "Stop",
+        "When its program stops",
+        "Last response",
+    ]
 
 
 def test_a_low_battery_comes_first(case: Case) -> None:
@@ -133,7 +140,7 @@ def test_the_warmest_part_is_named(case: Case) -> None:
     case.with_sensor(joints, {"knee": 44.2, "hip": 39.0})
     assert case.says("Temperature") == ("ok", "left knee 44 °C")
     case.link.values["joints"] = {"knee": 44.2, "hip": 61.0}
-    assert case.says("Temperature") == ("warn", "hip warm, 61 °C; let it rest")
+    assert case.says("Temperature") == ("warn", "hip warm, 61 °C; let it cool down")
     case.link.values["joints"] = None
     assert "Temperature" not in [fact.title for fact in case.facts()]
 
@@ -141,9 +148,9 @@ def test_the_warmest_part_is_named(case: Case) -> None:
 @pytest.mark.parametrize(
     ("last", "status"),
     [
-        ("answered in 41 ms, at 8:40", "ok"),
-        ("not answered, at 8:41", "error"),
-        ("sent at 8:41; this robot cannot confirm", "off"),
+        ("confirmed in 41 ms, at 8:40", "ok"),
+        ("not confirmed, at 8:41", "error"),
+        ("sent at 8:41; this robot can't confirm", "off"),
     ],
 )
 def test_the_last_stop(case: Case, last: str, status: str) -> None:
@@ -188,7 +195,7 @@ def test_what_has_sent_nothing_is_not_said_to_send(case: Case) -> None:
 def test_one_of_rize_has_neither_watchdog_nor_signs_of_life(case: Case) -> None:
     case.link.robot = rize.robot("Nao")
     case.link.last_stop = None
-    assert case.says("Stop") == ("off", "not used yet; this robot cannot confirm")
-    assert case.says("Left alone")[0] == "off"
-    assert "Sign of life" not in [fact.title for fact in case.facts()]
+    assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")
+    assert case.says("When its program stops")[0] == "off"
+    assert "Last response" not in [fact.title for fact in case.facts()]
     assert not any(fact.to_look_at for fact in case.facts())

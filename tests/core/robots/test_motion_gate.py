@@ -93,7 +93,7 @@ def test_robots_without_a_readable_description_are_asked_about_too(rover) -> Non
     gate = MotionGate(permission, robots)
     assert not gate.permits(TOPIC, lambda: None)
     assert permission.question is not None
-    assert permission.question.title == "Let Rover move?"
+    assert permission.question.title == "Allow Rover to move?"
     permission.answer(let=True)
     assert gate.is_permitted(TOPIC)
     robots.come(rover)  # its description was read: the yes was for whoever had this name

@@ -32,7 +32,7 @@ def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
     assert not moving.permits([(rover, ["move", "light", "turn"])], lambda: None)
     question = moving.question
     assert question is not None
-    assert question.title == "Let Rover move?"
+    assert question.title == "Allow Rover to move?"
     assert question.sentence.startswith("“move” and “turn” move Rover.")
     assert "Stop is F12" in question.sentence
 
@@ -120,6 +120,6 @@ def test_one_yes_counts_for_all_robots_of_the_question(rover) -> None:
     moving, other = MotionPermission(), replace(rover, name="Other")
     assert not moving.permits([(rover, ["move"]), (other, ["turn"])], lambda: None)
     assert moving.question is not None
-    assert moving.question.title == "Let Rover and Other move?"
+    assert moving.question.title == "Allow Rover and Other to move?"
     moving.answer(let=True)
     assert moving.permits([(rover, ["move"]), (other, ["turn"])], pytest.fail)

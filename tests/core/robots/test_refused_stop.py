@@ -74,7 +74,7 @@ def test_a_robot_that_refuses_stop_is_said_to_refuse_everywhere(session: Session
     assert "the brake does not answer" in view.title
     assert view.title.startswith("Arm may still move")
     assert view.detail == "Switch Arm off by hand."
-    assert (view.result_status, view.confirm) == ("error", "Arm is still")
+    assert (view.result_status, view.confirm) == ("error", "Arm isn't moving")
     assert "did not answer" not in f"{view}"
     assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)
@@ -132,7 +132,7 @@ def test_one_that_went_away_without_a_stop_is_asked_again_until_a_person_says_th
     tick_until(session, lambda: not link.connected)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().confirm == "Arm is still"
+    assert session.runs.view().confirm == "Arm isn't moving"
     session.runs.confirm_still()
     assert link.state == "away"
     assert robots_chip(session) == ("No robot", "off")
@@ -153,7 +153,7 @@ def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: P
     path.write_text(json.dumps(content))
     assert run_file(path, out=out, allow_moving=True) == FAILED
     assert "Arm may still move" in out.getvalue()
-    assert "the brake does not answer. Switch it off by hand." in out.getvalue()
+    assert "the brake is not responding. Switch it off by hand." in out.getvalue()
     assert "did not answer." not in out.getvalue()
 
 
@@ -180,7 +180,7 @@ def test_while_a_stop_is_not_answered_nothing_looks_well(patient: Session, peppe
     assert link.chip.removeprefix("virtual, ") == "stopping"
     assert robots_chip(patient) == ("Pepper stopping", "running")
     (fact,) = (each for each in facts_of(link, patient.topics, 0.0, str) if each.title == "Stop")
-    assert (fact.status, fact.words) == ("off", "told to stop; its answer is waited for")
+    assert (fact.status, fact.words) == ("off", "Stop sent; waiting for confirmation")
     answers(patient, pepper)
     tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
     assert link.state == "ready"
@@ -244,7 +244,7 @@ def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
 ) -> None:
     link = the_link(session, "Pepper")
     say_ = pepper._say
-    said = "Pepper may still move: turn has not ended"
+    said = "Pepper may still move: turn is still running"
     pepper._say = lambda command, state, error="": say_(command, "failed", said)  # type: ignore[method-assign]
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().title == said)
@@ -274,7 +274,7 @@ def test_one_whose_stop_is_too_late_each_time_is_asked_once_more_and_not_for_eve
         lives(pepper)
         tick_until(session, lambda: not link.goes_on, LONG_S)
         session.tick()
-    assert (link.state, session.runs.view().confirm) == ("not stopped", "Pepper is still")
+    assert (link.state, session.runs.view().confirm) == ("not stopped", "Pepper isn't moving")
     session.runs.stop()  # a person asks: it is given another chance
     tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
@@ -319,7 +319,7 @@ def test_a_late_answer_changes_what_stands_there(session: Session, pepper: WireR
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
     session.runs.stop()
-    tick_until(session, lambda: session.runs.view().title == "Pepper did not answer")
+    tick_until(session, lambda: session.runs.view().title == "Pepper did not respond")
     pepper._say(pepper.heard("stop")[0], "failed", "the brake is stuck")
     tick_until(session, lambda: session.runs.view().title == "Pepper may still move: the brake is stuck")
     pepper._say(pepper.heard("stop")[0], "succeeded")
@@ -339,7 +339,7 @@ def test_the_programs_own_silent_robots_are_asked_again(session: Session, pepper
     assert runner is not None
     session.runs.on_runner(RunnerEvent("ended", runner.run, silent=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().title == "Pepper did not answer"
+    assert session.runs.view().title == "Pepper did not respond"
     runner.close()
 
 
@@ -348,5 +348,5 @@ def test_a_stop_without_a_network_names_every_robot(session: Session, pepper: Wi
     stopper, session.stopper = session.stopper, None
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().title.startswith("Pepper was not told to stop: ")
+    assert session.runs.view().title.startswith("Stop was not sent to Pepper: ")
     session.stopper = stopper

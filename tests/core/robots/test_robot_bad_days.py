@@ -91,7 +91,7 @@ def runs(session: Session, turtles: Turtles) -> None:
 
 def says_so_at_the_block(session: Session) -> None:
     tick_until(session, lambda: session.runs.block_errors, SAID_S)
-    assert session.runs.block_errors == {"x": "Turtle has stopped answering. Start the virtual robot again."}
+    assert session.runs.block_errors == {"x": "Turtle stopped responding. Start the virtual robot again."}
 
 
 def well_again(session: Session, turtles: Turtles) -> None:
@@ -126,7 +126,7 @@ def test_a_robot_that_hangs_in_the_middle_of_an_action(session: Session, turtles
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
     tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
     tick_until(session, lambda: not tried.running, SAID_S)
-    told = ("does not answer", "has gone", "can't be reached")  # as soon as the master knows, it is away
+    told = ("not responding", "has gone", "can't be reached")  # as soon as the master knows, it is away
     assert any(words in (tried.error or "") for words in told)
     if link.connected:
         assert link.chip == "virtual, does not answer"
@@ -257,12 +257,12 @@ def test_it_floods_its_feedback(session: Session, liar: Liar, tried: Invocation)
 
 def test_it_says_nothing_at_all(session: Session, liar: Liar, tried: Invocation) -> None:
     tick_until(session, lambda: not tried.running, SAID_S)
-    assert tried.error == "Turtle does not answer. Check that it is on."
+    assert tried.error == "Turtle is not responding. Check that it is switched on."
     assert session.fleet.link("Turtle").state == "not stopped"  # type: ignore[union-attr]
     tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
-    assert session.runs.view().title == "Turtle did not answer"
+    assert session.runs.view().title == "Turtle did not respond"
 
 
 def test_it_falls_silent_in_the_middle(session: Session, liar: Liar, tried: Invocation) -> None:

@@ -101,7 +101,7 @@ def test_two_robots_of_one_name_must_both_answer(master, stopper, pepper) -> Non
         report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
         assert [(each.answered, each.waits) for each in told] == [(True, True), (False, False)]
         assert (report.proven, report.silent) == (False, ("Pepper",))
-        assert report.robots[1].sentence == "Pepper (“Pepper”) did not answer. Switch it off by hand."
+        assert report.robots[1].sentence == "Pepper (“Pepper”) did not respond. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
         assert [robot.answered for robot in report.robots] == [False, True]
@@ -115,7 +115,7 @@ def test_a_program_that_only_listens_to_the_commands_is_named(master, stopper) -
         stopper.see(stopper._node.graph())
         report = stopper.stop_all(timeout_s=LONG_S)
     assert report.proven
-    said = "Pepper (“motor box”) hears the commands too and cannot confirm"
+    said = "Pepper (“motor box”) also receives the commands and can't confirm"
     assert [robot.sentence for robot in report.robots][1:] == [said]
 
 
@@ -161,10 +161,10 @@ def test_what_was_asked_and_not_told_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
     whole = report.with_asked(["Pepper", "Turtle"], "no master answers")
     assert (whole.proven, whole.silent) == (False, ("Turtle",))
-    said = "Turtle was not told to stop: no master answers. Switch it off by hand."
+    said = "Stop was not sent to Turtle: no master answers. Switch it off by hand."
     assert whole.robots[1].sentence == said
     assert report.with_asked(["Pepper"]) is report
-    assert not_reached("Turtle").wrong == "Turtle was not told to stop"
+    assert not_reached("Turtle").wrong == "Stop was not sent to Turtle"
 
 
 class Broken:
@@ -200,7 +200,7 @@ def test_a_line_that_failed_is_named_and_does_not_take_others_along(master, brok
         assert list(stopper.problems) == ["Pepper"]
         report = stopper.stop_all(timeout_s=LONG_S)
         assert (report.proven, report.silent) == (False, ("Pepper",))
-        assert report.robots[0].sentence.startswith("Pepper can't be told: ")
+        assert report.robots[0].sentence.startswith("Stop can't be sent to Pepper: ")
         assert broken.tried == 2  # once more at the stop
     finally:
         stopper.close()
@@ -268,5 +268,5 @@ def test_the_words_of_a_refusal_are_the_robots_own_and_harmless(stopper, pepper)
     words = "Pepper may still move: the brake\x1b[2J\n does not answer." + "!" * 1000
     pepper._say = lambda command, state, error="": say_(command, "failed", words)
     (stopped,) = stopper.stop_all(timeout_s=LONG_S).robots
-    assert stopped.wrong.startswith("Pepper may still move: the brake [2J does not answer.!")
+    assert stopped.wrong.startswith("Pepper may still move: the brake [2J is not responding.!")
     assert len(stopped.wrong) <= 200

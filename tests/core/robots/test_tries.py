@@ -83,7 +83,7 @@ def test_a_robot_that_says_nothing_to_a_command_fails_it_in_three_seconds(bench)
     bench.pass_time(FIRST_ANSWER_S - 0.1)
     assert made.running
     bench.pass_time(0.2)
-    assert (made.state, made.error) == ("failed", "Turtle does not answer. Check that it is on.")
+    assert (made.state, made.error) == ("failed", "Turtle is not responding. Check that it is switched on.")
     assert bench.sent[-1]["op"] == "cancel"  # should it wake up
     assert (bench.link.state, bench.link.chip) == ("silent", "virtual, does not answer")
     bench.tries.answer(bench.link, {"op": "alive", "id": ""})
@@ -156,7 +156,7 @@ def test_the_second_answer_changes_nothing(bench) -> None:
 def test_a_robot_that_can_not_be_reached_fails_at_once(bench) -> None:
     bench.reachable = False
     made = bench.begin()
-    assert (made.state, made.error) == ("failed", "Turtle can't be reached; check that it is on")
+    assert (made.state, made.error) == ("failed", "Turtle can't be reached; check that it is switched on")
 
 
 def test_a_cancel_is_sent_once_it_runs_and_never_after_its_end(bench) -> None:
@@ -174,7 +174,7 @@ def test_two_tries_of_one_action_both_come_to_their_end(bench) -> None:
     first, second = bench.begin(), bench.begin()
     bench.answer(first, "accepted")
     bench.answer(second, "accepted", replaces=["move"])
-    bench.answer(first, "canceled", error="move took its place")
+    bench.answer(first, "canceled", error="replaced by move")
     assert (first.state, second.state) == ("canceled", "accepted")
     assert bench.rested == []  # the second one still keeps the robot awake
     bench.answer(second, "succeeded")

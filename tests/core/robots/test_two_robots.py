@@ -91,7 +91,7 @@ def test_nothing_moves_a_real_robot_before_the_answer(session: Session, node: ne
         for press in (session.runs.run, session.runs.step, session.runs.run):  # F5, F10, the palette
             press()
             assert session.runs.view().state == "ready"
-            assert moving.question.title == "Let Turtle move?"
+            assert moving.question.title == "Allow Turtle to move?"
         lit = session.fleet.invoke("Turtle", "light", {})  # that moves nothing
         tick_until(session, lambda: lit.state == "succeeded")
         assert wheels.still()
@@ -116,7 +116,7 @@ def test_a_behaviour_that_publishes_on_a_robots_topic_asks_and_is_stopped_too(
         moving = session.fleet.permission
         assert not session.runs.active
         assert moving.question is not None
-        assert moving.question.title == "Let Turtle move?"
+        assert moving.question.title == "Allow Turtle to move?"
         assert "“move”" in moving.question.sentence
         session.tick()
         assert "drive" not in heard

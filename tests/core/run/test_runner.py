@@ -250,7 +250,7 @@ def test_a_child_that_crashes_is_told(runner, heard):
 
 def test_a_child_that_fails_says_why(runner, heard):
     runner(FAILS).start(program(), [], None)
-    assert heard.until("ended").text == "The program's process ended with code 1: no room left."
+    assert heard.until("ended").text == "The program's process ended with exit code 1: no room left."
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -279,7 +279,7 @@ def test_what_is_no_event_is_left_out(runner, heard):
     made.start(program(), [], None)
     assert heard.until("ended").elapsed_s == 1.5
     assert [(event.kind, event.text) for event in heard.events] == [
-        ("print", "3.0 MB that no block wrote were left out"),
+        ("print", "3.0 MB of unexpected output were discarded"),
         ("ended", ""),
     ]
 

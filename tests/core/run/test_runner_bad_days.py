@@ -65,12 +65,12 @@ def test_a_program_that_eats_memory_is_ended_and_says_so(started, heard) -> None
     started(EATS, most_bytes=200_000_000)
     ended = heard.until("ended")
     assert not ended.ok
-    assert ended.text == "The program used more than 0.2 GB of memory and was ended."
+    assert ended.text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_what_it_starts_counts_with_it(started, heard) -> None:
     started(LETS_EAT, most_bytes=200_000_000)
-    assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was ended."
+    assert heard.until("ended").text == "The program used more than 0.2 GB of memory and was stopped."
 
 
 def test_a_behaviours_program_has_a_gigabyte() -> None:
@@ -127,7 +127,7 @@ def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
 def test_a_line_without_end_is_left_out_and_what_follows_is_read(started, heard) -> None:
     started(NO_END)
     assert heard.until("ended").elapsed_s == 1.0
-    assert printed(heard) == ["10.0 MB that no block wrote were left out"]
+    assert printed(heard) == ["10.0 MB of unexpected output were discarded"]
 
 
 def test_errors_without_end_are_bounded(started, heard) -> None:

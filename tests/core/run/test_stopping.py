@@ -54,7 +54,7 @@ def test_a_silent_robot_is_named(stopper, robots):
     assert (report.proven, report.silent) == (False, ("Turtle",))
     by_name = {robot.name: robot for robot in report.robots}
     assert by_name["Pepper"].answered
-    assert by_name["Turtle"].sentence == "Turtle did not answer. Switch it off by hand."
+    assert by_name["Turtle"].sentence == "Turtle did not respond. Switch it off by hand."
     assert report.elapsed_ms >= SILENT_S * 1000
     assert [robot.name for robot in answered] == [
         "Pepper",
@@ -70,7 +70,7 @@ def test_only_the_robots_that_are_named_are_stopped(stopper, robots):
 def test_a_name_that_could_not_be_told_is_in_the_report(stopper, robots):
     report = stopper.stop_all(["Turtle", "Nobody"], timeout_s=LONG_S)
     assert (report.proven, report.silent) == (False, ("Nobody",))
-    assert report.robots[1].sentence == "Nobody was not told to stop. Switch it off by hand."
+    assert report.robots[1].sentence == "Stop was not sent to Nobody. Switch it off by hand."
 
 
 def test_a_stop_without_robots_proves_nothing(stopper):
@@ -118,7 +118,7 @@ def test_a_robot_of_rize_cannot_confirm(master, stopper):
     try:
         stopper.set_robots([rosie.described])
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert report.robots[0].sentence == "Rosie: stop sent; this robot cannot confirm"
+        assert report.robots[0].sentence == "Rosie: Stop sent; this robot can't confirm"
         assert (report.proven, report.silent) == (True, ())
         assert report.elapsed_ms < LONG_S * 1000  # nobody is waited for
         until(lambda: bool(rosie.commands))
@@ -133,7 +133,7 @@ def test_a_closed_node_is_told_in_words(master, robots):
         stopper.set_robots([robots[0].described])
     report = stopper.stop_all()
     assert not report.proven
-    assert report.robots[0].sentence.startswith("Pepper can't be told: ")
+    assert report.robots[0].sentence.startswith("Stop can't be sent to Pepper: ")
 
 
 def test_a_stop_names_the_program_that_it_ends(stopper, robots):

@@ -44,18 +44,18 @@ def test_running_tells_its_time_and_what_happens() -> None:
 
 
 def test_a_paused_program_says_what_go_on_will_leave_out() -> None:
-    said = "Rover does not tell how much of “drive” is left; Go on leaves it out"
+    said = "Rover doesn't report how much of “drive” is left; Resume skips it"
     run = RunState("paused", "Greeting", paused_at="drive 2 m", warning=said)
     assert view_of(run, ["Rover"], 1.0).detail == said
     run = replace(run, warning="")
-    assert view_of(run, ["Rover"], 1.0).detail == "Robots hold still; the clock stands"
+    assert view_of(run, ["Rover"], 1.0).detail == "Robots and timers are paused"
 
 
 def test_the_clock_stands_while_paused() -> None:
     run = RunState("paused", "Greeting", paused_at="wait 2 s", started_s=100.0, pause_began_s=110.0)
     view = view_of(run, ["Pepper"], 200.0)
-    assert (view.title, view.detail) == ("Paused at “wait 2 s”", "Robots hold still; the clock stands")
-    assert (view.run_word, view.can_run, view.can_step) == ("Go on", True, True)
+    assert (view.title, view.detail) == ("Paused at “wait 2 s”", "Robots and timers are paused")
+    assert (view.run_word, view.can_run, view.can_step) == ("Resume", True, True)
     assert run.elapsed(200.0) == 10.0
 
 
@@ -77,7 +77,7 @@ def test_a_stop_after_one_that_is_not_proven_never_says_ready() -> None:
 
 def test_proven_says_how_long_it_took() -> None:
     view = view_of(after(PEPPER, TURTLE, elapsed_s=14.0, dashed=True), [], 0)
-    assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed outline shows where")
+    assert (view.title, view.detail) == ("Stopped after 14 s", "The dashed block is where it stopped")
     assert (view.result, view.result_status) == ("all 2 robots stopped (41 ms)", "ok")
     assert view.can_run
     assert view_of(after(PEPPER), [], 0).result == "Pepper stopped (41 ms)"
@@ -90,30 +90,30 @@ def test_an_answer_in_less_than_a_millisecond_is_not_zero() -> None:
 def test_not_answered_names_the_robot_and_what_a_hand_can_do() -> None:
     view = view_of(after(PEPPER, SILENT), [], 0)
     assert (view.title, view.detail) == (
-        "Turtle did not answer",
+        "Turtle did not respond",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
     )
     assert (view.result, view.result_status) == ("1 of 2 robots stopped", "error")
-    assert (view.stop_word, view.confirm) == ("Stop again", "Turtle is still")
-    assert view.compact == "Turtle did not answer; switch it off by hand"
+    assert (view.stop_word, view.confirm) == ("Stop again", "Turtle isn't moving")
+    assert view.compact == "Turtle did not respond; switch it off by hand"
     assert (view.can_run, view.can_pause, view.can_step) == (False, False, False)
 
 
 def test_what_a_robot_said_stands_first_in_its_own_words() -> None:
     stuck = RobotStop("Arm", False, 9.0, error="Arm may still move: the brake is stuck", refused=True)
     view = view_of(after(PEPPER, stuck, SILENT), [], 0)
-    assert view.title == "Arm may still move: the brake is stuck; Turtle did not answer"
+    assert view.title == "Arm may still move: the brake is stuck; Turtle did not respond"
     assert view.detail == "Pepper stopped (38 ms). Switch Arm and Turtle off by hand."
-    assert view.confirm == "Arm and Turtle are still"
+    assert view.confirm == "Arm and Turtle aren't moving"
     twin = RobotStop("Arm", False, 9.0, error=stuck.error, refused=True, program="arm 2")
-    assert view_of(after(twin), [], 0).title == "Arm may still move: the brake is stuck (says “arm 2”)"
+    assert view_of(after(twin), [], 0).title == "Arm may still move: the brake is stuck (from “arm 2”)"
     assert stop_words(stuck, "8:40") == "Arm may still move: the brake is stuck, at 8:40"
 
 
 def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
     many = [RobotStop("Pepper", False, None, program=f"copy {number}") for number in range(30)]
     title = view_of(after(*many), [], 0).title
-    assert title.endswith("Pepper (“copy 3”) and 26 more did not answer")
+    assert title.endswith("Pepper (“copy 3”) and 26 more did not respond")
     refused = [
         RobotStop(f"R{n}", False, 1.0, error=f"R{n} may still move: no", refused=True) for n in range(9)
     ]
@@ -123,19 +123,19 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
 def test_the_button_beside_the_sentence_leaves_it_room() -> None:
     long = RobotStop("The old blue robot in the entrance hall", False, None)
     view = view_of(after(PEPPER, long), [], 0)
-    assert (view.title, view.confirm) == (f"{long.name} did not answer", "It is still")
-    assert view_of(after(long, SILENT), [], 0).confirm == "They are still"
+    assert (view.title, view.confirm) == (f"{long.name} did not answer", "It isn't moving")
+    assert view_of(after(long, SILENT), [], 0).confirm == "They aren't moving"
 
 
 def test_robots_are_counted_not_the_programs_that_serve_them() -> None:
     twin = RobotStop("Pepper", False, None, program="pepper 2")
     view = view_of(after(PEPPER, twin, TURTLE), [], 0)
-    assert view.title == "Pepper (“pepper 2”) did not answer"
+    assert view.title == "Pepper (“pepper 2”) did not respond"
     assert view.result == "1 of 2 robots stopped"
     assert view.detail == "Turtle stopped (41 ms). Switch Pepper off by hand."
     ears = RobotStop("Pepper", False, None, can_confirm=False, program="nep-topic-echo")
     view = view_of(after(PEPPER, ears), [], 0)
-    assert view.result == "Pepper stopped (41 ms); Pepper (“nep-topic-echo”) cannot confirm"
+    assert view.result == "Pepper stopped (41 ms); Pepper (“nep-topic-echo”) can't confirm"
     both = RobotStop("Pepper", True, 3.0, program="pepper 2")
     assert view_of(after(PEPPER, both), [], 0).result == "Pepper stopped (41 ms)"
 
@@ -144,22 +144,22 @@ def test_a_robot_is_not_called_stopped_while_another_of_its_programs_is_waited_f
     run = RunState("stopping", "Greeting", pressed_s=10.0, asked=("Pepper",))
     run = replace(run, answered=(replace(PEPPER, waits=True),))
     view = view_of(run, [], 10.2)
-    assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "not stopped yet")
+    assert (view.detail, view.result) == ("Waiting for Pepper, 0.2 s", "Stop not confirmed")
     run = replace(run, answered=(*run.answered, RobotStop("Pepper", True, 90.0, program="pepper 2")))
     assert view_of(run, [], 10.2).result == "1 robot stopped"
 
 
 def test_a_robot_of_rize_is_never_called_stopped() -> None:
     view = view_of(after(RIZE), [], 0)
-    assert view.result == "stop sent; Nao cannot confirm"
+    assert view.result == "stop sent; Nao can't confirm"
     both = view_of(after(PEPPER, RIZE), [], 0)
-    assert both.result == "Pepper stopped (41 ms); Nao cannot confirm"
+    assert both.result == "Pepper stopped (41 ms); Nao can't confirm"
 
 
 def test_a_program_that_came_to_its_end_or_failed_says_so() -> None:
     assert view_of(after(PEPPER, finished=True, elapsed_s=3.0), [], 0).title == "Finished after 3 s"
     view = view_of(after(PEPPER, errors={"a": "“turn” needs a number."}, elapsed_s=3.0), [], 0)
-    assert (view.title, view.detail) == ("Stopped by a problem after 3 s", "“turn” needs a number.")
+    assert (view.title, view.detail) == ("Stopped after 3 s because of an error", "“turn” needs a number.")
 
 
 def test_the_last_stop_stays_beside_a_running_program() -> None:
@@ -175,9 +175,9 @@ def test_seconds(value: float, words: str) -> None:
 
 
 def test_stop_words() -> None:
-    assert stop_words(PEPPER, "8:40") == "answered in 38 ms, at 8:40"
-    assert stop_words(SILENT, "8:40") == "not answered, at 8:40"
-    assert stop_words(RIZE, "8:40") == "sent at 8:40; this robot cannot confirm"
+    assert stop_words(PEPPER, "8:40") == "confirmed in 38 ms, at 8:40"
+    assert stop_words(SILENT, "8:40") == "not confirmed, at 8:40"
+    assert stop_words(RIZE, "8:40") == "sent at 8:40; this robot can't confirm"
 
 
 @pytest.mark.parametrize(

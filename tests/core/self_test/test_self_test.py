@@ -64,7 +64,7 @@ def test_a_report_is_true_at_any_moment(tmp_path: Path) -> None:
     report.begin("window", "the window", 5.0)
     half = told(tmp_path)
     assert not half["ok"]
-    assert half["why"] == "Studio ended in the middle of the self-test; its last step was “window”."
+    assert half["why"] == "Studio ended during the self-test; its last step was “window”."
     assert half["steps"][0]["ms"] is None
     report.seen("it was painted")
     report.mark("first_paint")
@@ -84,12 +84,12 @@ def test_a_report_is_true_at_any_moment(tmp_path: Path) -> None:
 def test_the_first_sentence_is_why_it_failed(tmp_path: Path) -> None:
     report = Report(tmp_path / "report.json", {})
     report.begin("robot", "the virtual robot", 5.0)
-    report.fail("The robot is not there.")
+    report.fail("The robot does not exist.")
     report.fail("The window did not close.")
     assert not report.end()
     whole = told(tmp_path)
-    assert (whole["ok"], whole["why"]) == (False, "The robot is not there.")
-    assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot is not there.")
+    assert (whole["ok"], whole["why"]) == (False, "The robot does not exist.")
+    assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot does not exist.")
 
 
 def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -
     folder.rmdir()
     folder.write_text("a file is there now", "utf-8")
     assert not report.end()
-    assert report.why.startswith("The report can't be written (")
+    assert report.why.startswith("can't write The report (")
 
 
 def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_a_process_in_which_nothing_moves_is_ended_with_all_that_it_started(tmp_
     assert done.returncode == 1, done.stderr
     whole = told(tmp_path)
     assert not whole["ok"]
-    assert whole["why"] == "Studio did not answer in time, and was ended. It waited for: the window"
+    assert whole["why"] == "Studio did not respond in time and was stopped. It was waiting for: the window"
     assert not whole["steps"][0]["ok"]
     assert "in show" in (tmp_path / "crash.txt").read_text("utf-8")  # where it stood
     assert not psutil.pid_exists(int(done.stdout))

@@ -336,7 +336,7 @@ def test_a_typing_error_is_told_with_what_was_meant() -> None:
     sped = case.curve("/a.sped")
     assert case.curves.advice(sped) == ""
     case.send("/a", (0.0, {"speed": 1, "pose": {"x": 1}}))
-    assert case.curves.advice(sped) == "There is no /a.sped. Did you mean /a.speed?"
+    assert case.curves.advice(sped) == "/a.sped does not exist. Did you mean /a.speed?"
     assert "Choose one" in case.curves.advice(case.curve("/a.pose"))
     with pytest.raises(CurveError, match="did you mean /a"):
         case.curves.add("/aa.x")

@@ -134,8 +134,7 @@ def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     backpack.look()
     assert backpack.items == ()
     assert backpack.take_trouble() == (
-        "the backpack in “backpack.json” is of a newer NEP Studio and is left as it is; what you put in here"
-        " is kept beside it"
+        "the backpack in “backpack.json” belongs to a newer NEP Studio and is unchanged; blocks you add here are saved separately"
     )
     backpack.put([{"type": "control_wait"}])
     assert (tmp_path / "backpack.json").read_bytes() == before
@@ -164,7 +163,7 @@ def test_a_behaviour_of_a_newer_studio_is_told_in_one_sentence_and_not_touched(t
     with pytest.raises(DocumentError) as raised:
         read_file(path)
     assert str(raised.value) == (
-        "Mine.nepb was made by a newer NEP Studio (version 2) and is left as it is; update this one"
+        "Mine.nepb was saved by a newer NEP Studio (version 2) and is unchanged; update this one"
     )
     assert path.read_bytes() == before
 

@@ -49,7 +49,7 @@ def test_of_a_damaged_file_the_rest_is_used_and_a_copy_kept(path: Path) -> None:
     path.write_bytes(b"a1b")
     found = read(path)
     assert found.value == ["a", "b"]
-    assert found.problem == "The file is kept as “words.damaged.json”: there are figures in it."
+    assert found.problem == "The file was saved as “words.damaged.json”: there are figures in it."
     assert (path.read_bytes(), beside(path).read_bytes()) == (b"a1b", b"a1b")
 
 
@@ -74,5 +74,5 @@ def test_a_newer_file_is_left_as_it_is(path: Path) -> None:
     path.write_bytes(b"9")
     found = read(path)
     assert (found.value, found.is_newer) == (None, True)
-    assert found.problem.startswith("The file is left as it is, and what you change is not kept: it is of")
+    assert found.problem.startswith("File: left as it is, and what you change is not kept: it is of")
     assert (path.read_bytes(), beside(path).exists()) == (b"9", False)

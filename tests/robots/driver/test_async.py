@@ -151,9 +151,9 @@ def test_a_cancel_a_time_limit_and_a_stop_end_it(drone):
     ("raised", "state", "error"),
     [
         (Failed("no wind"), "failed", "no wind"),
-        (ValueError("odd"), "failed", "crash broke off: odd"),
-        (SystemExit(3), "failed", "crash broke off: 3"),
-        (KeyboardInterrupt(), "failed", "crash broke off: KeyboardInterrupt"),
+        (ValueError("odd"), "failed", "crash failed: odd"),
+        (SystemExit(3), "failed", "crash failed: 3"),
+        (KeyboardInterrupt(), "failed", "crash failed: KeyboardInterrupt"),
         (asyncio.CancelledError(), "canceled", None),
         (None, "succeeded", None),
     ],
@@ -184,7 +184,7 @@ def test_one_that_does_not_listen_is_named_until_it_ends(drone):
     ears.command(id="s", op="stop")
     eventually(lambda: "told" in body.events and "stopped" in body.events)
     clock.advance(STOP_ANSWER_S + 0.01)
-    assert ears.final("s", "stop")["error"] == "Drone may still move: stubborn has not ended"
+    assert ears.final("s", "stop")["error"] == "Drone may still move: stubborn is still running"
     body.let_go.set()
     eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])
 

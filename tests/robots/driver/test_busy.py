@@ -31,7 +31,7 @@ def test_replace_ends_the_other_and_both_say_so(turtle) -> None:
     ears.invoke("2", "move", distance=0.5)
     assert first_answer(ears, "2")["replaces"] == ["move"]
     ended = ears.final("1")
-    assert (ended["state"], ended["error"]) == ("canceled", "move took its place")
+    assert (ended["state"], ended["error"]) == ("canceled", "replaced by move")
     body.go_on.set()
     assert ears.final("2")["output"] == {"moved": 0.5}
     assert body.done == [("move", 0.5)]
@@ -44,7 +44,7 @@ def test_replace_also_clears_what_waits(turtle) -> None:
     ears.invoke("2", "ignore")
     ears.invoke("3", "move", distance=1)
     assert first_answer(ears, "2")["waits_for"] == ["ignore"]
-    assert ears.final("2") == {**ears.final("2"), "state": "canceled", "error": "move took its place"}
+    assert ears.final("2") == {**ears.final("2"), "state": "canceled", "error": "replaced by move"}
     assert ears.states("2") == ["accepted", "canceled"]  # it never ran
     body.go_on.set()
     assert ears.final("3")["state"] == "succeeded"
@@ -152,5 +152,5 @@ def test_a_program_whose_action_runs_must_not(turtle) -> None:
     eventually(lambda: body.moving)
     clock.advance(1.1)
     ended = ears.final("1")
-    assert (ended["state"], ended["error"]) == ("canceled", "no sign of life from its program for 1 s")
+    assert (ended["state"], ended["error"]) == ("canceled", "its program has been silent for 1 s")
     eventually(lambda: body.stops >= 1)

@@ -326,7 +326,7 @@ def test_a_cancel_that_finds_nothing_says_so(bench) -> None:
     wanted = bench.new_id()
     bench.ears.command(id=wanted, op="cancel")
     answer = bench.ears.final(wanted, "cancel")
-    assert (answer["state"], answer["error"]) == ("failed", "nothing with this id runs")
+    assert (answer["state"], answer["error"]) == ("failed", "no running task has this id")
 
 
 def test_what_takes_too_long_fails_with_its_limit(shared) -> None:

@@ -50,7 +50,7 @@ def test_bad_input_never_reaches_the_function(turtle):
     ears.invoke("2", "mov")
     assert ears.final("2")["error"] == "Turtle can't “mov”; did you mean “move”?"
     ears.command(id="3", op="dance")
-    assert ears.final("3", "dance")["error"].startswith("there is no “dance”")
+    assert ears.final("3", "dance")["error"].startswith("unknown name “dance”")
     ears.command(id="4", op="invoke", action="say", input="text")
     assert ears.final("4")["error"] == "say: the input must be an object with named values"
     assert body.done == []
@@ -73,10 +73,10 @@ def test_a_function_that_fails_is_answered_with_its_sentence(turtle, caplog):
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", "no fuel")
     body.breaks = ValueError("no file 'a\udcff'")
     ears.invoke("3", "fail", how="broken")
-    assert ears.final("3")["error"] == r"fail broke off: no file 'a\udcff'"
+    assert ears.final("3")["error"] == "fail failed: no file 'a\\udcff'"
     body.breaks = ZeroDivisionError()
     ears.invoke("2", "fail", how="broken")
-    assert ears.final("2")["error"] == "fail broke off: ZeroDivisionError"
+    assert ears.final("2")["error"] == "fail failed: ZeroDivisionError"
 
 
 def test_cancel_ends_what_runs_and_what_waits(turtle):
@@ -89,7 +89,7 @@ def test_cancel_ends_what_runs_and_what_waits(turtle):
     ears.command(id="1", op="cancel")
     assert ears.final("1")["state"] == "canceled"
     ears.command(id="9", op="cancel")
-    assert ears.final("9", "cancel")["error"] == "nothing with this id runs"
+    assert ears.final("9", "cancel")["error"] == "no running task has this id"
     assert body.done == []
 
 
@@ -125,7 +125,7 @@ def test_queue_replace_and_reject(turtle):
     assert ears.final("4")["error"] == "dig: Turtle is busy with move"
     ears.invoke("5", "move", distance=1)
     replaced = ears.final("3")
-    assert (replaced["state"], replaced["error"]) == ("canceled", "move took its place")
+    assert (replaced["state"], replaced["error"]) == ("canceled", "replaced by move")
     eventually(lambda: "running" in ears.states("5"))
     body.go_on.set()
     assert ears.final("2")["state"] == "succeeded"
@@ -190,7 +190,7 @@ def test_a_stop_that_does_not_work_is_said(turtle):
     ears.command(id="s", op="stop")
     eventually(lambda: body.stops >= 1)
     clock.advance(STOP_ANSWER_S + 0.01)
-    still = "Turtle may still move: ignore has not ended"
+    still = "Turtle may still move: ignore is still running"
     assert ears.final("s", "stop")["error"] == still
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", still)
     ears.invoke("2", "light")  # uses nothing that is in use, and is refused all the same
@@ -238,10 +238,10 @@ def test_a_function_that_ends_the_program_is_answered_and_can_be_stopped(turtle,
     body.breaks = how
     ears.invoke("1", "fail", how="broken")
     answer = ears.final("1")
-    assert (answer["state"], str(answer["error"]).startswith("fail broke off: ")) == ("failed", True)
+    assert (answer["state"], str(answer["error"]).startswith("fail failed: ")) == ("failed", True)
     body.stop_fails = how
     ears.command(id="s", op="stop")
-    assert str(ears.final("s", "stop")["error"]).startswith("Turtle may still move: its stop broke off: ")
+    assert str(ears.final("s", "stop")["error"]).startswith("Turtle may still move: its stop failed: ")
     body.stop_fails = None
     ears.command(id="t", op="stop")
     assert ears.final("t", "stop")["state"] == "succeeded"
@@ -252,7 +252,7 @@ def test_a_stop_that_hangs_is_said_each_time_and_nothing_is_accepted(turtle):
     body.may_stop.clear()
     ears.command(id="s", op="stop")
     eventually(lambda: clock.advance(0.1) or ears.states("s"))
-    said = "Turtle may still move: the stop itself has not ended"
+    said = "Turtle may still move: the stop itself is still running"
     assert ears.final("s", "stop")["error"] == said
     ears.invoke("1", "light")
     assert ears.final("1")["error"] == f"light: {said}"
@@ -313,7 +313,7 @@ def test_a_program_that_falls_silent_stops_the_robot(turtle):
         ears.final(f"d{number}")
     assert body.stops == 0
     clock.advance(1.1)
-    assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
+    assert ears.final("1")["error"] == "its program has been silent for 1 s"
     eventually(lambda: body.stops >= 1)
     assert not body.moving
 
@@ -353,7 +353,7 @@ def test_a_stop_of_the_watchdog_that_hangs_is_told(turtle):
     ears.invoke("1", "move", program="p")
     eventually(lambda: body.moving)
     clock.advance(1.1)
-    still = (["the stop itself"], "Turtle may still move: the stop itself has not ended")
+    still = (["the stop itself"], "Turtle may still move: the stop itself is still running")
     eventually(lambda: clock.advance(0.1) or told_of_itself(ears) == still)
     body.may_stop.set()
     eventually(lambda: told_of_itself(ears) == ([], None))
@@ -386,7 +386,7 @@ def test_a_forged_sign_of_life_keeps_no_robot_going(turtle, node):
         attacker.publish({"op": "alive", "id": f"a{number}", "from": "p"})
         attacker.publish({"op": "invoke", "id": f"i{number}", "action": "fail", "input": {}, "from": "p"})
         ears.final(f"i{number}")  # the forged sign before it was taken
-    assert ears.final("1")["error"] == "no sign of life from its program for 1 s"
+    assert ears.final("1")["error"] == "its program has been silent for 1 s"
     eventually(lambda: body.stops >= 1)
     assert not body.moving
 
@@ -412,7 +412,7 @@ def test_only_who_asked_can_cancel_and_anybody_can_stop(turtle, node):
     eventually(lambda: body.moving)
     attacker.publish({"op": "cancel", "id": "1", "action": "move", "from": "p"})
     refused = ears.final("1", "cancel")
-    assert refused["error"] == "only who asked for “move” can cancel it; a stop is for everybody"
+    assert refused["error"] == "only the program that started “move” can cancel it; anyone can stop"
     assert body.moving
     attacker.publish({"op": "stop", "id": "s"})
     assert ears.final("s", "stop")["state"] == "succeeded"
@@ -459,7 +459,7 @@ def test_closing_stops_the_robot_and_answers_everything(node, clock):
         eventually(lambda: body.moving)
         driver.close()
         driver.close()
-        assert ears.final("1")["error"] == "the driver ends"
+        assert ears.final("1")["error"] == "the driver is ending"
         assert (body.moving, body.stops >= 1, body.is_closed) == (False, True, True)
         eventually(lambda: not other.graph().topics["/Turtle/answer"].publishers)
 

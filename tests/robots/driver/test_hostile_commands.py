@@ -82,7 +82,7 @@ def test_one_rize_message_does_not_disable_the_robots_it_names(node, clock):
 def test_command_of_more_than_64_kb_is_rejected_with_a_sentence(turtle, caplog):
     body, ears, _clock = turtle
     ears.invoke("1", "say", text="a" * MAX_COMMAND_BYTES)
-    assert ears.final("1")["error"] == "the message has 64 kB; at most 64 kB are read"
+    assert ears.final("1")["error"] == "the message has 64 kB; the limit is 64 kB"
     ears.rize({"node": "action", "robots": "Turtle", "primitives": [], "pad": "x" * MAX_COMMAND_BYTES})
     assert stops(ears, "s")
     assert len([record for record in caplog.records if "rejected" in record.getMessage()]) == 1
@@ -96,7 +96,7 @@ def test_unknown_names_are_checked_in_bounded_time():
     problems = problems_of(parameters, given)
     assert len(problems) < 10
     assert problems[-1].sentence == "19995 more names are unknown"
-    assert problems_of(parameters, {"txt": "hi"})[0].sentence == "there is no “txt”; did you mean “text”?"
+    assert problems_of(parameters, {"txt": "hi"})[0].sentence == "unknown name “txt”; did you mean “text”?"
 
 
 @pytest.fixture

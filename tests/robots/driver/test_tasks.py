@@ -89,7 +89,7 @@ def test_a_queue_that_is_full_refuses_with_a_sentence(world: World) -> None:
         world.ask(f"n{number}", ("arm",))
     world.ask("last", ("arm",))
     assert world.states("last") == ["failed"]
-    assert world.answers["last"][0].error == "last: 50 other actions are waiting already"
+    assert world.answers["last"][0].error == "last: 50 other actions are already waiting"
     assert world.states("n49") == ["accepted"]
 
 
@@ -98,7 +98,7 @@ def test_what_uses_nothing_does_not_run_without_end(world: World) -> None:
         world.ask(f"n{number}", ())
     eventually(lambda: len(world.began) == 50)
     world.ask("last", ())
-    assert world.answers["last"][0].error == "last: 50 other actions run already"
+    assert world.answers["last"][0].error == "last: 50 other actions are already running"
     world.let_go["n7"].set()
     eventually(lambda: world.states("n7")[-1] == "succeeded")
     world.ask("later", ())

@@ -236,7 +236,7 @@ def test_values_go_to_python_and_back(kind, json, python):
         (Pose, {"y": 1}, "x is missing"),
         (Pose, Pose("far"), "x must be a number, not 'far'"),  # type: ignore[arg-type]
         (Pose, 7, "the value must have x, y and name, not be 7"),
-        (object, object(), "the value must be what JSON has, not object"),
+        (object, object(), "the value must be a JSON value, not object"),
     ],
 )
 def test_what_is_of_another_type_is_said(kind, value, sentence):
@@ -399,7 +399,7 @@ def test_what_a_function_returns_is_the_output(arm, asked, returned, output):
         ("look", 7, "the value must have x, y and name, not be 7"),
         ("count", "many", "count must be a whole number, not 'many'"),
         ("anything", {"a": float("inf")}, "the value must be a finite number, not inf"),
-        ("anything", {"a": ["\ud800"]}, "the value must be text of whole letters"),
+        ("anything", {"a": ["\ud800"]}, "the value must be valid Unicode text"),
     ],
 )
 def test_a_wrong_return_is_a_failure_with_a_sentence(arm, asked, returned, why):

@@ -128,7 +128,7 @@ def test_it_answers_stop_while_it_moves(pepper):
 
 def test_its_program_gone_it_stops_by_itself(pepper):
     pepper.invoke("1", "turn", program="p", angle=360, speed=20)
-    assert pepper.final("1")["error"] == "no sign of life from its program for 1 s"
+    assert pepper.final("1")["error"] == "its program has been silent for 1 s"
     eventually(lambda: not pepper.newest("state")["moving"])
 
 
@@ -208,7 +208,7 @@ def test_it_sees(pepper):
     eventually(lambda: pepper.heard["face_lost"] == [{"name": "Aiko"}])
     eventually(lambda: pepper.newest("sees_ball") == {"value": False})
     pepper.invoke("2", "look_at", target="ball")
-    assert pepper.final("2")["error"] == "look at: there is no ball in the picture"
+    assert pepper.final("2")["error"] == "look at: no ball in the picture"
 
 
 def test_it_looks_at_the_ball(pepper):

@@ -104,7 +104,7 @@ def test_a_stack_dropped_on_it_is_kept_and_stays_where_it_was(qtbot, view, them,
     view.changed.connect(lambda key, _program: edits.append(key))
     put_in(them, window, "one")
     assert window.types == [["wait", "wait"]]
-    assert window.said == ["Put 2 blocks into the backpack"]
+    assert window.said == ["Added 2 blocks to the backpack"]
     assert them.newest() == before
     assert edits == []
     them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (1)")
@@ -288,5 +288,7 @@ def test_of_blocks_and_notes_chosen_together_it_takes_the_blocks_and_says_so(
     them.drop(end)
     them.until(lambda: len(window.backpack.items) == 1, "the block is in the backpack")
     assert window.types == [["wait"]]
-    assert window.said == ["Put 1 block into the backpack. Notes stay here: it keeps blocks only."]
+    assert window.said == [
+        "Put 1 block into the backpack. Notes were left out: the backpack holds blocks only."
+    ]
     assert them.newest() == before

@@ -151,7 +151,7 @@ def test_a_double_click_folds_a_block_up_and_it_still_shows_what_happens_in_it(q
     view.highlight(["b"])
     them.wait_for(outlined("running"), ["loop"])
     looked_at(them, "folded")
-    view.set_errors({"b": "The robot does not answer."})
+    view.set_errors({"b": "The robot is not responding."})
     view.highlight([])
     them.wait_for(outlined("error"), ["loop"])
     them.wait_for("document.querySelector('.nepBubble').getBoundingClientRect().left > 250")

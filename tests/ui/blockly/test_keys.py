@@ -211,7 +211,7 @@ def test_f1_explains_the_block_that_the_keys_are_on_and_else_is_the_windows(qtbo
     press(them, Qt.Key_F1)
     them.wait_for(f"({CARD}).includes('Waits that many seconds')")
     goes_to(them, "Close the help")
-    assert "secondsa number; 2 unless you change it" in them.ask(CARD)
+    assert "secondsa number; 2 by default" in them.ask(CARD)
     press(them, Qt.Key_Escape)
     goes_to(them, "wait")
     assert them.ask(CARD) == ""

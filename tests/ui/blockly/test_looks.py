@@ -77,8 +77,8 @@ def test_thirty_highlights_a_second_are_cheap(qtbot, view, person):
 
 def test_an_error_has_its_sentence_beside_the_block(view, person):
     them = person(state=PICTURE)
-    view.set_errors({"say_touch": "Pepper does not answer."})
-    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper does not answer.")
+    view.set_errors({"say_touch": "Pepper is not responding."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper is not responding.")
     assert them.ask(outlined("error")) == ["say_touch"]
     block = them.box("[data-id=say_touch] > .blocklyPath")
     bubble = them.box(".nepBubble")
@@ -98,8 +98,8 @@ def test_a_warning_has_its_sentence_and_no_outline(view, person):
     assert 0 < bubble["left"] - block["right"] < 30
     view.highlight(["wave"])
     them.wait_for(outlined("running"), ["wave"])
-    view.set_errors({"say_touch": "Pepper does not answer."})
-    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper does not answer.")
+    view.set_errors({"say_touch": "Pepper is not responding."})
+    them.wait_for("document.querySelector('.nepBubble')?.textContent", "Pepper is not responding.")
     view.set_errors({})
     them.wait_for("document.querySelector('.nepBubble')?.textContent", "“say” was replaced by “turn”")
     view.set_warnings({})
@@ -109,11 +109,9 @@ def test_a_warning_has_its_sentence_and_no_outline(view, person):
 def test_an_error_never_comes_without_its_sentence(view, person):
     them = person(state=PICTURE)
     them.ask(
-        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') &&"
-        " seen.push(document.body.textContent.includes('Pepper does not answer.')))"
-        ".observe(document.body, {subtree: true, childList: true}); })()"
+        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') && seen.push(document.body.textContent.includes('Pepper is not responding.'))).observe(document.body, {subtree: true, childList: true}); })()"
     )
-    view.set_errors({"say_touch": "Pepper does not answer."})
+    view.set_errors({"say_touch": "Pepper is not responding."})
     them.wait_for("seen.length > 0")
     assert them.ask("seen[0]") is True
 

@@ -73,7 +73,7 @@ class Runner:
         owners: Mapping[str, str] | None = None,
     ) -> None:
         if self.state != "ready":
-            raise RunnerError("this runner has run its program; make another one")
+            raise RunnerError("this runner has already run its program; create a new one")
         self.state, self.pace_s, self.breakpoints = "running", pace_s, program.breakpoints
         self._tell("ready")
         if paused:

@@ -210,7 +210,7 @@ class Session(session_module.Session):
             *([self.source.listen(topics.world, "json")] if topics.world is not None else []),
         ]
         self.fleet.join(replace(robot, virtual=virtual), topics.description)
-        self.fleet.stopped({robot.name: ("answered in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
+        self.fleet.stopped({robot.name: ("confirmed in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
         self.take_over()
         link = self.fleet.link(robot.name)
         assert link is not None
@@ -258,7 +258,7 @@ class Session(session_module.Session):
             session.console.add(level, origin, text)
         session.alerts.put(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
-            "1 204 messages could not be read.", button="Look at the raw bytes", action="inspect:/faces",
+            "1 204 messages can't be read.", button="Look at the raw bytes", action="inspect:/faces",
         )  # fmt: skip
         return session
 

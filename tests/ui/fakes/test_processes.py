@@ -103,7 +103,7 @@ def test_one_that_ends_by_itself_says_its_last_words_once(launcher: Launcher, st
     assert started_here.made[0].poll() == 3
     for _ in range(2):
         launcher.check()
-    assert told == [LaunchFailed("Pepper", "The virtual robot Pepper has ended.", "no room left")]
+    assert told == [LaunchFailed("Pepper", "The virtual robot Pepper ended.", "no room left")]
     assert launcher.ended == {"Pepper"}
     launcher.start_virtual_robot("Pepper")
     assert (launcher.virtual_robots, launcher.ended) == (("Pepper",), frozenset())
@@ -116,8 +116,8 @@ def test_one_that_was_ended_from_outside_says_so(launcher: Launcher, started_her
     killed.wait(60)
     launcher.check()
     (failed,) = told
-    ended = "Something else on this computer ended it."
-    assert failed.detail == (ended if os.name == "posix" else "It did not say why (exit code 1).")
+    ended = "Another program on this computer stopped it."
+    assert failed.detail == (ended if os.name == "posix" else "It gave no reason (exit code 1).")
 
 
 def test_one_that_is_started_anew_is_another_process(launcher: Launcher, started_here, told) -> None:

@@ -149,7 +149,7 @@ def shown(run: Run) -> tuple[object, ...]:
 
 READY = ("ready", True, False, True, "Run", "Stop")
 RUNNING = ("running", False, True, True, "Restart", "Stop")
-PAUSED = ("paused", True, False, True, "Go on", "Stop")
+PAUSED = ("paused", True, False, True, "Resume", "Stop")
 
 
 def test_run_pause_step_go_on_and_stop(run: Run) -> None:
@@ -180,7 +180,7 @@ def test_run_pause_step_go_on_and_stop(run: Run) -> None:
     tick_until(run.session, lambda: runs.view().state == "ready")
     assert shown(run) == READY
     assert runs.view().title.startswith("Stopped after ")
-    assert runs.view().detail == "The dashed outline shows where"
+    assert runs.view().detail == "The dashed block is where it stopped"
     assert (runs.running_blocks, runs.stopped_blocks) == ((), ("c",))
 
 
@@ -310,7 +310,7 @@ def test_a_stack_is_tried_alone_and_never_beside_another_program(run: Run) -> No
     run.ends()
     tick_until(run.session, lambda: runs.view().state == "ready")
     view = runs.view()
-    assert (view.title, view.detail) == ("Tried “change by”", "It came to its end")
+    assert (view.title, view.detail) == ("Tried “change by”", "Finished")
 
 
 def test_a_variable_that_is_tried_is_what_the_run_gave_it_and_stops_nothing(run: Run) -> None:
@@ -418,7 +418,7 @@ def test_a_block_that_fails_ends_the_program_and_is_marked(run: Run) -> None:
     runs.run()
     run.fails("v")
     tick_until(run.session, lambda: runs.view().state == "ready")
-    assert runs.view().title.startswith("Stopped by a problem")
+    assert runs.view().title.startswith("Stopped because of an error")
     assert list(runs.block_errors) == ["v"]
     assert runs.view().detail == runs.block_errors["v"]
     assert not run.session.alerts.active, "it stands on its block"
@@ -432,7 +432,7 @@ def test_a_process_that_is_killed_is_told(run: Run) -> None:
     run.is_killed()
     tick_until(run.session, lambda: runs.view().state == "ready")
     (alert,) = run.session.alerts.active
-    assert (alert.id, alert.title) == ("program", "The behaviour ended by itself.")
+    assert (alert.id, alert.title) == ("program", "The behaviour ended unexpectedly.")
     assert alert.detail.startswith("The program's process was killed")
     assert runs.view().title.startswith("Stopped after ")
 

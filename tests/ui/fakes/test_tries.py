@@ -42,7 +42,7 @@ def ends(session: fakes.Session) -> None:
 def test_a_real_robot_is_asked_for_once_and_then_does_what_was_tried(session: fakes.Session) -> None:
     session.join(ROVER, virtual=False)
     assert tried(session, LIGHT) == "", "what does not move needs no answer"
-    assert tried(session, TURN) == "Let Rover move?"
+    assert tried(session, TURN) == "Allow Rover to move?"
     assert not session.runs.active
     session.fleet.permission.answer(let=True)
     ends(session)  # the answer has begun what was tried
@@ -51,10 +51,10 @@ def test_a_real_robot_is_asked_for_once_and_then_does_what_was_tried(session: fa
 
 def test_after_a_no_nothing_moves_and_the_next_try_asks_again(session: fakes.Session) -> None:
     session.join(ROVER, virtual=False)
-    assert tried(session, TURN) == "Let Rover move?"
+    assert tried(session, TURN) == "Allow Rover to move?"
     session.fleet.permission.answer(let=False)
     assert not session.runs.active
-    assert tried(session, TURN) == "Let Rover move?"
+    assert tried(session, TURN) == "Allow Rover to move?"
 
 
 def test_a_virtual_robot_is_never_asked_for(session: fakes.Session) -> None:

@@ -66,13 +66,13 @@ def test_the_time_that_is_left_is_counted_down(card) -> None:
 
 def test_too_late_is_a_sentence_below(card) -> None:
     card.show_invocation(tried("failed", error="go far took longer than 10 s"))
-    assert (card.result.text, card.error.text()) == ("not done", "Go far took longer than 10 s.")
+    assert (card.result.text, card.error.text()) == ("failed", "Go far took longer than 10 s.")
     assert card.try_button.text() == "Try"
 
 
 def test_what_was_replaced_says_by_what_and_a_plain_stop_says_no_more(card) -> None:
-    card.show_invocation(tried("canceled", error="turn took its place", elapsed_s=1.0))
-    assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "Turn took its place.")
+    card.show_invocation(tried("canceled", error="replaced by turn", elapsed_s=1.0))
+    assert (card.result.text, card.error.text()) == ("stopped after 1.0 s", "replaced by Turn.")
     assert card.error.property("role") == "textSecondary"  # that is no error
     card.show_invocation(tried("canceled", elapsed_s=1.0), may_move=True)
     assert card.result.text == "ended after 1.0 s"  # its robot is not proven to stand still

@@ -161,7 +161,7 @@ def test_the_toolbox_says_which_robots_may_move_or_do_not_answer(panel, window, 
             "may still move",
             "error",
         ),
-        ({"mute": True}, "silent", "does not answer", "warn"),
+        ({"mute": True}, "silent", "not responding", "warn"),
     ):
         for name, value in fact.items():
             monkeypatch.setattr(link, name, value)

@@ -177,12 +177,12 @@ def test_the_menu_of_a_tab_names_what_can_be_done(qtbot, tabs) -> None:
         "Duplicate",
         "Save",
         "Save as",
-        "Show the file's folder",
+        "Show in folder",
         "Close",
-        "Close the others",
+        "Close other behaviours",
     ]
     by_words = {action.text(): action for action in menu.actions()}
-    assert not by_words["Show the file's folder"].isEnabled(), "it has no file"
+    assert not by_words["Show in folder"].isEnabled(), "it has no file"
     for each in ("Duplicate", "Close"):
         by_words[each].trigger()
     menu.close()

@@ -20,7 +20,7 @@ def test_words_come_late_and_go_with_the_page(qtbot) -> None:
     now[0] += 0.02
     wait.tell(ready=False)
     assert not wait.words.isHidden()
-    assert wait.words.text() == "Getting the blocks ready."
+    assert wait.words.text() == "Loading blocks."
     assert wait.words.geometry() == place.rect()
     wait.tell(ready=True)
     assert wait.words.isHidden()

@@ -112,7 +112,7 @@ def test_with_nothing_it_says_what_will_appear(qtbot, qapp) -> None:
     panel.refresh()
     assert panel.list.isVisible()
     panel.set_level("error")
-    assert panel.empty._title.text() == "No problem was told"
+    assert panel.empty._title.text() == "No problems reported"
 
 
 def logged(window, level="info", text="hello", node="Pepper", name="app.robots.driver.tasks", **more) -> None:
@@ -121,13 +121,13 @@ def logged(window, level="info", text="hello", node="Pepper", name="app.robots.d
 
 
 def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
-    logged(window, "warning", "its stop broke off", file="tasks.py", line=272)
+    logged(window, "warning", "its stop failed", file="tasks.py", line=272)
     logged(window, "debug", "a detail")
     panel.refresh()
-    assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] its stop broke off"
+    assert lines(panel)[0] == "warn Pepper [app.robots.driver.tasks] its stop failed"
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
     said, level, place = tip_of(record).split("\n")
-    assert (said, place) == ("its stop broke off", "app.robots.driver.tasks  tasks.py:272")
+    assert (said, place) == ("its stop failed", "app.robots.driver.tasks  tasks.py:272")
     assert level.endswith(" warn  Pepper")
     panel.set_level("debug")
     assert lines(panel)[0].startswith("debug Pepper")
@@ -135,7 +135,7 @@ def test_records_of_programs_stand_among_the_lines(panel, window) -> None:
 
 @pytest.mark.parametrize(("percent", "width"), [(100, 446), (200, 446), (200, 700), (200, 1200)])
 def test_large_text_leaves_the_message_its_place(panel, window, percent: int, width: int) -> None:
-    logged(window, "warning", "its stop broke off")
+    logged(window, "warning", "its stop failed")
     panel.refresh()
     record = panel.model.index(0, 0).data(Qt.ItemDataRole.UserRole)
     window.theme.set_text_percent(percent)
@@ -164,7 +164,7 @@ def test_lines_of_one_node_and_with_some_words(qtbot, panel, window) -> None:
     logged(window, text="walks 2 m", node="Turtle")
     panel.set_node("Turtle")
     assert lines(panel) == ["info Turtle [app.robots.driver.tasks] walks 2 m"]
-    assert panel.filter.accessibleName() == "Shown: Everything of Turtle"
+    assert panel.filter.accessibleName() == "Showing: Everything of Turtle"
     panel.set_node("")
     panel.focus_filter()
     qtbot.keyClicks(panel.words, "PEPPER walks")

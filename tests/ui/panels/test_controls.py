@@ -40,7 +40,7 @@ def theme(qapp) -> Theme:
 
 
 def form_of(qtbot, theme: Theme, *parameters: Parameter, pictures: object = None) -> ActionForm:
-    action = Action("do", "do it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
+    action = Action("do", "perform it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
     made = ActionForm(theme, action, pictures=pictures)  # type: ignore[arg-type]
     qtbot.addWidget(made)
     made.resize(560, 300)
@@ -82,7 +82,7 @@ def test_a_number_out_of_its_limits_is_what_the_form_gives_so_that_it_is_never_t
     assert slider.field.text() == "12"
     form.show_problems(form.action.problems(form.input()))
     shown = [text for text in (slider._sentence.text(), form._sentences["d"].text()) if text]
-    assert shown == ["The most is 1 m."]  # said once
+    assert shown == ["The maximum is 1 m."]  # said once
     assert slider.field.property("wrong") == "true"
 
 
@@ -125,7 +125,7 @@ def test_a_text_that_is_too_long_is_kept_and_the_sentence_stands_below_when_it_i
         Parameter("o", "other", "text"),
     )
     first, second = form.findChildren(QLineEdit)
-    assert second.placeholderText() == "May stay empty"
+    assert second.placeholderText() == "Optional"
     QTest.keyClicks(first, "too long")
     QTest.keyClick(first, Qt.Key.Key_Return)
     assert form._sentences["t"].isVisible()
@@ -363,7 +363,7 @@ def test_a_folder_and_a_pipe_are_not_opened(tmp_path) -> None:
     assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is no file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")
-        assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” is no file."
+        assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” is not a file."
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -441,7 +441,7 @@ def test_a_list_of_numbers_and_an_object_are_typed_as_such(qtbot, theme) -> None
     pose = parameter_of("pose", {"type": "object", "properties": {"x": {"type": "number"}}}, required=True)
     form = form_of(qtbot, theme, speeds, pose)
     first, second = form.findChildren(QLineEdit)
-    assert first.placeholderText() == "Numbers with commas between them"
+    assert first.placeholderText() == "Numbers separated by commas"
     assert second.placeholderText() == '{"x": …}'
     first.setText("1, 2.5")
     second.setText('{"x": 3}')

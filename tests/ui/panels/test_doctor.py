@@ -75,17 +75,17 @@ def test_while_it_looks_rows_come_as_they_are_found(qtbot, window) -> None:
     doctor.look = look
     panel._master = "none"
     look()
-    assert told == [(["master"], "Looking: 1 of 4", ""), (["disk", "master"], "Looking: 2 of 4", "1")]
+    assert told == [(["master"], "Checking: 1 of 4", ""), (["disk", "master"], "Checking: 2 of 4", "1")]
     panel.refresh()
     assert [each.id for each in panel.shown] == ["disk", "master", "loopback"]
-    assert panel.looked.text() == "3 things looked at"
+    assert panel.looked.text() == "3 checks done"
     told.clear()
     doctor.found = (FINE, ALSO_FINE)
     look()  # again: what was found stays until all was looked at
     panel.refresh()
     assert [shown for shown, _looked, _chip in told] == [["disk", "master", "loopback"]] * 2
-    assert [looked for _shown, looked, _chip in told] == ["Looking: 1 of 4", "Looking: 2 of 4"]
-    assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 things are well", "all is well")
+    assert [looked for _shown, looked, _chip in told] == ["Checking: 1 of 4", "Checking: 2 of 4"]
+    assert (panel.looked.text(), panel.chip.accessibleName()) == ("All 2 checks passed", "no problems")
 
 
 def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel, window, monkeypatch) -> None:
@@ -140,7 +140,7 @@ def test_studio_starts_the_master_and_looks_again_when_it_is_there(qtbot, panel,
     window.session.master = MasterState("searching", "127.0.0.1:7780")
     panel.refresh()
     assert [each.id for each in panel.shown] == ["master"]
-    assert panel.chip.accessibleName() == "all is well"
+    assert panel.chip.accessibleName() == "no problems"
 
 
 def test_the_report_is_copied_as_text(panel, window) -> None:
@@ -212,8 +212,8 @@ def test_the_name_that_was_meant_is_used_by_the_panel_that_asked(qtbot, panel, w
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
     panel.refresh()
     assert (asker.asked, window.session.doctor.missed) == (["/robot/depth"], "/robot/depth")
-    assert window.toasts == ["Showing /robot/depth, looking again"]
-    assert panel.chip.accessibleName() == "all is well"
+    assert window.toasts == ["Opened /robot/depth. Checking again"]
+    assert panel.chip.accessibleName() == "no problems"
 
 
 def test_without_a_panel_that_asked_the_topic_is_opened_where_it_fits(qtbot, panel, window) -> None:
@@ -229,10 +229,10 @@ def test_a_panel_that_is_paused_is_the_first_reason_and_goes_on(qtbot, panel, wi
     window.session.doctor.miss("/robot/deph")
     panel.begin_for(asker)
     assert panel.rows[0].accessibleName().startswith("error: Depth is paused")
-    assert names(panel) == ["Let it go on", "Use /robot/depth"]
+    assert names(panel) == ["Resume", "Use /robot/depth"]
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
     assert not asker.paused
-    assert window.toasts == ["Done, looking again"]
+    assert window.toasts == ["Done. Checking again"]
     panel.refresh()
     assert names(panel) == ["Use /robot/depth"]
 
@@ -254,7 +254,7 @@ def test_a_recording_that_is_open_hides_the_live_topic(qtbot, panel, window, tmp
         window.session.doctor.miss("/robot/camera")
         panel.refresh()
         said = panel.rows[0].accessibleName()
-        assert said.startswith("error: A recording is open, and /robot/camera is not in it.")
+        assert said.startswith("error: A recording is open and /robot/camera is not in it.")
         qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
         assert window.commands == ["replay.live"]
     finally:
@@ -271,7 +271,7 @@ def test_a_recording_that_is_open_hides_the_live_topic(qtbot, panel, window, tmp
             "Let other computers connect",
             "network.others",
         ),
-        (Finding("topic:unreadable", "error", "No JSON."), "Look at its bytes", "inspect:/x"),
+        (Finding("topic:unreadable", "error", "No JSON."), "Show the bytes", "inspect:/x"),
         (Finding("topic:name", "error", "No name."), "Choose a topic", "panel:topics"),
         (
             Finding("topic:silent:cam", "error", "Silent.", instead="restart"),
@@ -344,7 +344,7 @@ def test_the_console_tells_what_it_leaves_out(qtbot, window) -> None:
     assert list(made.hindrances()) == []
     made.set_level("error")
     (hindrance,) = made.hindrances()
-    assert hindrance.sentence == "Console shows only what has “Errors only”."
+    assert hindrance.sentence == "Console only shows entries with “Errors only”."
     hindrance.run()
     assert made.level == "all"
 

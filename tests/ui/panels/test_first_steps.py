@@ -167,7 +167,7 @@ def test_show_me_knows_the_block_of_the_robot_that_is_there(panel, window) -> No
 def test_a_block_that_stands_loose_is_told_where_to_go(panel, window) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
-    assert panel.rows[2].hint.text() == "It is in Speech, on the left."
+    assert panel.rows[2].hint.text() == "You'll find it under Speech, on the left."
     build(panel, block("events_started"), block(SAYS))
     assert panel.rows[2].hint.text() == "Drag it up until it snaps below “when started”."
     assert "say" not in panel.done

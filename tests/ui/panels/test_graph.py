@@ -295,8 +295,8 @@ def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, wi
     assert item.label is not None
     words = run_all(menu_at(panel, at(panel, item.label.center())))
     assert words == [
-        "Show its messages", "Show it in one more panel", "Plot a field of it", "Publish to it",
-        "New alarm", "Record this topic", "Copy its name",
+        "Show messages", "Open in another panel", "Plot a field", "Publish to this topic",
+        "New alarm", "Record topic", "Copy name",
     ]  # fmt: skip
     assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
     assert (window.opened, window.beside, window.plotted) == (
@@ -305,14 +305,14 @@ def test_a_right_click_on_a_line_offers_what_its_topic_can(panel: GraphPanel, wi
     about = ("publish.topic", "alarm.topic", "record.topic")
     assert window.commands == [f"{command}:/blackboard" for command in about]
     assert QGuiApplication.clipboard().text() == "/blackboard"
-    assert run_all(panel.menu_of(GraphChoice("topic", "remember"))) == ["Call it", "Copy its name"]
+    assert run_all(panel.menu_of(GraphChoice("topic", "remember"))) == ["Call service", "Copy name"]
     assert window.commands[-1] == "service.call:remember"
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 def test_the_menu_key_opens_the_menu_of_the_chosen_node(panel: GraphPanel, window: Window) -> None:
     panel.canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
-    assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy its name"]
+    assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy name"]
     assert window.commands == ["alarm.node:pepper_driver"]
 
 
@@ -570,7 +570,7 @@ def test_svg_and_dot_are_written(panel: GraphPanel, window: Window, tmp_path: Pa
     assert 'label="/blackboard 10/s"' in dot
     assert dot.count("subgraph cluster_") == 2
     panel.save(tmp_path / "graph.svg" / "graph.svg", SVG)
-    assert window.toasts[-1].startswith("The graph can't be saved: ")
+    assert window.toasts[-1].startswith("Can't save the graph: ")
 
 
 def test_the_export_menu_asks_for_a_file(panel: GraphPanel, window: Window, tmp_path: Path) -> None:
@@ -579,7 +579,7 @@ def test_the_export_menu_asks_for_a_file(panel: GraphPanel, window: Window, tmp_
     actions["Graph (DOT)"].trigger()
     assert window.answers.asked == [f"Export the graph: {Path.home() / 'graph'}"]
     assert window.toasts == ["Saved mine.dot"]
-    assert set(actions) == {"Picture (SVG)", "Graph (DOT)"}
+    assert set(actions) == {"Image (SVG)", "Graph (DOT)"}
 
 
 def test_nobody_is_here_says_what_to_do(qtbot, qapp) -> None:

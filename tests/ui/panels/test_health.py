@@ -37,27 +37,27 @@ def said(panel: HealthPanel) -> dict[str, str]:
 
 def test_each_fact_is_a_row_and_nothing_is_to_be_looked_at(panel, asked) -> None:
     assert said(panel)["Battery"] == "84 %"
-    assert said(panel)["Stop"] == "answered in 41 ms, at 8:40"
+    assert said(panel)["Stop"] == "confirmed in 41 ms, at 8:40"
     assert panel.chip.text == ""
     assert not panel.step.isVisible()
     assert panel.rows[0].accessibleName() == "Connection"
     assert panel.rows[0].accessibleDescription() == panel.rows[0].words.text()
     asked.session.fleet.links[0].last_stop, asked.session.fleet.links[0].last_stop_status = (
-        "not answered, at 8:41",
+        "not confirmed, at 8:41",
         "error",
     )
     panel.refresh()
-    assert said(panel)["Stop"] == "not answered, at 8:41"
+    assert said(panel)["Stop"] == "not confirmed, at 8:41"
 
 
 def test_what_is_to_be_looked_at_is_counted_and_first(panel, asked) -> None:
     asked.session.fleet.links[0].values["battery"] = 7
     panel.refresh()
-    assert (panel.chip.text, panel.chip.status) == ("1 to look at", "warn")
+    assert (panel.chip.text, panel.chip.status) == ("1 warning", "warn")
     assert panel.rows[0].title.text() == "Battery"
     asked.session.fleet.links[0].mute = True
     panel.refresh()
-    assert (panel.chip.text, panel.chip.status) == ("2 to look at", "error")
+    assert (panel.chip.text, panel.chip.status) == ("2 warning", "error")
 
 
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])

@@ -80,18 +80,18 @@ def test_it_says_how_many_are_shown_and_their_size(view) -> None:
     assert view.words.startswith("shown 30 of 60/s  320\u00d7240  ")
     assert view.words.endswith(" ms")  # its age
     assert rate_sentence(None, None) == ""
-    assert rate_sentence(17.2, 15.0) == "shown 15 of 15/s"  # two windows of time: never more than arrive
+    assert rate_sentence(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive
 
 
 def test_a_rate_that_jumps_is_said_once_a_second() -> None:
     now, rates = [100.0], SimpleNamespace(shown_hz=15.4, arriving_hz=15.4)
     words = RateWords(lambda: now[0])
-    assert words.of(rates) == "shown 15 of 15/s"  # type: ignore[arg-type]
+    assert words.of(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
     rates.shown_hz = rates.arriving_hz = 15.6
     now[0] += 0.9
-    assert words.of(rates) == "shown 15 of 15/s"  # type: ignore[arg-type]
+    assert words.of(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
     now[0] += 0.2
-    assert words.of(rates) == "shown 16 of 16/s"  # type: ignore[arg-type]
+    assert words.of(rates) == "16 fps (16 shown)"  # type: ignore[arg-type]
     rates.arriving_hz = None
     assert words.of(rates) == ""  # type: ignore[arg-type]
 
@@ -121,7 +121,7 @@ def test_a_silent_stream_is_grey_and_says_how_old_its_picture_is(view) -> None:
     view.take(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
     view.take(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
-    assert view.words == "Last picture, 4 s old"
+    assert view.words == "Last image 4 s ago"
     assert view.grab().toImage().pixelColor(20, 80) != before
 
 
@@ -187,7 +187,7 @@ def test_beside_the_cameras_picture_there_is_no_black(camera_view) -> None:
 def test_the_cameras_last_picture_has_no_colours_and_says_so_in_its_middle(camera_view) -> None:
     shown = picture(320, 240)
     camera_view.take(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
-    assert camera_view.words.startswith("Last picture, 4 s old")
+    assert camera_view.words.startswith("Last image 4 s ago")
     image = camera_view.grab().toImage()
     found = [image.pixelColor(x, y) for x in range(0, 400, 3) for y in range(0, 160, 3)]
     assert all(max(one.red(), one.green(), one.blue()) - min(one.red(), one.green(), one.blue()) < 3
@@ -261,7 +261,7 @@ def test_without_pictures_it_says_what_will_appear(qtbot, qapp) -> None:
     assert panel.empty.isVisible()
     window.session.put(Topic("/cam", "image", "image"))
     panel.refresh()
-    assert panel.empty._text.text() == "The next picture on /cam appears here."
+    assert panel.empty._text.text() == "The next image on /cam appears here."
     window.session.images.streams[0].error = "'/cam' does not send pictures"
     panel.refresh()
     assert panel.empty._text.text() == "'/cam' does not send pictures."
@@ -279,13 +279,13 @@ def test_the_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> 
     link.values["faces"] = FACES
     panel.refresh()
     assert panel.subtitle() == "/Pepper/camera"
-    assert panel.rate.text() == "shown 15 of 15/s"
+    assert panel.rate.text() == "15 fps (15 shown)"
     assert len(panel.view.boxes) == 1
     link.connected = False
     window.session.fleet.revision += 1
     window.session.clock.now += 4.0
     panel.refresh()
-    assert panel.view.words == "Last picture, 4 s old"  # the last picture stays, grey
+    assert panel.view.words == "Last image 4 s ago"  # the last picture stays, grey
     assert panel.rate.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.shut()
@@ -390,7 +390,7 @@ def test_as_many_pixels_are_wanted_as_are_shown_and_all_of_them_under_the_mouse(
 def test_the_sequence_is_recorded_and_of_a_recording_saved_as_files(qtbot, qapp, tmp_path) -> None:
     window = Window(Session.full())
     panel = made(qtbot, window)
-    (action,) = [each for each in panel.more_actions() if each.text() == "Record the sequence"]
+    (action,) = [each for each in panel.more_actions() if each.text() == "Record a sequence"]
     action.trigger()
     assert window.commands == [f"record.topic:{panel._topic}"]
     path = tmp_path / "Tour.mcap"
@@ -433,7 +433,7 @@ def test_every_action_has_a_key_that_works_while_the_picture_has_the_keyboard(qt
     assert panel.freeze.isChecked()
     assert window.session.images.streams[0].held
     words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
-    assert words == [*(row.words for row in ROWS), "Record the sequence", "Show in the inspector"]
+    assert words == [*(row.words for row in ROWS), "Record a sequence", "Open in the Inspector"]
 
 
 def test_the_windows_shortcuts_wait_while_the_picture_has_the_keyboard(qtbot, qapp) -> None:
@@ -555,7 +555,7 @@ def test_what_is_no_picture_offers_to_look_at_the_message(qtbot, qapp) -> None:
     panel = made(qtbot, window)
     window.session.images.streams[0].error = "they are no picture"
     panel.refresh()
-    assert panel.empty._title.text() == "This can't be shown as a picture"
+    assert panel.empty._title.text() == "Can't be shown as an image"
     next(each for each in panel.empty._buttons).click()
     assert window.commands == ["inspect:/cam"]
     assert panel.fit.isHidden()

@@ -86,7 +86,7 @@ def test_it_says_what_to_arm_and_one_click_is_one_message(qtbot, window, panel) 
     assert points.isVisible()
     assert panel.actions_of["point"].isChecked()
     assert points.target == Target("topic", POINTS)
-    assert points.strip.words.text() == "A click sends nothing until this is armed"
+    assert points.strip.words.text() == "Clicks send nothing until armed"
     assert unsaid(panel) == []
     QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, 16, 8))
     press(points.close_button)

@@ -96,7 +96,7 @@ def test_a_latched_message_from_before_says_when_it_was_sent(panel, window) -> N
         (3_200_000, ClockDifference(10**12, 900), "latency 3.2 ms ± 0.1 ms"),
         (3_200_000, SAME_CLOCK, "latency 3.2 ms"),
         (3_200_000, None, "latency 3.2 ms"),
-        (-3_600_000_000_000, None, "clocks of two computers, not corrected"),
+        (-3_600_000_000_000, None, "clocks of two computers, uncorrected"),
         (-3_600_000_000_000, ClockDifference(10**12, 400_000), "412 B"),
     ],
 )
@@ -216,7 +216,7 @@ def test_what_cannot_be_decoded_is_shown_as_bytes_with_a_sentence(panel, window)
     assert panel.body.page == RAW
     assert panel.mode.value == "raw"
     assert panel.body.sentence.isVisible()
-    assert panel.body.sentence.text().startswith("This can't be read as json: ")
+    assert panel.body.sentence.text().startswith("Can't be decoded as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     window.session.send("/faces", {"good": 1})
     panel.refresh()
@@ -261,7 +261,7 @@ def test_a_bad_message_that_is_held_is_shown_as_bytes_in_both_ways(panel, window
     ticks(window, panel)
     press(button(panel.mode, "Tree"))
     assert panel.body.page == RAW
-    assert panel.body.sentence.text().startswith("This can't be read as json: ")
+    assert panel.body.sentence.text().startswith("Can't be decoded as json: ")
     assert "6e 6f 74" in panel.bytes.text()
     panel.freeze.setChecked(False)
     assert panel.model.value() == {"good": 1}
@@ -289,7 +289,7 @@ def test_a_large_json_message_is_read_elsewhere_and_shown_when_it_is_there(qtbot
     assert message.size_bytes > LARGE_BYTES
     panel.refresh()
     assert panel.body.page == LARGE
-    assert panel.body.large._text.text() == "It is being read."
+    assert panel.body.large._text.text() == "Reading the message."
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
     assert panel.model.rowCount() == 2
     rows_index = panel.model.index(0, 0)
@@ -330,7 +330,7 @@ def test_no_large_message_is_ever_decoded_in_the_windows_thread(qtbot, panel, wi
     )
     panel.show_topic("/speech/words")
     panel.refresh()
-    press(button(panel.body.large, "Read the newest one"))
+    press(button(panel.body.large, "Decode the newest"))
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
     assert threads["looked into"]
     assert threads["decoded"]
@@ -348,8 +348,8 @@ def test_other_large_messages_are_read_only_when_asked_for(qtbot, panel, window)
     panel.show_topic("/speech/words")
     panel.refresh()
     assert panel.body.page == LARGE
-    assert panel.body.large._title.text() == "A message of 1.2 MB"
-    press(button(panel.body.large, "Read the newest one"))
+    assert panel.body.large._title.text() == "Message of 1.2 MB"
+    press(button(panel.body.large, "Decode the newest"))
     assert panel.frozen  # the next large one would hide it again
     topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
     qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])
@@ -360,7 +360,7 @@ def test_a_large_text_that_is_no_json_is_shown_as_bytes(qtbot, panel, window) ->
     panel.show_topic("/blackboard")
     window.session.send("/blackboard", b"[" * 1_100_000)
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == RAW)[1])
-    assert panel.body.sentence.text() == "This can't be read as json: its brackets do not match."
+    assert panel.body.sentence.text() == "Can't be decoded as json: its brackets do not match."
 
 
 def test_pictures_are_summed_up_not_listed() -> None:
@@ -471,14 +471,14 @@ def test_the_message_before_is_compared_and_only_changes_can_be_shown(panel, win
     panel.refresh()
     panel.compare.setChecked(True)
     assert panel.strip.isVisible()
-    assert panel.strip.words.text() == "Message before: 1 changed, 1 added, 1 removed"
+    assert panel.strip.words.text() == "Previous message: 1 changed, 1 added, 1 removed"
     marks = {node.key: node.mark for node in top(panel)}
     assert marks == {"same": "", "n": "changed", "new": "added", "gone": "removed"}
     panel.strip.only.setChecked(True)
     assert [node.key for node in top(panel)] == ["n", "new", "gone"]
     window.session.send("/blackboard", {"same": 1, "n": 2, "new": {"x": 1}})
     panel.refresh()
-    assert panel.strip.words.text() == "Message before: no difference"
+    assert panel.strip.words.text() == "Previous message: no difference"
     assert top(panel) == []
     panel.compare.setChecked(False)
     assert panel.strip.isHidden()
@@ -554,7 +554,7 @@ def test_a_topic_that_nobody_publishes_says_so_while_it_waits(panel, window) -> 
     assert panel.body.empty._text.text() == "The next message on /odom appears here."
     window.session.topics["/odom"].publishers = 0
     panel.refresh()
-    assert panel.body.empty._text.text().startswith("Nobody publishes it now.")
+    assert panel.body.empty._text.text().startswith("No publisher now.")
 
 
 def test_its_ctrl_f_goes_before_the_window_s(qtbot, panel, window) -> None:
@@ -626,5 +626,5 @@ def test_a_value_is_plotted_by_its_menu_its_key_the_foot_and_by_dragging_it(
         assert dragged[-1] == ("/blackboard", said)
     choose(panel, "robots", "Pepper", "pose")
     panel.own.plot()
-    assert window.toasts[-1] == "robots.Pepper.pose is no number, text or yes or no"
+    assert window.toasts[-1] == "robots.Pepper.pose is not a number, text or boolean"
     assert len(plotted) == 8

@@ -93,7 +93,7 @@ def test_what_begins_with_a_dollar_is_a_query_and_the_tree_shows_what_it_finds(p
 def test_a_wrong_query_is_a_sentence_and_the_next_letters_may_mend_it(panel, window, soon) -> None:
     send(window, panel, seen(7))
     panel.finder.field.setText("$.people[")
-    assert panel.query.words.text().startswith("the query does not end well: ")
+    assert panel.query.words.text().startswith("the query is incomplete: ")
     assert panel.query.isVisible()
     assert panel.finder.field.property("wrong") == "true"
     assert rows(panel) == []
@@ -234,9 +234,9 @@ def test_the_one_before_is_compared_with_the_one_before_it(panel, window) -> Non
     for number in (0, 0, 5):
         send(window, panel, seen(number, stamp=number))
     panel.compare.setChecked(True)
-    assert panel.strip.words.text() == "Message before: 2 changed"
+    assert panel.strip.words.text() == "Previous message: 2 changed"
     press(panel.history.back)
-    assert panel.strip.words.text() == "Message before: no difference"
+    assert panel.strip.words.text() == "Previous message: no difference"
 
 
 def test_another_topic_has_a_history_of_its_own_and_who_is_not_seen_keeps_nothing(panel, window) -> None:

@@ -112,7 +112,7 @@ def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
     assert cells(panel, "/blackboard")["network"] == "NEP"
     theirs = cells(panel, "ros /blackboard")
     assert (theirs["topic"], theirs["network"], theirs["type"]) == ("/blackboard", "ROS 1", "String")
-    assert (theirs["rate"], theirs["bandwidth"], theirs["loss"]) == ("", "", "not known on ROS 1")
+    assert (theirs["rate"], theirs["bandwidth"], theirs["loss"]) == ("", "", "unknown on ROS 1")
     told = tips(panel, "ros /blackboard")
     assert "nobody tells it" in told["rate"]
     assert "not counted" in told["loss"]
@@ -178,7 +178,12 @@ def test_nodes_of_ros_say_where_they_are_and_what_nobody_tells(qtbot, window: Wi
     ros.tell(GraphSeen(ros_graph(), 0.0))
     ticks(window, panel, 2)
     arm = cells(panel, "ros /arm  ")
-    assert (arm["node"], arm["generation"], arm["cpu"], arm["publishes"]) == ("arm", "ROS 1", "not told", "2")
+    assert (arm["node"], arm["generation"], arm["cpu"], arm["publishes"]) == (
+        "arm",
+        "ROS 1",
+        "not reported",
+        "2",
+    )
     assert "nobody tells there" in tips(panel, "ros /arm  ")["cpu"]
     panel.table.opened.emit("ros /arm  ")
     topic = next(row for row in panel.model._rows.shown if row.topic == "/camera")
@@ -202,7 +207,7 @@ def test_the_inspector_shows_messages_of_another_network(qtbot, window: Window, 
         sink("ros /blackboard", [message("/blackboard", b'{"x": 7}')])
     ticks(window, panel, 5)
     assert panel.model.value() == {"x": 7}
-    assert panel._facts_of[1] == "8 B   ROS 1 tells no seq and no latency"
+    assert panel._facts_of[1] == "8 B   ROS 1 does not report sequence numbers or latency"
     ros.tell(MasterLost("", REASON))
     ticks(window, panel, 2)
     assert panel.live.accessibleName() == "no answer"
@@ -225,7 +230,7 @@ def test_the_inspector_says_why_a_topic_can_not_be_read(qtbot, window: Window, l
     ros.tell(WatchFailed("/blackboard", "no type 'my/Own' is known here; install its package"))
     ticks(window, panel, 2)
     said = [each.text() for each in panel.body.empty.findChildren(QLabel) if each.text()]
-    assert said[0] == "It can't be read here"
+    assert said[0] == "Can't be decoded here"
     assert said[1] == "/blackboard on ROS 2: no type 'my/Own' is known here; install its package."
     panel.shut()
 

@@ -29,7 +29,7 @@ def test_a_panel_says_that_the_robot_is_coming(qapp, panel) -> None:
     before = words()
     assert "No robot" in before
     session.launcher.start_virtual_robot()
-    assert "Pepper is coming" in words()
+    assert "Pepper is starting" in words()
     assert "No robot" not in words()
     session.launcher.stop_virtual_robot("Pepper")
     assert words() == before, "it is not wanted any more"
@@ -49,7 +49,9 @@ def test_the_camera_offers_no_robot_that_is_already_coming(qtbot) -> None:
     before = words()
     assert "Use the virtual robot" in before
     session.launcher.start_virtual_robot()
-    qtbot.waitUntil(lambda: words() == ["Pepper is coming", "A virtual robot takes some seconds to start."])
+    qtbot.waitUntil(
+        lambda: words() == ["Pepper is starting", "A virtual robot takes a few seconds to start."]
+    )
     session.launcher.stop_virtual_robot("Pepper")
     qtbot.waitUntil(lambda: words() == before)
     made.shut()
@@ -64,7 +66,7 @@ def test_the_bars_say_that_the_robot_is_coming() -> None:
     session.launcher.start_virtual_robot()
     session.tick()
     said = (robots_chip(session)[0], facts.health()[1], session.runs.view().detail)
-    assert said == ("Pepper is coming",) * 3
+    assert said == ("Pepper is starting",) * 3
 
 
 def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> None:
@@ -73,7 +75,7 @@ def test_a_toast_goes_once_what_it_says_has_happened(qtbot, theme: Theme) -> Non
     window.resize(600, 300)
     window.show()
     toast, came = Toast(theme, window), list[bool]()
-    toast.say("The virtual Turtle is coming", until=lambda: bool(came))
+    toast.say("Starting the virtual Turtle", until=lambda: bool(came))
     toast.refresh()
     assert toast.isVisible()
     came.append(True)

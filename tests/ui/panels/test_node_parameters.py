@@ -112,7 +112,7 @@ def test_they_are_shown_with_what_they_may_be(world: World) -> None:
     assert world.cells()[4][1].endswith("x… (5000 characters)")
     assert len(world.cells()[4][1]) < 250
     assert world.window.session.watched == [place_of(world.robot.id)]
-    assert world.part.sentence.text() == "Choose a parameter to give it another value."
+    assert world.part.sentence.text() == "Choose a parameter to change its value."
 
 
 def test_a_value_is_set_with_return_and_what_was_typed_stays_when_it_is_refused(qtbot, world: World) -> None:
@@ -186,7 +186,7 @@ def test_what_can_not_be_set_says_why(world: World) -> None:
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
     part.table.choose("speed")
-    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node has gone.")
+    assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node disconnected.")
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
 
@@ -194,7 +194,7 @@ def test_a_node_without_any_says_so_and_what_to_do(world: World) -> None:
     world.choose("bare")
     assert not world.part.isVisibleTo(world.panel)
     assert (
-        "It has no parameters: a program declares them with node.parameters.declare."
+        "This node has no parameters. Programs declare them with node.parameters.declare."
         in world.panel.foot.text()
     )
     assert world.window.session.watched == []
@@ -215,8 +215,8 @@ def test_a_panel_that_nobody_sees_hears_nothing(world: World) -> None:
     ("parameter", "words"),
     [
         (ShownParameter("a", 1, "int"), ""),
-        (ShownParameter("a", 1, "int", minimum=0), "0 and more"),
-        (ShownParameter("a", 1, "float", maximum=0.5), "0.5 and less"),
+        (ShownParameter("a", 1, "int", minimum=0), "0 or more"),
+        (ShownParameter("a", 1, "float", maximum=0.5), "0.5 or less"),
         (ShownParameter("a", 1, "int", choices=tuple(range(9))), "0, 1, 2, 3, 4, 5 …"),
         (ShownParameter("a", 1, "int", minimum=0, read_only=True), "read only"),
     ],

@@ -81,7 +81,7 @@ def test_every_node_with_its_facts(panel) -> None:
     here = platform.node()
     assert shown(panel) == [
         ["camera_driver", "native", "Python", "lab-pc", "411", "12 %", "2", "0"],
-        ["rize", "NEP to 0.5.4.5", "JavaScript", here, "512", "130 %", "1", "0"],
+        ["rize", "NEP up to 0.5.4.5", "JavaScript", here, "512", "130 %", "1", "0"],
         ["studio", "native", "Python", here, "600", "0.4 %", "0", "1"],
     ]
 
@@ -169,7 +169,11 @@ def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) ->
 
 @pytest.mark.parametrize(
     ("generation", "words", "version"),
-    [("A", "NEP to 0.5.4.5", " up to 0.5.4.5:"), ("B", "NEP 0.5.4.8", " 0.5.4.8:"), ("C", "NEP C", "NEP:")],
+    [
+        ("A", "NEP up to 0.5.4.5", " up to 0.5.4.5:"),
+        ("B", "NEP 0.5.4.8", " 0.5.4.8:"),
+        ("C", "NEP C", "NEP:"),
+    ],
 )
 def test_generations_have_words(generation, words, version) -> None:
     node = NodeEntry("1", "old", generation=generation)
@@ -267,9 +271,9 @@ def test_a_subscription_with_wildcards_stands_with_its_node_and_is_no_topic(pane
     ticks(window, panel, 2)
     panel.table.opened.emit("3  ")
     row = next(row for row in panel.model._rows.shown if row.topic == wide.name)
-    assert generation_cell(row).text == "all that match"
-    assert _name_tip(row) == "studio subscribes all topics that match /robot/*/camera"
+    assert generation_cell(row).text == "all matching topics"
+    assert _name_tip(row) == "studio subscribes to all topics that match /robot/*/camera"
     panel.table.opened.emit(row.key)
     assert window.opened == []
-    assert window.toasts == ["/robot/*/camera has wildcards: it stands for all topics that match"]
+    assert window.toasts == ["/robot/*/camera has wildcards and matches several topics"]
     assert wide.name not in window.session.topics

@@ -146,11 +146,11 @@ def test_hundreds_of_problems_are_counted_and_the_first_are_shown(panel, window)
     document.edits = 30
     panel.refresh()
     assert (len(panel.rows), panel.chip.text) == (60, "500")
-    assert panel.others.text() == "and 440 more, when these are mended"
+    assert panel.others.text() == "440 more after these are fixed"
     document.found, document.edits = document.found[400:], 31
     panel.refresh()
     assert panel.rows[0].problem.subject == "b400"
-    assert panel.others.text() == "and 40 more, when these are mended"
+    assert panel.others.text() == "40 more after these are fixed"
     document.found, document.edits = document.found[:1], 32
     panel.refresh()
     assert not panel.others.isVisibleTo(panel)

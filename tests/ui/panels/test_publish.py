@@ -61,7 +61,7 @@ def test_a_fault_is_said_where_it_is_and_put_right_by_a_press(window, panel) -> 
     assert states(panel) == ["line 3", "not armed"]
     press(form.mend)
     assert form.edit.wrong_line == 0
-    assert form.sentence.text() == "Fill in “yaw” first. It cannot be sent yet."
+    assert form.sentence.text() == "Fill in “yaw” first. It can't be sent yet."
     QTest.keyClicks(form.values.fields["yaw"], "-12.5")
     ticks(window, panel)
     assert not form.sentence.isVisible()
@@ -98,7 +98,7 @@ def test_sending_arms_this_topic_alone_and_the_switch_ends_it(window, panel) -> 
     ticks(window, panel, 7)
     assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
     assert panel.form.send.text() == "Send"
-    assert panel.form.last.text().endswith("heard by 1")
+    assert panel.form.last.text().endswith("received by 1")
     assert [token.text() for token in panel.strip.tokens] == ["/cmd_vel"]
     assert panel.strip.words.text() == "5:00 left"
     press(panel.form.repeat)
@@ -112,7 +112,7 @@ def test_sending_arms_this_topic_alone_and_the_switch_ends_it(window, panel) -> 
     assert acting.outbox.all_repeated == ()
     ticks(window, panel, 7)
     assert states(panel)[1] == "not armed"
-    assert panel.strip.words.text() == "Nothing is sent"
+    assert panel.strip.words.text() == "Sending is off"
 
 
 def test_stop_another_source_and_closing_disarm(window, panel) -> None:
@@ -192,7 +192,7 @@ def test_the_last_message_is_the_template(window, panel) -> None:
     kept = panel.message
     assert kept is not None
     assert kept.payload() == {"mood": "happy", "n": [1, 2]}
-    assert panel.form.template.text() == "From the last message"
+    assert panel.form.template.text() == "Use the last message"
     assert window.session.watched == []
     panel.begin("/blackboard")
     assert panel.message == kept, "one that is kept is shown again"
@@ -204,7 +204,7 @@ def test_without_a_publisher_its_type_is_the_template(window, panel) -> None:
     panel.form.kind.clear()
     QTest.keyClicks(panel.form.kind, "geometry_msgs/Point")
     press(panel.form.template)
-    assert window.toasts[-1] == "Nobody publishes it now: these are the fields of its type"
+    assert window.toasts[-1] == "No publisher now: these are the fields of its type"
     assert panel.message is not None
     assert panel.message.payload() == {"x": 0.0, "y": 0.0, "z": 0.0}
 
@@ -215,7 +215,7 @@ def test_names_of_topics_are_offered_and_their_type_taken(panel) -> None:
     assert completer.currentCompletion() == "/blackboard"
     panel.form.topic.setText("/robot/camera")
     assert panel.form.kind.text() == "image"
-    assert panel.form.sentence.text().startswith("Messages of the type image can't be written by hand.")
+    assert panel.form.sentence.text().startswith("Messages of type image can't be edited by hand.")
 
 
 def test_copying_deleting_and_undo(window, panel) -> None:
@@ -251,15 +251,15 @@ def test_every_topic_has_it_in_its_menu(qtbot, window) -> None:
     qtbot.addWidget(table)
     for widget in table.header_widgets():
         qtbot.addWidget(widget)
-    action = next(each for each in table.row_actions("/blackboard") if each.words == "Publish to it")
+    action = next(each for each in table.row_actions("/blackboard") if each.words == "Publish to this topic")
     action.run()
     assert window.commands == ["publish.topic:/blackboard"]
-    assert "Publish to it" not in [each.words for each in table.row_actions("/robot/camera")]
+    assert "Publish to this topic" not in [each.words for each in table.row_actions("/robot/camera")]
 
 
 def test_in_a_recording_nothing_can_be_armed(window, panel, monkeypatch) -> None:
     monkeypatch.setattr(type(window.session), "is_replaying", True)
-    assert acting_of(window).send(STILL) == "A recording shows: go back to live to send."
+    assert acting_of(window).send(STILL) == "A recording is open. Return to live to send."
     ticks(window, panel, 7)
     assert not panel.strip.switch.isEnabled()
     assert not panel.form.send.isEnabled()

@@ -130,7 +130,7 @@ def test_f2_renames_in_the_row_and_nothing_is_written_over(qtbot, panel, window,
     assert field is not None
     field.setText("camera")
     QTest.keyClick(field, Qt.Key.Key_Return)
-    assert window.toasts == ["There is a recording “camera” already"]
+    assert window.toasts == ["A recording named “camera” already exists"]
     field.setText("Arm: second/try")
     QTest.keyClick(field, Qt.Key.Key_Return)
     assert table.field is None
@@ -258,10 +258,10 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     (made,) = (tmp_path / "long, 0.02.0 to 0.06.0, CSV").iterdir()
     assert (made.name, len(made.read_text("utf-8").splitlines())) == ("a.csv", 1 + 200)
     QTest.keyClicks(details.topics.edit, "not /a ")
-    assert details.part_words.text() == "No topic of it fits"
+    assert details.part_words.text() == "No matching topics in this recording"
     window.toasts.clear()
     details.export.click()
-    assert window.toasts == ["No topic of it fits"]
+    assert window.toasts == ["No matching topics in this recording"]
     details.topics.show_patterns((), ())
     details.topics.changed.emit()
     details.pick.setChecked(True)  # the same from a list
@@ -275,10 +275,10 @@ def test_a_part_of_the_time_and_some_topics_are_exported_by_mouse_and_keys(
     details.list.none.click()
     assert details.topics.patterns() == (("/camera",), ())
     assert details.part().topics == ["/camera"]
-    assert details.about.text() == "nothing of it can become that"
+    assert details.about.text() == "This value can't be converted to this type"
     details.list.filter.clear()
     details.list.none.click()
-    assert (details.part(), details.part_words.text()) == (None, "No topic of it fits")
+    assert (details.part(), details.part_words.text()) == (None, "No matching topics in this recording")
     details.list.all.click()
     assert details.part().topics is None
     details.topics.show_patterns(("/a",), ())
@@ -349,7 +349,7 @@ def test_a_topic_is_recorded_from_its_menu(qtbot, folder):
     qtbot.addWidget(panel)
     for widget in panel.header_widgets():
         qtbot.addWidget(widget)
-    (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record this topic")
+    (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record topic")
     run()
     assert window.commands == ["record.topic:/odom"]
     panel.shut()

@@ -31,7 +31,7 @@ def test_the_button_is_kept(panel, window) -> None:
     assert panel.sound.accessibleName() == "Mute the robots"
     press(panel.sound)
     heard = window.session.settings.get(SOUND, True)
-    assert (heard, panel.sound.accessibleName()) == (False, "Hear the robots")
+    assert (heard, panel.sound.accessibleName()) == (False, "Unmute the robots")
     press(panel.sound)
     assert window.session.settings.get(SOUND, False)
 

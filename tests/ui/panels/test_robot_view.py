@@ -159,7 +159,7 @@ def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> No
     qtbot.addWidget(panel)
     assert isinstance(panel, RobotPanel)
     assert not panel.reset.isVisibleTo(panel)
-    press(button(panel, "Show its actions"))
+    press(button(panel, "Show actions"))
     assert window.commands == ["panel:robots"]
     panel.shut()
     assert window.session.looked_at == []
@@ -168,10 +168,10 @@ def test_a_real_robot_has_no_drawing_but_a_way_to_its_actions(qtbot, qapp) -> No
 @pytest.mark.parametrize(
     ("kept", "words"),
     [
-        (lambda sensor: True, "Its camera and its sensors show how it is."),
-        (lambda sensor: sensor.is_image, "Its camera shows how it is."),
-        (lambda sensor: not sensor.is_image, "Its sensors show how it is."),
-        (lambda sensor: False, "It tells nothing of itself, but you can try what it can do."),
+        (lambda sensor: True, "Its camera and sensors show its state."),
+        (lambda sensor: sensor.is_image, "Its camera shows its state."),
+        (lambda sensor: not sensor.is_image, "Its sensors show its state."),
+        (lambda sensor: False, "This robot reports no state, but you can try its actions."),
     ],
 )
 def test_a_robot_that_is_not_drawn_names_only_what_it_has(qtbot, kept, words) -> None:

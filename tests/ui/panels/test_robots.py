@@ -64,8 +64,8 @@ def test_a_refused_input_stands_below_its_row(panel, window) -> None:
     [
         ("succeeded", None, "done in 1.4 s", "ok", ""),
         ("canceled", None, "stopped after 1.4 s", "off", ""),
-        ("failed", "the way is blocked", "not done", "error", "The way is blocked."),
-        ("failed", None, "not done", "error", "The robot did not say why."),
+        ("failed", "the way is blocked", "failed", "error", "The way is blocked."),
+        ("failed", None, "failed", "error", "The robot gave no reason."),
     ],
 )
 def test_how_it_ended_is_said(panel, window, state, error, chip, status, sentence) -> None:
@@ -183,7 +183,7 @@ def test_a_robot_of_another_start_is_away_and_can_be_forgotten(qtbot, window) ->
     assert nao.chip.text == "away"
     assert nao.where.startswith("seen ")
     menu = panel.list.menu_of(nao)
-    assert [action.text() for action in menu.actions()] == ["Find out why", "Forget NAO"]
+    assert [action.text() for action in menu.actions()] == ["Find the cause", "Forget NAO"]
     menu.actions()[1].trigger()
     assert panel.list.away == {}
     assert list(panel.items) == ["Pepper"]

@@ -215,7 +215,7 @@ def test_things_are_added_removed_and_put_back(panel, window) -> None:
     room = window.session.room.room
     assert {"ball 2", "Ben", "marker 8", "table 2", "shelf 2"} <= {thing.name for thing in room.things}
     press(panel.add)
-    choose(panel, "Put the room back")
+    choose(panel, "Reset room")
     assert window.session.room.room == Room()
     assert window.session.changes("Pepper") == window.session.changes("Turtle") == [{"reset": True}]
 
@@ -224,7 +224,7 @@ def test_a_kind_of_which_there_are_enough_says_so(panel, window) -> None:
     for _turn in range(9):
         press(panel.add)
         choose(panel, "Add a ball")
-    assert window.toasts == ["There is no more room for that; take something away first"] * 2
+    assert window.toasts == ["No more room. Remove something first"] * 2
 
 
 # ---- a larger room ----------------------------------------------------------------------------------------
@@ -277,7 +277,7 @@ def test_the_large_room_is_furnished_and_put_back_by_its_own_buttons(panel, larg
     press(buttons["Add something to the room"])
     choose(panel, "Add a ball")
     assert window.session.room.room.thing("ball 2") is not None
-    press(buttons["Put the robot and its room back"])
+    press(buttons["Reset the robot and its room"])
     assert window.session.room.room.thing("ball 2") is None
 
 

@@ -77,10 +77,10 @@ def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, w
     menu = panel.menu_of(key)
     assert menu is not None
     entries = {action.text(): action for action in menu.actions()}
-    assert list(entries) == ["Send again", "Copy the line", "Copy the message", "Show its messages"]
+    assert list(entries) == ["Send again", "Copy the line", "Copy the message", "Show messages"]
     entries["Copy the message"].trigger()
     assert json.loads(QGuiApplication.clipboard().text()) == {"word": "yes"}
-    entries["Show its messages"].trigger()
+    entries["Show messages"].trigger()
     assert window.opened == ["/words"]
 
     session.runs.stop()
@@ -93,7 +93,7 @@ def test_what_is_sent_is_listed_copied_and_sent_again_while_it_is_armed(qtbot, w
     assert (again.text(), again.isEnabled()) == ("Send again (not armed)", False)
     panel.table.choose(key)
     panel.repeat()
-    assert window.toasts[-1] == "Not armed for /words: nothing is sent."
+    assert window.toasts[-1] == "Not armed for /words: sending is off."
     assert heard.receive(0.0) is None
     panel.filter.setText("image words")
     assert rows(panel) == []
@@ -128,10 +128,10 @@ def test_calls_and_what_a_recording_sends_have_their_own_menus(qtbot, window) ->
         entries.append([action.text() for action in menu.actions()])
     assert entries == [
         ["Copy the line"],
-        ["Send again (not armed)", "Copy the line", "Copy the message", "Show its messages"],
-        ["Copy the line", "Show its messages"],
-        ["Call again", "Copy the line", "Copy the request", "Show the service"],
-        ["Send again (not armed)", "Copy the line", "Copy the message", "Show its messages"],
+        ["Send again (not armed)", "Copy the line", "Copy the message", "Show messages"],
+        ["Copy the line", "Show messages"],
+        ["Call again", "Copy the line", "Copy the request", "Open the service"],
+        ["Send again (not armed)", "Copy the line", "Copy the message", "Show messages"],
     ]
     called = next(each for each in acting.sent.records if each.asker == "service")
     panel.table.opened.emit(str(called.number))

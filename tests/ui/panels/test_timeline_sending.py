@@ -60,7 +60,7 @@ def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, p
     assert sending is not None
     until(qtbot, window, panel, lambda: replay.opened is not None and panel.transport.armed.isVisible())
     panel.refresh()
-    assert panel.transport.nothing.text() == "Nothing is sent"
+    assert panel.transport.nothing.text() == "Sending is off"
     assert not panel.strip.isVisible()
     heard = session.source.listen("/test/a", "json")
 
@@ -107,7 +107,7 @@ def test_topics_are_chosen_named_armed_asked_for_sent_and_counted(qtbot, qapp, p
     session.tick(), panel.refresh()
     sent = sum(each.count for each in going)
     assert panel.strip.counts.text().startswith(f"{sent} sent")
-    assert panel.strip.counts.text().endswith("heard by 1")
+    assert panel.strip.counts.text().endswith("received by 1")
     assert "Sending 2 topics of the recording" in StatusFacts(session).armed()[1]
     assert unsaid(panel) == []
 

@@ -171,7 +171,7 @@ def test_enter_opens_and_the_arrows_move(panel, window) -> None:
     [
         ("none", "No master is running", "Start a master here", 1, []),
         ("connected", "No topics yet", "Use the virtual robot", 0, ["robots.virtual"]),
-        ("searching", "Looking for a master", None, 0, []),
+        ("searching", "Searching for a master", None, 0, []),
     ],
 )
 def test_with_nothing_it_says_what_to_do_next(qtbot, qapp, kind, words, pressed, masters, commands) -> None:
@@ -207,7 +207,7 @@ def test_the_curve_of_the_last_rates_stands_before_the_rate(panel, window) -> No
         panel.model.index(panel.model.index_of("/odom").row(), place_of(panel, "curve")), CELL_ROLE
     )
     assert cell.curve == (49.0, 50.0, 51.0)
-    assert panel.table.columns[place_of(panel, "curve")].tip(topic) == "Rate lately: 49.0 to 51.0 /s"
+    assert panel.table.columns[place_of(panel, "curve")].tip(topic) == "Recent rate: 49.0 to 51.0 /s"
     assert place_of(panel, "curve") + 1 == place_of(panel, "rate")
     assert curve_cell(Topic("/silent")).curve == ()
 
@@ -232,7 +232,7 @@ def test_columns_are_chosen_in_a_menu_and_come_back_with_the_layout(qtbot, panel
     assert not again.table.isColumnHidden(place_of(panel, "subscribers"))
     assert again.table.isColumnHidden(place_of(panel, "bandwidth"))
     columns, _others = again.more_actions()
-    next(action for action in columns.menu().actions() if action.text() == "As at first").trigger()
+    next(action for action in columns.menu().actions() if action.text() == "Default columns").trigger()
     assert again.table.isColumnHidden(place_of(panel, "subscribers"))
     assert again.save_state()["columns"] == {}
 
@@ -245,10 +245,10 @@ def test_who_publishes_can_be_a_column() -> None:
 def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -> None:
     rate, loss = (panel.table.columns[place_of(panel, name)] for name in ("rate", "loss"))
     topic = window.session.topics["/odom"]
-    assert rate.tip(topic) == "Messages a second, as the publishers tell"
+    assert rate.tip(topic) == "Messages per second, as reported by the publishers"
     topic.received, topic.dropped, topic.missed = 1200, 970, 3800
-    assert rate.tip(topic) == "Shown 230 of 5\u2009000 sent"
-    assert loss.tip(topic) == "0 messages lost. Shown 230 of 5\u2009000 sent"
+    assert rate.tip(topic) == "230 of 5 000 messages shown"
+    assert loss.tip(topic) == "0 messages lost. 230 of 5 000 messages shown"
 
 
 def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> None:
@@ -271,7 +271,7 @@ def test_a_topic_that_is_typed_and_not_there_leads_there_too(panel, window) -> N
     press(button(panel, "Why do I see nothing?"))
     assert window.asked_why == [(panel, "/robot/deph")]
     (hidden,) = panel.hindrances()
-    assert hidden.sentence == "Topics shows only what has “/robot/deph”."
+    assert hidden.sentence == "Topics only shows entries with “/robot/deph”."
     hidden.run()
     assert (panel.filter.text(), list(panel.hindrances())) == ("", [])
 
@@ -392,11 +392,11 @@ def test_the_menu_of_a_folder_opens_and_closes_all_and_copies_its_pattern(panel,
     as_tree(panel, window)
     whole = shown(panel)
     by_words = {action.text(): action for action in panel.menu_of("/robot/*").actions()}
-    by_words["Close all folders"].trigger()
+    by_words["Collapse all folders"].trigger()
     assert len(shown(panel)) < len(whole)
-    by_words["Copy its name"].trigger()
+    by_words["Copy name"].trigger()
     assert QGuiApplication.clipboard().text() == "/robot/*"
-    by_words["Open all folders"].trigger()
+    by_words["Expand all folders"].trigger()
     assert shown(panel) == whole
 
 

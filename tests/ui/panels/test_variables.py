@@ -76,7 +76,7 @@ def test_values_come_while_it_runs_are_marked_and_stay_after_the_end(panel, wind
     window.session.runs.stop()
     ticks(window, panel, 2)
     assert shown(panel)[0] == ("score", "4")
-    assert panel.when.text() == "When it ended"
+    assert panel.when.text() == "Final values"
     window.session.runs.run()  # while the robots are asked nothing begins anew
     now[0] += 1
     ticks(window, panel, 2)
@@ -105,9 +105,9 @@ def test_keys_and_the_menu_ask_for_commands(panel, window) -> None:
     assert menu is not None
     enabled = {action.text(): action.isEnabled() for action in menu.actions()}
     assert enabled == {
-        "Show beside the blocks": True,
+        "Show next to the blocks": True,
         "Show where it is used": True,
-        "Give it another value": False,  # nothing runs
+        "Change the value": False,  # nothing runs
         "Rename": True,
         "Delete": True,
     }
@@ -135,7 +135,7 @@ def test_another_behaviour_shows_nothing_of_the_run(panel, window) -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [([], "empty"), (["x"], "1 item: x"), (None, "not known"), ("", ""), (True, "yes"), ("a\nb", "a b")],
+    [([], "empty"), (["x"], "1 item: x"), (None, "unknown"), ("", ""), (True, "yes"), ("a\nb", "a b")],
 )
 def test_a_value_in_the_words_of_a_row(value: object, words: str) -> None:
     (row,) = rows_of([Variable("v", "v", "v")], {"v": brief("v", value)}, (), Order())

@@ -51,7 +51,7 @@ def test_where_nothing_is_live_nothing_freezes(tools, window) -> None:
     live(window, "inspector").hide()
     tools.refresh()
     assert not tools.freeze.isEnabled()
-    assert window.commands.actions.why_not("view.freeze") == "Nothing here can be frozen"
+    assert window.commands.actions.why_not("view.freeze") == "Nothing to freeze here"
     live(window, "image")
     tools.refresh()
     assert tools.freeze.isEnabled()
@@ -77,7 +77,7 @@ def test_the_layout_says_its_name_and_offers_the_others(tools, window, dropped) 
     entries = {each.text(): each for each in menu.actions() if each.text()}
     assert list(entries)[:3] == ["Behaviour", "Developer", "Two cameras"]
     assert entries["Two cameras"].isChecked()
-    assert "Put the panels back" in entries
+    assert "Reset panels" in entries
     entries["Developer"].trigger()
     tools.refresh()
     assert tools.layout.text() == "Developer"

@@ -50,7 +50,7 @@ def test_what_can_t_be_done_is_grey(commands: Commands, field: QLineEdit) -> Non
     assert commands.actions.why_not("edit.copy") == ""
     field.clearFocus()
     field.hide()
-    assert commands.actions.why_not("edit.copy") == "Only for blocks and in text fields"
+    assert commands.actions.why_not("edit.copy") == "Only for blocks and text fields"
 
 
 def test_the_keys_stay_with_who_has_the_keyboard(commands: Commands) -> None:

@@ -94,7 +94,7 @@ def test_a_name_that_is_taken_is_replaced_or_both_are_kept(
 ) -> None:
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
     assert sheet.done.text() == "Replace"
-    assert sheet.said.text() == "“Greeting” is there already. Replace it, or keep both."
+    assert sheet.said.text() == "“Greeting” already exists. Replace it, or keep both."
     QTest.mouseClick(sheet.keep_both, LEFT)
     assert taken == [folder / "Greeting 2.nepb"]
     sheet.ask_save(folder / "Greeting.nepb", taken.append)
@@ -118,8 +118,8 @@ def test_numbers_that_are_taken_are_passed_over(folder: Path) -> None:
         ("a/b", "A name can't have “/” in it."),
         ("what?", "A name can't have “?” in it."),
         (".x", "A name that begins with a full stop hides the file."),
-        ("con", "Some computers take no file of this name. Choose another one."),
-        ("ends.", "Some computers take no file of this name. Choose another one."),
+        ("con", "Some computers don't support this file name. Choose another one."),
+        ("ends.", "Some computers don't support this file name. Choose another one."),
         ("x" * 121, "This name is too long."),
         ("Ñandú 3", ""),
         ("", ""),
@@ -146,7 +146,7 @@ def test_a_folder_is_opened_made_and_left_again(sheet: FileSheet, folder: Path, 
     QTest.keyClick(sheet.folder_name, Qt.Key.Key_Return)
     assert (folder / "Class 4").is_dir()
     assert sheet.folder == folder / "Class 4"
-    assert sheet.said.text() == "Nothing is in here yet."
+    assert sheet.said.text() == "This folder is empty."
     QTest.mouseClick(sheet.up, LEFT)
     assert sheet.folder == folder
     assert sheet.chosen is not None
@@ -154,7 +154,7 @@ def test_a_folder_is_opened_made_and_left_again(sheet: FileSheet, folder: Path, 
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
     QTest.mouseClick(sheet.make_folder, LEFT)
-    assert sheet.said.text() == "“Class 4” is there already."
+    assert sheet.said.text() == "“Class 4” already exists."
     assert taken == []
 
 
@@ -188,7 +188,7 @@ def test_a_folder_that_is_gone_says_so_and_the_one_before_stays(sheet: FileSheet
     sheet.ask_open(folder, print)
     sheet.go_to(folder / "gone")
     assert sheet.folder == folder
-    assert sheet.said.text() == "“gone” can't be opened: no such file or directory."
+    assert sheet.said.text() == "Can't open “gone”: no such file or directory."
 
 
 def test_places_are_folders_that_are_there_each_once(folder: Path, tmp_path: Path) -> None:
@@ -268,16 +268,16 @@ def test_a_picture_is_chosen_among_pictures(sheet: FileSheet, folder: Path, take
 def test_a_folder_is_chosen_or_made(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
     sheet.ask_folder(folder, taken.append)
     assert rows(sheet) == ["class 3"]
-    assert sheet.said.text() == "Pictures will be kept in “work”.", "no row is chosen by itself"
+    assert sheet.said.text() == "Images will be saved in “work”.", "no row is chosen by itself"
     sheet.list.setCurrentItem(sheet.list.topLevelItem(0))
-    assert sheet.said.text() == "Pictures will be kept in “class 3”."
+    assert sheet.said.text() == "Images will be saved in “class 3”."
     sheet.done.click()
     sheet.ask_folder(folder, taken.append)
     sheet.new_folder.click()
     sheet.folder_name.setText("album")
     sheet.make_folder.click()
     assert sheet.list.hasFocus()
-    assert sheet.said.text() == "Pictures will be kept in “album”."
+    assert sheet.said.text() == "Images will be saved in “album”."
     sheet.done.click()
     assert taken == [folder / "class 3", folder / "album"]
 

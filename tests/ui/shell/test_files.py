@@ -81,7 +81,7 @@ def test_work_without_a_file_is_kept_when_its_tab_is_closed(commands, window, ho
     kept = list((home / "kept").glob("New behaviour*.nepb"))
     assert len(kept) == 1
     assert [file.path for file in window.session.settings.recent] == [kept[0].resolve()]
-    assert window.toast.text == "Kept New behaviour in Recent"
+    assert window.toast.text == "Closed New behaviour. You'll find it under Recent."
     assert names(window) == ["New behaviour"]
     assert window.session.document.blank
 
@@ -97,7 +97,7 @@ def test_a_changed_file_is_saved_when_its_tab_is_closed_and_opens_again(commands
     assert names(window) == ["Mine"]
     assert window.session.document.workspace == changed("z")
     commands.run("tab.reopen")
-    assert window.toast.text == "No tab was closed"
+    assert window.toast.text == "No closed tabs"
 
 
 def press_toast(window: MainWindow) -> None:
@@ -192,7 +192,10 @@ def test_saving_over_what_another_program_wrote_keeps_that(commands, window, hom
     foreign = path.read_bytes().replace(b'"a"', b'"theirs"')
     path.write_bytes(foreign)
     commands.run("file.save")
-    assert window.toast.text == "Saved Mine. Another program had changed the file; what it wrote is kept."
+    assert (
+        window.toast.text
+        == "Saved Mine. Another program had changed the file; its version is under Earlier versions."
+    )
     assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [foreign]
     press_toast(window)
     document = window.session.document
@@ -231,7 +234,7 @@ def test_saving_as_keeps_the_file_that_it_writes_over(
     before = answers.path.read_bytes()
     window.session.document.edited(changed("z"))
     commands.run("file.save_as")
-    assert window.toast.text == "Saved Theirs. The file that was there is kept."
+    assert window.toast.text == "Saved Theirs. The previous file is under Earlier versions."
     assert b'"z"' in answers.path.read_bytes()
     assert [copy.read_bytes() for copy in (home / "earlier").iterdir()] == [before]
     press_toast(window)
@@ -272,7 +275,7 @@ def test_a_tab_that_can_not_be_saved_stays(commands, window, tmp_path: Path) -> 
     commands.run("tab.close")
     assert names(window) == ["Mine"]
     alert = window.session.alerts.active[0]
-    assert alert.title.startswith("Mine.nepb can't be written (")
+    assert alert.title.startswith("can't write Mine.nepb (")
     assert alert.button == "Save somewhere else"
 
 

@@ -238,5 +238,5 @@ def test_about_says_what_it_runs_on_and_copies_it(qtbot, window: MainWindow, com
     assert copied[0] == f"NEP Studio: {__version__}"
     assert f"Python: {platform.python_version()}" in copied
     assert any(line.startswith("Qt: 6.") for line in copied)
-    assert window.toast.text == "Copied the versions"
+    assert window.toast.text == "Copied version information"
     sheet.shut()

@@ -52,18 +52,18 @@ def test_a_name_is_one_line_that_fits(name, shown):
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
-        (b"", "it is damaged, or no layout of Studio"),
-        (b"\xff\xfe", "it is damaged, or no layout of Studio"),
-        (b"[" * 100_000, "it is damaged, or no layout of Studio"),
-        (b"[]", "it is no layout of Studio"),
-        (b'{"format": "another"}', "it is no layout of Studio"),
+        (b"", "it is damaged or not a layout of Studio"),
+        (b"\xff\xfe", "it is damaged or not a layout of Studio"),
+        (b"[" * 100_000, "it is damaged or not a layout of Studio"),
+        (b"[]", "it is not a layout of Studio"),
+        (b'{"format": "another"}', "it is not a layout of Studio"),
         (changed(arrangement={**SAVED, "docks": "AAAA"}), "it is damaged"),
         (changed(sum=None), "it is damaged"),
-        (changed(version=2), "a newer Studio has made it; update this one"),
+        (changed(version=2), "it was made by a newer Studio; update this one"),
         (changed(version=0), "it is damaged"),
         (changed(version="1"), "it is damaged"),
-        (changed(base="start"), "it arranges a layout that this Studio does not have"),
-        (changed(base=["developer"]), "it arranges a layout that this Studio does not have"),
+        (changed(base="start"), "it is for a layout that this Studio doesn't have"),
+        (changed(base=["developer"]), "it is for a layout that this Studio doesn't have"),
         (changed(arrangement=[]), "it is damaged"),
         (changed(arrangement={"open": 3, "docks": ""}), "it is damaged"),
         (changed(arrangement={"open": [], "docks": 3}), "it is damaged"),
@@ -84,7 +84,7 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
     file = tmp_path / "Mine.nep-layout"
     answers.path = file
     commands.run("layout.export")
-    assert window.toast.text == "Saved the layout in Mine.nep-layout"
+    assert window.toast.text == "Saved the layout to Mine.nep-layout"
     commands.run("layout.reset")
     before = set(window.bench.open_names())
     assert before > {"topics", "console"}
@@ -107,15 +107,15 @@ def test_a_layout_goes_out_and_comes_back_and_can_be_undone(
         assert set(window.bench.open_names()) == {"topics", "console"}
     file.write_bytes(layout_bytes("Arm", "developer", {**saved, "docks": ""}))  # Qt has nothing to put back
     commands.files.open_all([file])
-    assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged"
+    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged"
     assert set(window.bench.open_names()) == {"topics", "console"}
     assert [each.name for each in window.saved_layouts.all()] == ["Arm", "Arm 2"]
     file.write_bytes(b"nothing of the kind")
     commands.files.open_all([file])
-    assert window.toast.text == "Mine.nep-layout can't be opened: it is damaged, or no layout of Studio"
+    assert window.toast.text == "Can't open Mine.nep-layout: it is damaged, or no layout of Studio"
     commands.files.open_all([tmp_path / "gone.nep-layout"])
-    assert window.toast.text == "gone.nep-layout can't be opened: no such file or directory"
+    assert window.toast.text == "Can't open gone.nep-layout: no such file or directory"
     answers.path = tmp_path / "a file" / "x.nep-layout"
     answers.path.parent.write_bytes(b"in its place")
     commands.run("layout.export")
-    assert window.toast.text.startswith("x.nep-layout can't be written: ")
+    assert window.toast.text.startswith("Can't write x.nep-layout: ")

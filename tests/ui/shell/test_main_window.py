@@ -64,7 +64,7 @@ def test_there_is_one_way_to_the_start_page_and_one_back(
     show(qtbot, window)
     assert not window.bar.home.isVisible()
     assert not window.bar.back.isVisible(), "a first start leads back to nothing"
-    assert commands.actions.why_not("start_page.leave") == "Nothing is open"
+    assert commands.actions.why_not("start_page.leave") == "Nothing open"
     commands.run("layout.developer")
     QTest.mouseClick(window.bar.home, Qt.MouseButton.LeftButton)
     assert window.start.isVisible()
@@ -105,7 +105,7 @@ def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
     window.tick()
     assert window.bar.stop.filled
     link.not_stopped = ""
-    link.goes_on = "Pepper may still move: wave has not ended"
+    link.goes_on = "Pepper may still move: wave is still running"
     window.tick()
     assert window.bar.stop.filled
     link.goes_on = ""
@@ -294,7 +294,7 @@ def test_panels_float_close_and_open_again(qtbot, window: MainWindow, commands: 
     assert labels == ["Float", "Close"]
     dock.menu().actions()[0].trigger()
     assert dock.isFloating()
-    assert [action.text() for action in dock.menu().actions()] == ["Dock it", "Close"]
+    assert [action.text() for action in dock.menu().actions()] == ["Dock", "Close"]
     dock.menu().actions()[1].trigger()
     assert "inspector" not in bench.open_names()
     assert commands.run("panel:inspector")
@@ -712,7 +712,7 @@ def test_a_layout_that_comes_shows_its_bars_and_then_itself(
     assert window.ring.target is None, "no ring round a page that is only words"
     placeholder = window.findChild(Placeholder)
     assert window.pages.currentWidget() is placeholder
-    assert placeholder.accessibleName() == "Getting the blocks ready."
+    assert placeholder.accessibleName() == "Loading blocks."
     assert not window.run_bar.isHidden()
     assert window.start.isHidden()
     commands.run("layout.behaviour")
@@ -740,7 +740,7 @@ def test_a_start_shows_what_was_left(
     monkeypatch.setattr(window, "begin", lambda: None)
     window.state.keep_layout("developer")
     steps = first_steps(window, Options())
-    assert window.findChild(Placeholder).accessibleName() == "Getting the panels ready."
+    assert window.findChild(Placeholder).accessibleName() == "Loading panels."
     for step in steps:
         step()
     assert window.showing == "developer"
@@ -767,7 +767,7 @@ def test_nothing_is_offered_where_something_else_is_at_hand(
 ) -> None:
     monkeypatch.setattr(window, "begin", lambda: None)
     if instead == "work of last time":
-        window.banner.offer("Put back?", "It was not saved.", ("Put it back", bool), ("Not now", bool))
+        window.banner.offer("Put back?", "It was not saved.", ("Restore", bool), ("Not now", bool))
     elif instead == "open work":
         window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
     elif instead == "an earlier version":

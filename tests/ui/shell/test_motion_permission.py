@@ -58,13 +58,13 @@ def test_it_says_what_moves_and_how_it_is_stopped(window) -> None:
     window.ask("move", "turn")
     question = window.question
     assert question.isVisible()
-    assert question.title.text() == "Let Rover move?"
+    assert question.title.text() == "Allow Rover to move?"
     assert "“move” and “turn” move Rover." in question.sentence.text()
     assert "F12" in question.sentence.text()
     assert question.always.text() == "Always for Rover"
     assert question.y() > 200  # the run bar's Stop and the robot's own stay free
     assert window.focusWidget() is question.not_now
-    assert question.accessibleName() == "Let Rover move?"
+    assert question.accessibleName() == "Allow Rover to move?"
 
 
 def test_let_it_move_goes_on(window) -> None:

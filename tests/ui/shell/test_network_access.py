@@ -83,7 +83,7 @@ def test_it_is_taken_back_where_it_was_given(make):
 def test_without_a_network_it_says_what_to_do_first(make):
     sheet, reach, _asked = make(here=())
     sheet.open()
-    assert sheet.heading.text() == "This computer is in no network"
+    assert sheet.heading.text() == "This computer is not connected to a network"
     assert not sheet.yes.isVisible()
     assert access_words(reach)[1] == "This computer only"
 

@@ -63,9 +63,9 @@ def test_a_switch_applies_at_once_and_says_how_the_network_is(
     ros = sheet.rows[0]
     ros.switch.click()
     assert (world.made[0].address, ros.address.text()) == ("127.0.0.1:11311", "127.0.0.1:11311")
-    assert states(sheet)[0] == "Looking for it."
+    assert states(sheet)[0] == "Searching."
     world.tell(GraphSeen(graph("/a", "/b"), 0.0))
-    assert states(sheet)[0] == "There: 2 topics, 1 node."
+    assert states(sheet)[0] == "Connected: 2 topics, 1 node."
     world.tell(MasterLost("", LONG))
     assert states(sheet)[0] == f"N{LONG[1:]}."
     ros.switch.click()

@@ -23,7 +23,7 @@ class Runner:
 
 def test_the_run_bar_offers_the_speeds_of_the_menu(window: MainWindow, commands: Commands) -> None:
     offered = [action.text() for action in window.run_bar._paces.actions()]
-    assert offered == ["Full speed", "Slow motion: 0.5 s a block", "Very slow: 1.5 s a block"]
+    assert offered == ["Full speed", "Slow motion: 0.5 s per block", "Very slow: 1.5 s per block"]
     assert commands.actions["run.full_speed"].isChecked()
     assert window.run_bar.pace.accessibleName() == "Speed"
 

@@ -44,8 +44,8 @@ def test_the_beginning_of_a_word_is_better_than_its_middle() -> None:
 
 
 def test_letters_that_fit_are_told() -> None:
-    assert bold("reco", "Keep the last 60 s of the recording") == "reco"
-    assert bold("pb", "Put the panels back") == "P|b"
+    assert bold("reco", "Save the last 60 s of the recording") == "reco"
+    assert bold("pb", "Reset panels") == "P|b"
     assert bold("text larger", "Larger text") == "Larger|text"
     assert bold("ab", "ÄAB") == "AB"
 
@@ -56,8 +56,8 @@ def test_what_does_not_fit_is_not_found(query: str) -> None:
 
 
 def test_what_can_be_done_now_stands_above_what_can_not() -> None:
-    entries = [Entry("command:a", "Go on", reason="Nothing is paused"), Entry("command:b", "Go up")]
-    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Go on"]
+    entries = [Entry("command:a", "Resume", reason="Nothing is paused"), Entry("command:b", "Go up")]
+    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Resume"]
 
 
 def test_scattered_letters_do_not_fit() -> None:
@@ -67,7 +67,7 @@ def test_scattered_letters_do_not_fit() -> None:
 
 @pytest.mark.parametrize(
     ("query", "words"),
-    [("pb", "Put the panels back"), ("ptpb", "Put the panels back"), ("vl", "Volver a poner los paneles")],
+    [("pb", "Reset panels"), ("ptpb", "Reset panels"), ("vl", "Volver a poner los paneles")],
 )
 def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
     topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]
@@ -80,7 +80,7 @@ def test_the_initials_of_a_command_mean_it(query: str, words: str) -> None:
 
 @pytest.mark.parametrize("query", ["p", "pt b", "bp", "pbx", "tb"])
 def test_what_are_no_initials_stands_as_ever(query: str) -> None:
-    assert not fuzzy.is_initials(query, "Put the panels back")
+    assert not fuzzy.is_initials(query, "Reset panels")
 
 
 def test_of_very_many_whole_pieces_are_found_and_all_are_counted() -> None:
@@ -283,7 +283,7 @@ def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow,
     QTest.keyClicks(palette.field, "faces")
     assert {"Topics", "Recent files"} <= set(headings(palette))
     lines = {line.entry.words: line.entry for line in palette.rows.lines.lines if isinstance(line, Match)}
-    assert lines["old faces"].reason == "Not in gone any more"
+    assert lines["old faces"].reason == "No longer in gone"
     assert lines["faces"].reason == ""
     palette.field.setText("/faces")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
@@ -316,7 +316,7 @@ def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: Ma
     palette.field.setText("smaller text")
     entry = palette.rows.entry
     assert entry is not None
-    assert entry.reason == "Text is as small as it gets"
+    assert entry.reason == "Text is at its smallest"
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert palette.isVisible()
     assert window.theme.text_percent == 100
@@ -325,7 +325,7 @@ def test_what_cant_be_done_says_why_and_is_not_done(palette: Palette, window: Ma
 def test_nothing_found_is_said(palette: Palette) -> None:
     palette.field.setText("qqqq")
     assert palette.rows.entry is None
-    assert palette.nothing.text() == "Nothing is called “qqqq”."
+    assert palette.nothing.text() == "No results for “qqqq”."
     assert palette.nothing.isVisible()
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert palette.isVisible()

@@ -91,7 +91,7 @@ def test_what_cannot_be_written_or_is_empty_is_said(qtbot, tmp_path: Path) -> No
     assert case.said[0].startswith("The PDF can't be saved")
     case.editor.data = b""
     case.printing.save(tmp_path / "b.pdf")
-    assert case.said[1] == "There are no blocks on this page"
+    assert case.said[1] == "This page has no blocks"
     assert not (tmp_path / "b.pdf").exists()
 
 

@@ -98,7 +98,7 @@ def test_the_key_begins_and_ends_and_the_bars_tell(window, recorder):
     assert recorder.ops() == ["record", "stop"]
     assert shown(window) == "Record"
     assert not any(words.startswith("Recording") for words in window.status.words())
-    assert window.commands.actions.why_not("recording.stop") == "Nothing is recorded"
+    assert window.commands.actions.why_not("recording.stop") == "Not recording"
     assert ": 0:42, 168 MB" in window.toast.accessibleName()
 
 
@@ -131,7 +131,7 @@ def test_what_is_chosen_is_what_is_recorded(window, recorder):
     sheet._toggle("/odom")
     assert sheet.count.text().startswith(f"{len(names) - 1} of {len(names)}")
     place = sheet.model.index_of("/odom").row()
-    assert [sheet.model.cell_at(place, column).said for column in (0,)] == ["left out"]
+    assert [sheet.model.cell_at(place, column).said for column in (0,)] == ["excluded"]
     sheet._choose_mode("pattern")
     QTest.keyClicks(sheet.patterns.edit, "/** not /odom")
     assert session.recordings.choice.left_out == ("/odom",)
@@ -184,7 +184,7 @@ def test_patterns_are_tokens_that_keys_make_and_take_away(window, recorder):
 def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    assert sheet.ends_words.text() == "when you end it"
+    assert sheet.ends_words.text() == "when you stop it"
     for field, text in ((sheet.ends_min, "30"), (sheet.ends_gb, "8")):
         field.setText(text)
         field.editingFinished.emit()
@@ -193,7 +193,7 @@ def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, reco
     assert (choice.ends_min, choice.ends_gb) == (30.0, 8.0)
     sheet.ends_min.setText("-1")
     sheet.ends_min.editingFinished.emit()
-    assert sheet.ends_words.text() == "The least is 0.1 min."
+    assert sheet.ends_words.text() == "The minimum is 0.1 min."
     sheet.ends_min.setText("30")
     sheet.ends_min.editingFinished.emit()
     assert not sheet.at_end.isVisible()
@@ -224,13 +224,13 @@ def test_keeping_needs_the_flight_recorder_which_one_press_switches_on(window, r
     recorder.say("ring")
     recorder.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 10**9}, free_bytes=None)
     window._show_facts()
-    assert "41 s can be kept" in window.status.words()
+    assert "last 41 s available" in window.status.words()
     window.commands.run("recording.keep")
     assert recorder.ops() == ["ring", "keep"]
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
     assert sheet.ring.isChecked()
-    assert sheet.ring_words.text() == "41 s there, 1.0 GB of 2.0 GB"
+    assert sheet.ring_words.text() == "41 s buffered, 1.0 GB of 2.0 GB"
     sheet.seconds.setText("30")
     sheet.seconds.editingFinished.emit()
     assert recorder.session.recordings.wish == RingWish(is_on=True, seconds=30)

@@ -205,7 +205,7 @@ def test_the_tool_bar_and_the_status_bar_say_which_source_shows(qtbot, window, s
     assert source.text() == "Tour.mcap  0:00"
     window._show_facts()
     assert window.status.words()[0].startswith("Tour.mcap, ")
-    assert "Live network goes on" in window.status.words()
+    assert "The live network keeps running" in window.status.words()
     QTest.mouseClick(source.back, Qt.MouseButton.LeftButton)
     window.tools.refresh()
     assert (source.text(), source.back.isVisible()) == ("Live network", False)

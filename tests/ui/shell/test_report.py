@@ -83,7 +83,7 @@ def lines(sheet: ReportSheet) -> str:
 def test_it_opens_in_the_field_and_says_what_goes_in(sheet: ReportSheet) -> None:
     assert sheet.isVisible()
     assert sheet.happened.edit.hasFocus()
-    for words in ("Nothing is sent", "In the file", "connection doctor", "Not in it", "Keys, passwords"):
+    for words in ("Sending is off", "Included", "connection doctor", "Not included", "Keys, passwords"):
         assert words in lines(sheet)
     assert not sheet.work.isVisible(), "nothing is open that could go in"
     assert "unless" not in lines(sheet)
@@ -133,8 +133,8 @@ def test_behaviours_go_in_only_when_they_are_switched_on_each_time(
     assert window.commands.run("help.report")
     assert sheet.work.isVisible()
     assert not sheet.work.isChecked()
-    assert "Your behaviours, unless you switch them on below" in lines(sheet)
-    assert sheet.names.text() == "As they are now: “New behaviour”"
+    assert "Your behaviours, unless you include them below" in lines(sheet)
+    assert sheet.names.text() == "Current settings: “New behaviour”"
     answers.path = tmp_path / "without.zip"
     written(qtbot, sheet)
     sheet.work.click()
@@ -156,8 +156,8 @@ def test_a_place_that_takes_nothing_is_said_and_what_was_typed_stays(
     answers.path = tmp_path / "file" / "report.zip"
     sheet.happened.set_text("It stopped")
     written(qtbot, sheet)
-    assert sheet.state.text().startswith("Report.zip can't be written (")
-    assert sheet.state.text().endswith("choose another place.")
+    assert sheet.state.text().startswith("can't write Report.zip (")
+    assert sheet.state.text().endswith("choose another folder.")
     assert sheet.happened.text() == "It stopped"
     assert not sheet.show_file.isVisible()
     assert sheet.write.hasFocus()
@@ -185,7 +185,7 @@ def test_a_crash_is_offered_by_the_banner_and_its_report_is_in_the_file(
     banner.button.click()
     sheet = window.findChild(ReportSheet)
     assert sheet is not None
-    assert "1 report of a crash" in lines(sheet)
+    assert "1 crash report" in lines(sheet)
     assert not session.alerts.has(ALERT)
     answers.path = tmp_path / "report.zip"
     written(qtbot, sheet)

@@ -18,7 +18,7 @@ def chip(*states: str, run: str = "ready", silent: str | None = None) -> tuple[s
         ("ready", "ready", "Robot 1 ready"),
         ("busy", "ready", "Robot 1 moving"),
         ("ready", "running", "Robot 1 running"),
-        ("ready", "paused", "Robot 1 holds still"),
+        ("ready", "paused", "Robot 1 is paused"),
     ],
 )
 def test_one_robot_says_what_it_does(state: str, run: str, words: str) -> None:
@@ -38,4 +38,4 @@ def test_one_that_is_silent_is_named() -> None:
     assert chip("silent") == ("Silent", "error")
     assert chip("silent", silent="camera silent") == ("Camera silent", "error")
     assert chip("silent", "ready") == ("Robot 1: silent", "error")
-    assert chip("silent", "silent") == ("2 robots silent", "error")
+    assert chip("silent", "silent") == ("2 robots not responding", "error")

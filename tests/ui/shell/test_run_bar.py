@@ -29,21 +29,21 @@ VIEWS = {
         last_stop_status="ok",
     ),
     "paused": RunView(
-        "paused", "Paused at “wait 2 s”", "Robots hold still; the clock stands", "Greeting is paused",
-        can_run=True, can_step=True, can_restart=True, run_word="Go on",
+        "paused", "Paused at “wait 2 s”", "Robots and timers are paused", "Greeting is paused",
+        can_run=True, can_step=True, can_restart=True, run_word="Resume",
     ),
     "stopping": RunView(
         "stopping", "Stopping", "Waiting for Turtle, 0.2 s", "Stopping",
         stop_word="Stopping", result="1 of 2 robots stopped",
     ),
     "proven": RunView(
-        "proven", "Stopped after 14 s", "The dashed outline shows where", "Stopped after 14 s",
+        "proven", "Stopped after 14 s", "The dashed block is where it stopped", "Stopped after 14 s",
         can_run=True, can_step=True, result="all 2 robots stopped (41 ms)", result_status="ok",
     ),
     "unanswered": RunView(
-        "unanswered", "Turtle did not answer", "Pepper stopped (38 ms). Switch Turtle off by hand.",
-        "Turtle did not answer; switch it off by hand", stop_word="Stop again",
-        result="1 of 2 robots stopped", result_status="error", confirm="Turtle is still",
+        "unanswered", "Turtle did not respond", "Pepper stopped (38 ms). Switch Turtle off by hand.",
+        "Turtle did not respond; switch it off by hand", stop_word="Stop again",
+        result="1 of 2 robots stopped", result_status="error", confirm="Turtle isn't moving",
     ),
 }  # fmt: skip
 
@@ -107,7 +107,7 @@ def test_nothing_jumps_between_the_states(bar: RunBar) -> None:
 
 def test_paused_says_go_on(bar: RunBar) -> None:
     bar.show_view(VIEWS["paused"])
-    assert bar.run.text() == "Go on"
+    assert bar.run.text() == "Resume"
     bar.show_view(VIEWS["ready"])
     assert bar.run.text() == "Run"
 
@@ -118,7 +118,7 @@ def test_restart_has_the_place_of_run_and_is_filled_once_the_blocks_differ(bar: 
     bar.show_view(replace(VIEWS["running"], edited=True))
     assert (bar.run.text(), bar.run.kind, bar.restart.isVisible()) == ("Restart", "run", False)
     bar.show_view(replace(VIEWS["paused"], edited=True))
-    assert (bar.run.text(), bar.restart.isVisible()) == ("Go on", True)
+    assert (bar.run.text(), bar.restart.isVisible()) == ("Resume", True)
     bar.show_view(VIEWS["paused"])
     assert not bar.restart.isVisible()
 
@@ -149,7 +149,7 @@ def test_the_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     [
         ("running", False, True, "Greeting runs, 14 s"),
         ("proven", True, False, "all 2 robots stopped (41 ms)"),
-        ("unanswered", False, False, "Turtle did not answer; switch it off by hand"),
+        ("unanswered", False, False, "Turtle did not respond; switch it off by hand"),
         ("paused", True, False, "Greeting is paused"),
     ],
 )
@@ -210,7 +210,7 @@ def test_in_a_narrow_window_the_sentence_has_room_beside_what_a_stop_brought(qtb
 
 def test_a_long_good_result_leaves_room_for_a_fault(qtbot, bar: RunBar) -> None:
     good = "the robot of the second group and all others have stopped (41 ms), as far as anybody can tell"
-    fault = replace(VIEWS["proven"], title="Stopped by a problem after 14 s", result=good)
+    fault = replace(VIEWS["proven"], title="Stopped after 14 s because of an error", result=good)
     bar.resize(1093, 60)
     bar.show_view(fault)
     qtbot.waitUntil(lambda: bar.sentence.width() >= 180)

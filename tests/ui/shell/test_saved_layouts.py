@@ -56,7 +56,7 @@ def use(window: MainWindow, commands: Commands, name: str) -> None:
 def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, commands: Commands) -> None:
     before = opened(shown)
     keep_as(shown, commands, "Only topics")
-    assert shown.toast.text == "Kept the layout “Only topics”"
+    assert shown.toast.text == "Saved layout “Only topics”"
     for name in before - {"topics"}:
         shown.bench.docks[name].close()
     assert menu(shown, commands) == {"Behaviour": False, "Developer": False, "Only topics": True}
@@ -69,7 +69,7 @@ def test_a_layout_gets_a_name_and_the_built_in_one_stays(shown: MainWindow, comm
 def test_names_that_cant_be_are_said(shown: MainWindow, commands: Commands) -> None:
     sheet = keep_as(shown, commands, "developer")
     assert sheet.isVisible()
-    assert sheet.wrong.text() == "“developer” is there already."
+    assert sheet.wrong.text() == "“developer” already exists."
     sheet.field.setText("x" * 41)
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert "40 letters" in sheet.wrong.text()
@@ -142,7 +142,7 @@ def test_a_damaged_layout_is_as_at_first_and_said_in_the_console(
     window.commands.run("layout.developer")
     assert {"topics", "inspector", "image", "console"} <= opened(window)
     said = [record.text for record in session.console.records]
-    assert "The layout “Developer” could not be put back; it is as at first." in said
+    assert "Can't restore the layout “Developer”; using its default." in said
     assert window.saved_layouts.all() == ()
     window.close()
 
@@ -184,22 +184,20 @@ def test_what_can_not_be_written_is_not_said_to_be_kept(shown: MainWindow, comma
     path.unlink()
     path.mkdir()  # as a disk that can't be written
     keep_as(shown, commands, "Two")
-    assert shown.toast.text == "“Two” is kept until Studio closes: it can't be saved"
+    assert shown.toast.text == "Can't save “Two”: it is kept only until Studio closes"
     assert "Two" in menu(shown, commands)
     shown.session.tick()
     alert = next(each for each in shown.session.alerts.active if each.id == "settings")
-    assert alert.title == "What you choose now is forgotten when Studio ends."
+    assert alert.title == "Settings you change now are lost when Studio closes."
     commands.run("layout.delete")
-    assert shown.toast.text == "“Two” comes back at the next start: the change can't be saved"
+    assert shown.toast.text == "Can't save this change: “Two” will return at the next start"
     commands.behaviours.forget_recent()
-    assert (
-        shown.toast.text == "The list of recent files comes back at the next start: the change can't be saved"
-    )
+    assert shown.toast.text == "Can't save this change: the recent files will return at the next start"
     commands.run("robots.ask")
-    assert shown.toast.text == "Studio asks again before a real robot moves, until Studio ends"
+    assert shown.toast.text == "Studio will ask again before a real robot moves, until you close it"
     path.rmdir()
     keep_as(shown, commands, "Three")
-    assert shown.toast.text == "Kept the layout “Three”"
+    assert shown.toast.text == "Saved layout “Three”"
     shown.session._next_check = 0.0
     shown.session.tick()
     assert not shown.session.alerts.has("settings")

@@ -110,8 +110,8 @@ def test_recent_files_that_are_gone_say_so_and_the_list_can_be_cleared(
     entries = {entry.text(): entry.isEnabled() for entry in lists._recent.actions() if entry.text()}
     assert entries == {
         "there": True,
-        "gone (not there any more)": False,
-        "Clear the list of recent files": True,
+        "gone (missing)": False,
+        "Clear recent files": True,
     }
     commands.run("file.forget_recent")
     assert settings.recent_known == []

@@ -23,7 +23,7 @@ from app.ui.widgets.lists.entry_list import Heading
 from tests.ui.shell_parts import PANELS, Answers, PlainPanel
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
-MORE = "One more beside it"
+MORE = "Open another panel to the side"
 
 
 class TopicPanel(PlainPanel):
@@ -222,7 +222,7 @@ def test_the_menu_and_the_palette_know_them(bench, window) -> None:
     entries["Inspector 2"].trigger()
     assert "inspector#2" not in bench.docks
     found = {entry.words: entry for entry in window.commands.view._entries.all()}
-    window.commands.view.do(found["One more: Inspector"])
+    window.commands.view.do(found["Another panel: Inspector"])
     assert "inspector#2" in bench.docks
 
 
@@ -233,8 +233,8 @@ def test_one_more_is_found_in_the_palette(bench, window, qtbot) -> None:
     palette = window.findChild(Palette)
     assert palette is not None
     lines = palette.rows.lines.lines
-    assert "One more panel" in [line.words for line in lines if isinstance(line, Heading)]
-    palette.field.setText("One more: Inspector")
+    assert "Another panel" in [line.words for line in lines if isinstance(line, Heading)]
+    palette.field.setText("Another panel: Inspector")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert "inspector#2" in bench.docks
     assert bench.docks["inspector#2"].isVisible()

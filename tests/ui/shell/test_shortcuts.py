@@ -235,7 +235,7 @@ def test_a_new_key_works_at_once_everywhere(
     choose(sheet, "Pause")
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_F7)
-    assert sheet.said.text() == "“Pause” has F7 now."
+    assert sheet.said.text() == "The shortcut of “Pause” is now F7."
     assert commands.actions["run.pause"].shortcut() == QKeySequence("F7")
     assert window.tool_bar.pause.toolTip() == "Pause (F7)"
     paused: list[str] = []
@@ -309,10 +309,10 @@ def test_keys_are_taken_away_and_reset(sheet: ShortcutSheet, commands: Commands)
     assert keys.of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
     sheet._take_away()
-    assert sheet.said.text() == "Stop has only F12 now."
+    assert sheet.said.text() == "Stop now has only F12."
     assert keys.of("run.stop") == ("F12",)
     sheet._take_away()
-    assert sheet.said.text() == "Stop keeps F12."
+    assert sheet.said.text() == "F12 always remains a shortcut of Stop."
 
 
 def test_ctrl_enter_in_the_palette_leads_here(

@@ -76,7 +76,7 @@ def test_who_is_new_is_offered_the_first_steps_before_all_else(qtbot, page: Star
     qtbot.waitUntil(lambda: cards(page)[0] is page.learn_card)
     assert page.learn_card.width() > max(card.width() for card in cards(page)[1:])
     assert filled(page) == ["First steps"]
-    assert "First steps: five minutes" in words(page)
+    assert "First steps (five minutes)" in words(page)
     button = page.focusWidget()
     assert isinstance(button, Button)
     assert button.text() == "First steps"
@@ -130,8 +130,8 @@ def test_open_work_stands_first_and_leads_back(page: StartPage) -> None:
     )
     assert "Open now" in words(page)
     assert [row.accessibleName() for row in page.open_work.rows] == [
-        "Go on with Greeting, not saved yet",
-        "Go on with Quiz, runs now",
+        "Continue with Greeting, not saved yet",
+        "Continue with Quiz, runs now",
     ]
     told: list[str] = []
     page.work_chosen.connect(told.append)

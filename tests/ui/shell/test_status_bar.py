@@ -38,9 +38,9 @@ def test_health_agrees_with_the_health_panel(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.values["battery"] = 7
-    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")
-    link.last_stop, link.last_stop_status = "not answered, at 8:41", "error"
-    assert facts(session).health() == ("circle-x", "Pepper: 2 to look at", "error")
+    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to check", "warn")
+    link.last_stop, link.last_stop_status = "not confirmed, at 8:41", "error"
+    assert facts(session).health() == ("circle-x", "Pepper: 2 to check", "error")
 
 
 def test_a_robot_that_has_told_nothing_is_connected_and_not_well(session: fakes.Session) -> None:
@@ -56,7 +56,7 @@ def test_a_robot_that_has_gone_is_to_be_looked_at(session: fakes.Session) -> Non
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
     link.connected = False
-    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to look at", "warn")
+    assert facts(session).health() == ("triangle-alert", "Pepper: 1 to check", "warn")
 
 
 def test_health_without_a_robot() -> None:
@@ -68,17 +68,17 @@ def test_saving_is_said_with_its_time(session: fakes.Session) -> None:
     session.document.saved_at = 8 * 3600 + 41 * 60
     assert facts(session).saved()[1] == "Saved 8:41"
     session.document.dirty = True
-    assert facts(session).saved()[1] == "Not saved, kept safe"
+    assert facts(session).saved()[1] == "Not saved · backed up"
 
 
 def test_work_that_the_disk_does_not_take_is_not_called_safe(session: fakes.Session) -> None:
     session.document.dirty = True
     session.document._journal_error = (
-        "unsaved work can't be kept (No space left on device); save the file now"
+        "can't back up unsaved work (No space left on device); save the file now"
     )
-    assert facts(session).saved() == ("circle-x", "Not saved, not kept", "error")
+    assert facts(session).saved() == ("circle-x", "Not saved · no backup", "error")
     session.document._journal_error = None
-    assert facts(session).saved()[1] == "Not saved, kept safe"
+    assert facts(session).saved()[1] == "Not saved · backed up"
 
 
 def test_traffic_counts_live_topics_only(session: fakes.Session) -> None:
@@ -100,14 +100,14 @@ def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) 
     session.traffic.shown_30s = session.traffic.sent_30s = 900
     assert facts(session).shown()[1] == ""
     session.traffic.sent_30s = 4900
-    assert facts(session).shown()[1] == "Shown 900 of 4\u2009900 in 30 s"
+    assert facts(session).shown()[1] == "900 of 4 900 shown in 30 s"
 
 
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
         ("connected", "Master 127.0.0.1:7780"),
-        ("searching", "Looking for the master 127.0.0.1:7780"),
+        ("searching", "Searching for the master 127.0.0.1:7780"),
         ("none", "No master"),
     ],
 )
@@ -138,7 +138,7 @@ def test_facts_without_words_leave_no_gap(qtbot, theme: Theme) -> None:
         (["ready", "ready"], "ready", ("2 robots", "ok")),
         (["ready", "silent"], "running", ("Robot 2: camera silent", "error")),
         (["silent"], "running", ("Camera silent", "error")),
-        (["silent", "silent"], "running", ("2 robots silent", "error")),
+        (["silent", "silent"], "running", ("2 robots not responding", "error")),
     ],
 )
 def test_the_chip_of_the_robots(states: list[str], run: str, chip: tuple[str, str]) -> None:

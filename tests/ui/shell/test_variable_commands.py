@@ -59,7 +59,7 @@ def typed(sheet: NameSheet, words: str) -> NameSheet:
 def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.new")
     sheet = sheet_of(shown)
-    assert sheet.heading.text() == "Name of the new variable"
+    assert sheet.heading.text() == "New variable"
     assert (sheet.field.text(), sheet.field.selectedText()) == ("count", "count"), "it can be taken as it is"
     assert sheet.button.isEnabled()
     assert not typed(sheet, "").button.isEnabled()
@@ -69,7 +69,7 @@ def test_a_new_variable_is_asked_for_and_made(shown: MainWindow, commands: Comma
     assert not sheet.isVisible()
     assert editor(shown).edited == [{"do": "new", "name": "points", "list": False}]
     commands.run("variable.new_list")
-    assert (sheet.heading.text(), sheet.field.text()) == ("Name of the new list", "list")
+    assert (sheet.heading.text(), sheet.field.text()) == ("New list", "list")
     QTest.keyClick(typed(sheet, "names").field, Qt.Key.Key_Return)
     assert editor(shown).edited[1] == {"do": "new", "name": "names", "list": True}
 
@@ -100,7 +100,7 @@ def test_a_used_name_is_said_while_it_is_typed(shown: MainWindow, commands: Comm
 def test_another_name_may_differ_in_capitals_only(shown: MainWindow, commands: Commands) -> None:
     commands.run("variable.rename:s")
     sheet = sheet_of(shown)
-    assert (sheet.heading.text(), sheet.field.text()) == ("Another name for “Score”", "Score")
+    assert (sheet.heading.text(), sheet.field.text()) == ("New name for “Score”", "Score")
     QTest.keyClick(typed(sheet, "score").field, Qt.Key.Key_Return)
     assert editor(shown).edited == [{"do": "rename", "id": "s", "name": "score"}]
     commands.run("variable.rename:gone")

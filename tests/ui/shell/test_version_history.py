@@ -60,7 +60,7 @@ def test_each_save_makes_a_version_that_says_what_is_different(
         commands.run("file.save")
     sheet = opened(qtbot, commands, shown)
     assert sheet.heading.text() == "Earlier versions of Mine"
-    other = "1 block; since then 1 added, 1 removed"
+    other = "1 block, 1 added, 1 removed since"
     assert rows(sheet) == [("Today", other), ("Today", other)]
     assert sheet.rows.hasFocus()
 
@@ -120,8 +120,8 @@ def test_versions_of_other_files_of_that_name_stand_below(qtbot, commands, shown
         keep_earlier(saved(tmp_path / folder / "Mine.nepb"))
     commands.files.open(tmp_path / "here" / "Mine.nepb")
     sheet = opened(qtbot, commands, shown)
-    same = ("Today", "1 block, the same as now")
-    assert rows(sheet) == [same, ("Of other files called Mine", ""), same]
+    same = ("Today", "1 block, unchanged since")
+    assert rows(sheet) == [same, ("Versions of other files named Mine", ""), same]
 
 
 def test_with_none_it_says_what_makes_one(qtbot, commands, shown, tmp_path: Path) -> None:
@@ -150,10 +150,10 @@ def test_when_in_plain_words() -> None:
 
 
 def test_what_is_different_in_plain_words() -> None:
-    assert difference_words(Difference(14)) == "14 blocks, the same as now"
-    assert difference_words(Difference(1, moved=True)) == "1 block, put in another order"
+    assert difference_words(Difference(14)) == "14 blocks, unchanged since"
+    assert difference_words(Difference(1, moved=True)) == "1 block, reordered"
     found = Difference(14, added=3, removed=1, changed=2)
-    assert difference_words(found) == "14 blocks; since then 3 added, 1 removed, 2 changed"
+    assert difference_words(found) == "14 blocks, 3 added, 1 removed, 2 changed since"
 
 
 def test_many_versions_stay_inside_the_window(qtbot, commands, shown, tmp_path: Path) -> None:

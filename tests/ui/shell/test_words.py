@@ -142,13 +142,15 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
     look("start page", window)
     window.start.show_all(True)
     look("all examples", window.start)
-    window.session.alerts.put("one", "error", _("Nothing runs"), button=_("Try again"), action="panel:topics")
-    window.session.alerts.put("two", "error", _("Nothing runs"))
+    window.session.alerts.put(
+        "one", "error", _("Nothing is running"), button=_("Try again"), action="panel:topics"
+    )
+    window.session.alerts.put("two", "error", _("Nothing is running"))
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()
         window._show_facts()
-        window.toast.say(_("Nothing runs"), _("Undo"), lambda: None)
+        window.toast.say(_("Nothing is running"), _("Undo"), lambda: None)
         for view in views():
             bar.show_view(view)
             look(f"{layout}, {view.state}", window)

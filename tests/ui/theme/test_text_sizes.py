@@ -42,7 +42,7 @@ VIEWS = (
     RunView(
         "proven",
         "Stopped after 14 s",
-        "The dashed outline shows where",
+        "The dashed block is where it stopped",
         "",
         can_run=True,
         can_step=True,
@@ -51,13 +51,13 @@ VIEWS = (
     ),
     RunView(
         "unanswered",
-        "Turtle did not answer",
+        "Turtle did not respond",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
-        "Turtle did not answer; switch it off by hand",
+        "Turtle did not respond; switch it off by hand",
         stop_word="Stop again",
         result="1 of 2 robots stopped",
         result_status="error",
-        confirm="Turtle is still",
+        confirm="Turtle isn't moving",
     ),
 )
 OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
@@ -179,7 +179,7 @@ def test_the_window_cuts_no_words(
     window.tick()
     look("start page")
     alerts = window.session.alerts
-    title, detail = "The camera of Pepper has been silent for 4 s.", "The behaviour waits for a face."
+    title, detail = "The camera of Pepper has sent nothing for 4 s.", "The behaviour waits for a face."
     alerts.put("one", "error", title, detail, button="Open the connection doctor", action="panel:topics")
     alerts.put("two", "error", "Another one.", button="Look", action="panel:topics")
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):

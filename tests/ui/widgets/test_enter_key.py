@@ -16,7 +16,7 @@ from app.ui.widgets import Button
 def window(qtbot) -> QWidget:
     made = QWidget()
     column = QVBoxLayout(made)
-    made.button, made.field = Button(Theme("light"), "Do it"), QLineEdit()
+    made.button, made.field = Button(Theme("light"), "Activate"), QLineEdit()
     column.addWidget(made.button)
     column.addWidget(made.field)
     made.pressed = []

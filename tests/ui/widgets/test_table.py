@@ -219,7 +219,7 @@ def test_a_right_click_on_the_head_offers_the_columns(qtbot, qapp, view) -> None
     view.horizontalHeader().customContextMenuRequested.emit(QPoint(10, 10))
     menu = qapp.activePopupWidget()
     assert menu is not None
-    assert [action.text() for action in menu.actions() if action.text()] == ["Rate", "As at first"]
+    assert [action.text() for action in menu.actions() if action.text()] == ["Rate", "Default columns"]
     menu.close()
 
 

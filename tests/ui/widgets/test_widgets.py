@@ -99,8 +99,8 @@ def test_a_press_on_the_track_goes_there(slider: SliderWithUnit) -> None:
 @pytest.mark.parametrize(
     ("typed", "sentence"),
     [
-        ("2", "The most is 1 m."),
-        ("-3", "The least is -1 m."),
+        ("2", "The maximum is 1 m."),
+        ("-3", "The minimum is -1 m."),
         ("far", "This needs a number."),
         ("nan", "This needs a number."),
     ],
@@ -177,9 +177,9 @@ def test_an_icon_button_says_its_name_and_key(theme: Theme) -> None:
 
 
 def test_run_keeps_its_width_when_it_becomes_go_on(theme: Theme) -> None:
-    button = RunButton(theme, "Run", "play", widest="Go on")
+    button = RunButton(theme, "Run", "play", widest="Resume")
     before = button.sizeHint()
-    button.set_word("Go on")
+    button.set_word("Resume")
     assert button.sizeHint() == before
 
 
@@ -304,7 +304,7 @@ def test_controls_grow_with_their_text(theme: Theme, percent: int) -> None:
 
 def test_an_empty_place_that_is_low_says_its_words_without_the_picture(qtbot, theme: Theme) -> None:
     theme.apply()
-    empty = EmptyState(theme, "eye", "No robot, no sensors", "Connect a robot to see what it feels.")
+    empty = EmptyState(theme, "eye", "No robot connected", "Connect a robot to see what it feels.")
     place = QWidget()
     qtbot.addWidget(place)
     empty.setParent(place)
@@ -391,11 +391,11 @@ def test_tab_goes_through_rows_and_not_into_the_window_of_a_dropped_list(qtbot) 
 def test_a_steady_label_is_laid_out_anew_only_for_more_room(qtbot) -> None:
     label = SteadyLabel("body", "text")
     qtbot.addWidget(label)
-    label.setText("shown 15 of 15/s")
+    label.setText("15 fps (15 shown)")
     wide = label.sizeHint()
     label.setText("1/s")
     assert (label.text(), label.accessibleName(), label.sizeHint()) == ("1/s", "1/s", wide)
-    label.setText("shown 15 of 15/s, and more")
+    label.setText("shown 15 of 15/s, or more")
     assert label.sizeHint().width() > wide.width()
     label.setText("")
     assert label.sizeHint().width() < 10

@@ -130,7 +130,7 @@ def mapped(value: object, low: object, high: object, new_low: object, new_high: 
         number(each, what) for each in (value, low, high, new_low, new_high)
     )
     if first == last:
-        raise BehaviourError(_("{name} needs a first range of two different numbers.").format(name=_(what)))
+        raise BehaviourError(_("The first range of {name} needs two different numbers.").format(name=_(what)))
     return to_first + (found - first) * (to_last - to_first) / (last - first)
 
 

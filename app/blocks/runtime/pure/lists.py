@@ -92,7 +92,7 @@ def join_items(of: object, between: object) -> str:
         size += len(pieces[-1]) + len(joint)
         if size > LONGEST_TEXT:
             raise BehaviourError(
-                _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+                _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
             )
     return joint.join(pieces)
 
@@ -196,7 +196,7 @@ def _read(of: object) -> Sequence[object]:
     if isinstance(of, (list, tuple)):
         return of
     if of is None:
-        raise BehaviourError(_("This list is not known yet."), unknown=True)
+        raise BehaviourError(_("This list has no value yet."), unknown=True)
     said = _("This needs a list, not {kind}.")
     if of == 0 and isinstance(of, int):
         said = _("This needs a list, not {kind}. Set the variable to an empty list first.")
@@ -224,8 +224,8 @@ def _index(items: Sequence[object], where: object) -> int:
         raise BehaviourError(_("“item number” needs a whole number, not {place}.").format(place=text(place)))
     if not 1 <= place <= len(items):
         said = ngettext(
-            "The list has {count} item; there is no item {number}.",
-            "The list has {count} items; there is no item {number}.",
+            "The list has only {count} item; it has no item {number}.",
+            "The list has only {count} items; it has no item {number}.",
             len(items),
         )
         raise BehaviourError(said.format(count=len(items), number=text(place)))
@@ -277,4 +277,4 @@ def _size(value: object, enough: int) -> int:
 
 
 def _full() -> BehaviourError:
-    return BehaviourError(_("The list is full: it has room for {most} items.").format(most=MOST_ITEMS))
+    return BehaviourError(_("The list is full: it can have at most {most} items.").format(most=MOST_ITEMS))

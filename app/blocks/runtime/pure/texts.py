@@ -41,8 +41,8 @@ def letter(of: object, where: object) -> str:
         )
     if not 1 <= wanted <= len(all_of_it):
         said = ngettext(
-            "The text has {count} letter; there is no letter {number}.",
-            "The text has {count} letters; there is no letter {number}.",
+            "The text has only {count} letter; it has no letter {number}.",
+            "The text has only {count} letters; it has no letter {number}.",
             len(all_of_it),
         )
         raise BehaviourError(said.format(count=len(all_of_it), number=text(wanted)))
@@ -114,7 +114,7 @@ def replaced(of: object, old: object, new: object) -> str:
         return whole
     if len(whole) + whole.count(before) * (len(after) - len(before)) > LONGEST_TEXT:
         raise BehaviourError(
-            _("This text is too long: more than {most} characters.").format(most=LONGEST_TEXT)
+            _("This text is too long. Use at most {most} characters.").format(most=LONGEST_TEXT)
         )
     return whole.replace(before, after)
 
@@ -130,7 +130,7 @@ def number_in(value: object) -> int | float:
         return number(value, lazy("“number in”"))
     found = _written(value)
     if found is None:
-        raise BehaviourError(_("There is no number in “{text}”.").format(text=text(value)[:60]))
+        raise BehaviourError(_("“{text}” has no number in it.").format(text=text(value)[:60]))
     return found
 
 

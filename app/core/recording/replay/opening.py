@@ -40,7 +40,7 @@ def open_recording(path: Path, progress: Progress, opener: RecordingOpener | Non
             said = _("it has {count} topics; at most {most} can be shown")
             raise RecordingError(str(path), said.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
-            raise RecordingError(str(path), _("it holds no message that can be read"))
+            raise RecordingError(str(path), _("it has no message that can be decoded"))
         return OpenedRecording(recording, Bookmarks(recording), recording.figures())
     except BaseException:
         recording.close()

@@ -347,10 +347,10 @@ class Replay:
         recording = opened.recording
         if recording.is_complete:
             return
-        title = _("{name} was cut off or not closed. Everything up to {seconds} s is there.").format(
+        title = _("{name} was not closed properly. Everything up to {seconds} s was recovered.").format(
             name=self.name, seconds=number(recording.duration_s, ".1f")
         )
-        detail = _("To make a copy that is closed: nep recording repair {file}").format(file=self.path)
+        detail = _("To make a repaired copy: nep recording repair {file}").format(file=self.path)
         self._alerts.put(NOT_CLOSED, "info", title, detail)
 
     def _take_jump(self, messages: Sequence[Message], now: float) -> None:

@@ -236,7 +236,7 @@ class ReplaySending:
             return ""
         wanted = name.strip() or recorded
         if recorded not in self.routes and len(self.routes) >= MOST_NAMES:
-            return _("So many topics are sent that no more can be; take one away first.")
+            return _("No more topics can be sent. Remove one first.")
         try:
             check_topic(wanted)
         except BadTopicError as error:
@@ -255,7 +255,7 @@ class ReplaySending:
         if opened is None or not self.routes:
             return _("Choose a topic first.")
         if not self.is_known:
-            return _("It is still being read which topics move robots; try again in a moment.")
+            return _("Still finding out which topics move robots. Try again in a moment.")
         why_not = self._acting.arm(for_replay=True)
         if why_not:
             return why_not
@@ -295,7 +295,7 @@ class ReplaySending:
         topic = opened.recording.topics[route.recorded]
         self._acting.tell_moved(route.target, "replay")
         self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
-        self._say(route, _("is sent as it is played"))
+        self._say(route, _("sent as it is played"))
         self._changed()
 
     def end(self) -> None:
@@ -369,7 +369,7 @@ def sent_words(sent: SentTopic) -> str:
 
 def late_words(count: int) -> str:
     """How many were left out: "3 left out, being late"."""
-    said = ngettext("{count} left out, being late", "{count} left out, being late", count)
+    said = ngettext("{count} late message skipped", "{count} late messages skipped", count)
     return said.format(count=count)
 
 

@@ -165,8 +165,8 @@ def _words(topic: str, names: Sequence[str]) -> str:
     if not names:
         return ""
     if names == [topic]:
-        return _("a message on {topic} moves a robot that nobody has allowed to move").format(topic=topic)
-    said = _("it moves {robots}, which nobody has allowed")
+        return _("a message on {topic} would move a robot that is not allowed to move").format(topic=topic)
+    said = _("it would move {robots}, which is not allowed")
     return said.format(robots=listed(list(names)))
 
 

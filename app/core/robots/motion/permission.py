@@ -55,7 +55,7 @@ class Question:
     @property
     def title(self) -> str:
         """In bold: "Let Rover move?"."""
-        return _("Let {robots} move?").format(robots=listed(list(self.names)))
+        return _("Allow {robots} to move?").format(robots=listed(list(self.names)))
 
     @property
     def sentence(self) -> str:
@@ -69,9 +69,9 @@ class Question:
         ]
         if self.strangers:
             names = listed([_stranger(each) for each in self.strangers])
-            said = _("The message may move {robot}, which Studio does not know.")
+            said = _("The message may move {robot}, which Studio doesn't know.")
             told.append(said.format(robot=names))
-        return _("{moves} See that nobody stands in the way. Stop is F12, at any time.").format(
+        return _("{moves} Make sure nobody is in the way. Press F12 to stop at any time.").format(
             moves=" ".join(told)
         )
 

@@ -152,5 +152,5 @@ class StopLine:
     @property
     def untold(self) -> str:
         """Why the robot can't be told, in a sentence."""
-        why = self.error or _("there is no way to it yet; press Stop again")
-        return _("{robot} can't be told: {why}").format(robot=self.name, why=why)
+        why = self.error or _("not connected yet; press Stop again")
+        return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)

@@ -25,20 +25,20 @@ MAX_MOTIONS = 64
 """Limit of motions of one robot that are tracked by id; further ones end only with a Stop."""
 
 _SENTENCES = {
-    "form": lazy("{robot} got a command from a form and has not answered since"),
-    "behaviour": lazy("{robot} got a command from a behaviour and has not answered since"),
-    "shelf": lazy("{robot} got a command from a message of the publish shelf and has not answered since"),
-    "key": lazy("{robot} got a command from a key and has not answered since"),
-    "alarm": lazy("{robot} got a command from an alarm and has not answered since"),
-    "replay": lazy("{robot} got a command from a replayed recording and has not answered since"),
-    "bridge": lazy("{robot} got a command from a bridge and has not answered since"),
-    "image": lazy("{robot} got a command from a click on a picture and has not answered since"),
-    "program": lazy("{robot} got a command from a Python program and has not answered since"),
-    "action": lazy("{robot} could not end an action and has not answered since"),
-    "stop": lazy("{robot} has not answered Stop"),
+    "form": lazy("{robot} received a command from a form and has not responded since"),
+    "behaviour": lazy("{robot} received a command from a behaviour and has not responded since"),
+    "shelf": lazy("{robot} received a command from a saved message and has not responded since"),
+    "key": lazy("{robot} received a command from a key and has not responded since"),
+    "alarm": lazy("{robot} received a command from an alarm and has not responded since"),
+    "replay": lazy("{robot} received a command from a replayed recording and has not responded since"),
+    "bridge": lazy("{robot} received a command from a bridge and has not responded since"),
+    "image": lazy("{robot} received a command from a click on an image and has not responded since"),
+    "program": lazy("{robot} received a command from a Python program and has not responded since"),
+    "action": lazy("{robot} could not end an action and has not responded since"),
+    "stop": lazy("{robot} has not confirmed Stop"),
 }
 """Sentences by kind of sender; `_OTHER` for unknown kinds."""
-_OTHER = lazy("{robot} got a command and has not answered since")
+_OTHER = lazy("{robot} received a command and has not responded since")
 
 
 def ignore_moved(_names: Sequence[str], _by: str) -> None:

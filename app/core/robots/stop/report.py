@@ -49,8 +49,8 @@ class RobotStop:
         if self.answered or not self.can_confirm:
             return ""
         if self.program and self.refused:
-            return _("{error} (says “{program}”)").format(error=self.error, program=self.program)
-        return self.error or _("{robot} did not answer").format(robot=self.who)
+            return _("{error} (from “{program}”)").format(error=self.error, program=self.program)
+        return self.error or _("{robot} did not respond").format(robot=self.who)
 
     @property
     def sentence(self) -> str:
@@ -65,9 +65,9 @@ class RobotStop:
                 robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}"
             )
         if self.program and not self.can_confirm:
-            return _("{robot} hears the commands too and cannot confirm").format(robot=self.who)
+            return _("{robot} also receives the commands and can't confirm").format(robot=self.who)
         if not self.can_confirm:
-            return _("{robot}: stop sent; this robot cannot confirm").format(robot=self.name)
+            return _("{robot}: Stop sent; this robot can't confirm").format(robot=self.name)
         return _("{wrong}. Switch it off by hand.").format(wrong=self.wrong)
 
     @property
@@ -156,7 +156,7 @@ class StopReport:
 
 def not_reached(name: str, why: str = "") -> RobotStop:
     """The line of a robot that could not be told to stop, and why."""
-    words = _("{robot} was not told to stop: {why}") if why else _("{robot} was not told to stop")
+    words = _("Stop was not sent to {robot}: {why}") if why else _("Stop was not sent to {robot}")
     return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 

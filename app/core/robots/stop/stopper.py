@@ -378,7 +378,7 @@ class RobotStopper:
                 way.publisher.publish(command)
                 sent = True
             except NepError as failed:
-                error = _("{robot} can't be told: {why}").format(robot=robot.name, why=failed)
+                error = _("Stop can't be sent to {robot}: {why}").format(robot=robot.name, why=failed)
         return "" if sent else error
 
     # ---- answers

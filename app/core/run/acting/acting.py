@@ -70,9 +70,9 @@ class ArmQuestion:
     @property
     def sentence(self) -> str:
         """What would move; no names: a robot that the recording knows, or any that listens."""
-        said = _("{topic} moves {robots}. See that nobody stands in the way; Stop is F12.")
+        said = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
-            said = _("{topic} tells robots what to do. See that nobody stands in the way; Stop is F12.")
+            said = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
             return said.format(topic=self.topic)
         return said.format(topic=self.topic, robots=listed(list(self.robots)))
 
@@ -124,7 +124,7 @@ class SessionActing:
         While a recording shows only who sends ``for_replay`` can.
         """
         if self._session.is_replaying and not for_replay:
-            return _("A recording shows: go back to live to send.")
+            return _("A recording is open. Return to live to send.")
         was_on = self.arming.is_on
         self.arming.arm(self.armed_s)
         self.revision += 1
@@ -159,7 +159,7 @@ class SessionActing:
             self.revision += 1
             return ""
         if not self.arming.allow(target, is_confirmed=is_sure):
-            return _("Not armed, or too many names are: take one away first.")
+            return _("Not armed, or too many names. Remove one first.")
         self.revision += 1
         if then is not None:
             then()
@@ -220,7 +220,7 @@ class SessionActing:
     def problem_of(self, message: KeptMessage) -> str:
         """Why a message can't be sent, as a sentence; empty when it can, once it is armed."""
         if not is_written(message.msg_type):
-            said = _("Messages of the type {type} can't be written by hand.")
+            said = _("Messages of type {type} can't be edited by hand.")
             return said.format(type=message.msg_type)
         read = None if is_plain(message.msg_type) else read_json(message.text)
         if read is not None and read.fault is not None:
@@ -258,13 +258,13 @@ class SessionActing:
         if not rate_hz:
             self.outbox.send(order)
         elif not self.outbox.begin(order, rate_hz):
-            return _("So many messages are sent again and again that no more can be; end one first.")
+            return _("No more messages can be sent repeatedly. Stop one first.")
         self.revision += 1
         return ""
 
     def _not_now(self) -> str:
         """Why nothing can be written or called by hand now: a recording shows, which can be armed itself."""
-        return _("A recording shows: go back to live to send.") if self._session.is_replaying else ""
+        return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
         """None when something may be sent there now; else why not.
@@ -293,7 +293,7 @@ class SessionActing:
         if record is None or record.again is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
-            return _("Not armed for {name}: nothing is sent.").format(name=record.name)
+            return _("Not armed for {name}: sending is off.").format(name=record.name)
         return record.again()
 
     def end(self, message_id: str) -> None:
@@ -398,8 +398,8 @@ class SessionActing:
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
             self._written = -1  # tried again in a second
-            said = _("They stay until Studio ends: {reason}.").format(reason=error.strerror or error)
-            title = _("The kept messages can't be saved.")
+            said = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
+            title = _("The saved messages can't be saved.")
             self._session.alerts.put("messages:kept", "warn", title, said, count=0)
 
     def close(self) -> None:
@@ -431,13 +431,13 @@ class SessionActing:
 
         def parse(data: bytes) -> tuple[Shelf, str]:
             shelf, unread = read_shelf(data)
-            said = ngettext("{count} message could not be read", "{count} messages could not be read", unread)
+            said = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return shelf, said.format(count=unread) if unread else ""
 
         kept = read_kept(path, parse, NewerShelfError, MOST_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
-            title = _("Kept messages could not be read.")
+            title = _("Saved messages could not be read.")
             self._session.alerts.put("messages:file", "warn", title, kept.problem)
         return kept.value if kept.value is not None else Shelf()
 
@@ -451,10 +451,10 @@ def result_words(result: SendResult) -> str:
     if result.kind == "sent":
         return heard_words(result.heard)
     if result.kind == "began":
-        return _("began")
+        return _("started")
     words = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
     if result.skipped:
-        left_out = ngettext("{count} left out, being late", "{count} left out, being late", result.skipped)
+        left_out = ngettext("{count} late message skipped", "{count} late messages skipped", result.skipped)
         words = f"{words}, {left_out.format(count=result.skipped)}"
     parts = (words if result.count else "", result.sentence)
     return ", ".join(filter(None, parts)) or words
@@ -463,16 +463,16 @@ def result_words(result: SendResult) -> str:
 def heard_words(count: int) -> str:
     """How many hear it: "heard by 2", "nobody hears it"."""
     return (
-        ngettext("heard by {count}", "heard by {count}", count).format(count=count)
+        ngettext("received by {count}", "received by {count}", count).format(count=count)
         if count
-        else _("nobody hears it")
+        else _("no subscribers")
     )
 
 
 def call_words(record: CallRecord) -> str:
     """How a call ended: "answered in 412 ms", "no answer in 2 s"."""
     if record.state == "answered":
-        return _("answered in {time}").format(time=time_words(record.took_s))
+        return _("replied in {time}").format(time=time_words(record.took_s))
     return record.sentence
 
 

@@ -28,7 +28,7 @@ ANSWERS_KEPT = 20
 ANSWER_LETTERS = 1_000_000
 MOST_CLIENTS = 20
 
-State = Literal["waiting", "answered", "failed", "given up"]
+State = Literal["waiting", "answered", "failed", "canceled"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class ServiceCalls:
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
         """Call it; ``words`` are the request as it is shown. Raises `NepError` while one is waited for."""
         if self.waiting is not None:
-            raise NepError(_("Wait for the answer of {service} first.").format(service=self.waiting.service))
+            raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
         timeout_s = min(MOST_S, max(LEAST_S, timeout_s))
         record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
         now = _UnderWay(record.number, self._arming.turn, self._clock())
@@ -128,7 +128,7 @@ class ServiceCalls:
 
     def give_up(self) -> None:
         """Wait no longer for the answer; it may still be carried out."""
-        self._end_now("given up", _("given up; it may still be carried out"))
+        self._end_now("canceled", _("canceled; the server may still carry it out"))
 
     def tick(self) -> list[CallRecord]:
         """Take over how calls have ended; those that did since the last time, also those given up."""
@@ -141,7 +141,7 @@ class ServiceCalls:
         waiting, now = self.waiting, self._now
         has_begun = now is None or now.future is not None  # then its client counts the time
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
-            said = _("no master was there within {time} s").format(time=number(waiting.timeout_s))
+            said = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._end_now("failed", said)
         done, self._done = self._done, []
         return done
@@ -156,7 +156,7 @@ class ServiceCalls:
 
     def close(self) -> None:
         """Wait for nothing any more; its node closes the clients."""
-        self._end_now("given up", _("given up; it may still be carried out"))
+        self._end_now("canceled", _("canceled; the server may still carry it out"))
         self._clients.clear()
 
     # ---- inside
@@ -209,7 +209,7 @@ class ServiceCalls:
                     now.future = client.call_async(request, record.timeout_s)
 
             if not self._arming.if_armed(now.turn, target, call_it):
-                raise NepError(_("not called: it was no longer armed"))
+                raise NepError(_("not called: no longer armed"))
         except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this call
             said = str(error) if isinstance(error, NepError) else error_words(error)
             self._ended.append(_Ended(record.number, "failed", 0.0, said))
@@ -246,9 +246,9 @@ class ServiceCalls:
 def reason_of(error: Exception, timeout_s: float) -> str:
     """Why there is no answer, in a few words: "no answer in 2 s", "refused: no face in sight"."""
     if isinstance(error, NoServerError):
-        return _("nobody serves it")
+        return _("no server")
     if isinstance(error, WaitTimeoutError):
-        return _("no answer in {time} s").format(time=number(timeout_s))
+        return _("no reply within {time} s").format(time=number(timeout_s))
     if isinstance(error, ServiceError):
-        return _("refused: {reason}").format(reason=error.reason)
+        return _("rejected: {reason}").format(reason=error.reason)
     return str(error) if isinstance(error, NepError) else error_words(error)

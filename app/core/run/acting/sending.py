@@ -158,7 +158,7 @@ class Outbox:
                 text = _text_of(value) if len(made.data) <= KEPT_BYTES else ""
                 self._tell(SendResult(order, "sent", heard=publisher.subscribers, text=text))
             else:
-                self._tell(SendResult(order, "failed", _("not sent: it was no longer armed")))
+                self._tell(SendResult(order, "failed", _("not sent: no longer armed")))
 
         self._submit("", self._guarded(order, asked_s, send_it))
 
@@ -233,7 +233,7 @@ class Outbox:
         def run(node: Node) -> None:
             try:
                 if self._clock() - asked_s > LATE_S:
-                    raise NepError(_("not sent: no master was there"))
+                    raise NepError(_("not sent: there was no master"))
                 job(node)
             except NepError as error:
                 self._tell(SendResult(order, "failed", str(error)))

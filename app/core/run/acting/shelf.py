@@ -186,12 +186,12 @@ def read_shelf(data: bytes) -> tuple[Shelf, int]:
     try:
         value = json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise NepError(_("it is no JSON")) from error
+        raise NepError(_("it is not JSON")) from error
     listed = value.get("messages") if isinstance(value, dict) else None
     if not isinstance(value, dict) or not isinstance(listed, list):
         raise NepError(_("it has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT:
-        raise NewerShelfError(_("it was kept by a newer Studio"))
+        raise NewerShelfError(_("it was saved by a newer Studio"))
     made = [_message(each) for each in listed[:MOST_MESSAGES]]
     good = {each.id: each for each in made if each is not None}
     requests = value.get("requests")

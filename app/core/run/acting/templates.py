@@ -32,11 +32,9 @@ def is_plain(msg_type: str) -> bool:
 def text_of_message(message: Message) -> str:
     """A message as text to begin with. Raises `NepError` for what can't be written by hand."""
     if message.size_bytes > MOST_LETTERS:
-        raise NepError(_("The last message is too large to be changed by hand."))
+        raise NepError(_("The last message is too large to edit by hand."))
     if not is_written(message.msg_type):
-        raise NepError(
-            _("Messages of the type {type} can't be written by hand.").format(type=message.msg_type)
-        )
+        raise NepError(_("Messages of type {type} can't be edited by hand.").format(type=message.msg_type))
     payload = message.payload
     return payload if isinstance(payload, str) and is_plain(message.msg_type) else pretty(payload)
 

@@ -18,9 +18,9 @@ from nep.programs.alarms.rule import problem_of
 from nep.programs.alarms.sentences import seen_words
 
 TROUBLES = {
-    "missing": lazy("the newest message has no such value"),
-    "no_number": lazy("the value is no number"),
-    "unreadable": lazy("the newest message can't be read"),
+    "missing": lazy("the newest message has no such field"),
+    "no_number": lazy("the value is not a number"),
+    "unreadable": lazy("the newest message can't be decoded"),
 }
 
 
@@ -36,7 +36,7 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
         case "faulty":
             problem = problem_of(rule)
             if not rule.condition.name or problem is None:
-                return _("not yet finished"), "off", None
+                return _("not finished yet"), "off", None
             return problem.sentence, "warn", None
         case "off":
             return _("off"), "off", None
@@ -47,13 +47,13 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
         words = _("{seen}, snoozed until {clock}") if seen else _("snoozed until {clock}")
         return words.format(seen=seen, clock=until), "warn", "bell-off"
     if state.phase == "on":
-        lasts = _("on for {time}").format(time=seconds_words(state.on_for_s))
+        lasts = _("active for {time}").format(time=seconds_words(state.on_for_s))
         is_told = bool(seen) and rule.condition.kind != "silent"
         words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
         return words, severity_of(rule.condition), None
     if state.phase == "pending":
-        return seen or _("so for a moment"), "warn", None
-    return seen or _("well"), "ok", None
+        return seen or _("true for a moment"), "warn", None
+    return seen or _("OK"), "ok", None
 
 
 def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
@@ -63,7 +63,7 @@ def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: d
     last = alarms.history.last(rule.id)
     if retry_s is not None and last is not None and last.deeds:
         parts.append(
-            _("{what}; tried again in {time}").format(
+            _("{what}; next try in {time}").format(
                 what=last.deeds[-1].words, time=seconds_words(round(retry_s))
             )
         )
@@ -104,16 +104,16 @@ def history_columns(
     def lasted(record: AlarmRecord) -> Cell:
         if record.is_on:
             on_s = max(0.0, now().timestamp() - record.at_s)
-            return Cell(_("{time}, on").format(time=seconds_words(on_s)), role=condition(record))
+            return Cell(_("{time}, active").format(time=seconds_words(on_s)), role=condition(record))
         return Cell(seconds_words(record.lasted_s) if record.lasted_s is not None else "")
 
     return (
         Column("when", lazy("When"), 136, when, key=lambda record: record.at_s, figures=False),
         Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.words),
-        Column("times", lazy("Times"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
+        Column("times", lazy("Count"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
                key=lambda record: record.count, figures=True, yields=2),
         Column("lasted", lazy("Lasted"), 84, lasted, key=lambda record: record.lasted_s, figures=True),
-        Column("did", lazy("Did"), 210, lambda record: Cell(deeds_words(record), role="textSecondary"),
+        Column("did", lazy("Actions"), 210, lambda record: Cell(deeds_words(record), role="textSecondary"),
                tip=deeds_words, yields=1),
     )  # fmt: skip
 
@@ -121,7 +121,7 @@ def history_columns(
 def deeds_words(record: AlarmRecord) -> str:
     """What was done: "restart_lidar did not answer, sound"; "nothing, snoozed"."""
     if record.was_snoozed and not record.deeds:
-        return _("nothing, snoozed")
+        return _("none, snoozed")
     return ", ".join(deed.words for deed in record.deeds)
 
 

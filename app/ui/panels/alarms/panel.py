@@ -100,7 +100,7 @@ class AlarmsPanel(PanelWidget):
             self.theme,
             "bell",
             _("No alarms yet"),
-            _("Right click a value, topic or node."),
+            _("Right-click a value, topic or node."),
             [EmptyAction(_("New alarm"), self.begin, "plus", primary=True)],
         )
 
@@ -139,10 +139,10 @@ class AlarmsPanel(PanelWidget):
         foot.setContentsMargins(12, 3, 12, 4)
         foot.setSpacing(6)
         hint = ElidedLabel("small", "textTertiary")
-        hint.setText(_("A right click on any value, topic or node makes an alarm"))
+        hint.setText(_("Right-click a value, topic or node to create an alarm"))
         self.line = LinkButton(self.theme, _("nep watch"))
-        self.line.setToolTip(plain.tip(_("Copies the line that watches over them without a window")))
-        self.line.setAccessibleName(_("Copy the line for a terminal: nep watch"))
+        self.line.setToolTip(plain.tip(_("Copies the command that watches these alarms without a window")))
+        self.line.setAccessibleName(_("Copy the command for a terminal: nep watch"))
         self.line.clicked.connect(self._copy_line)
         foot.addWidget(hint, 1)
         foot.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
@@ -216,7 +216,9 @@ class AlarmsPanel(PanelWidget):
         count = len(self.rows)
         words = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
         self.count.setText(words if count else "")
-        self.chip.set(ngettext("{count} on", "{count} on", on).format(count=on) if on else "", "error")
+        self.chip.set(
+            ngettext("{count} active", "{count} active", on).format(count=on) if on else "", "error"
+        )
 
     def _show_history(self) -> None:
         history = self.alarms.history
@@ -231,7 +233,7 @@ class AlarmsPanel(PanelWidget):
         before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
         words_today = _("today {today}, yesterday {yesterday}") if before else _("today {today}")
         said = words_today.format(today=today, yesterday=before)
-        self.history_count.setText(said if len(history) else _("nothing happened yet"))
+        self.history_count.setText(said if len(history) else _("no events yet"))
         for widget in (self.filter, self.export):
             widget.setVisible(len(history) > 0)
         if len(history) and not self.rows:
@@ -461,7 +463,7 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         group = QActionGroup(menu)
         for calm_s in CALM_CHOICES_S:
-            said = _("On until it was well for {time}").format(time=time_words(calm_s))
+            said = _("Active until all was well for {time}").format(time=time_words(calm_s))
             action = menu.addAction(said)
             action.setCheckable(True)
             action.setChecked(rule.calm_s == calm_s)
@@ -520,7 +522,7 @@ class AlarmsPanel(PanelWidget):
         try:
             write_atomically(path, csv_text(self.alarms.history.records).encode("utf-8"))
         except OSError as error:
-            said = _("{file} can't be written: {reason}.")
+            said = _("Can't write {file}: {reason}.")
             self.session.alerts.put(
                 "alarms:csv", "warn", said.format(file=path.name, reason=error.strerror or error)
             )

@@ -35,7 +35,7 @@ _TEMPLATES: Mapping[str, str] = {
     "comes": lazy("When {subject} {kind}"),
 }
 KIND_WORDS: Mapping[str, str] = {
-    "silent": plazy("alarm", "silent"),
+    "silent": plazy("alarm", "not responding"),
     "rate_below": plazy("alarm rate", "fewer than"),
     "rate_above": plazy("alarm rate", "more than"),
     "loses": plazy("alarm", "loses more than"),
@@ -46,7 +46,7 @@ KIND_WORDS: Mapping[str, str] = {
     "is_not": plazy("alarm", "is not"),
     "changes": plazy("alarm", "changes"),
     "leaves": plazy("alarm", "leaves"),
-    "comes": plazy("alarm", "comes"),
+    "comes": plazy("alarm", "joins"),
 }
 MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
     (
@@ -63,15 +63,15 @@ MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
         ("is_not", lazy("A value is not")),
         ("changes", lazy("A value changes")),
     ),
-    (("leaves", lazy("A node leaves")), ("comes", lazy("A node comes"))),
+    (("leaves", lazy("A node leaves")), ("comes", lazy("A node joins"))),
 )
 """The kinds, in the groups of a menu."""
 SLOT_NAMES: Mapping[str, str] = {
-    "subject": lazy("What it is about"),
+    "subject": lazy("Subject"),
     "value": lazy("Value"),
-    "kind": lazy("What must be so"),
+    "kind": lazy("Condition"),
     "limit": lazy("Limit"),
-    "time": lazy("For how long"),
+    "time": lazy("Duration"),
     "add": lazy("Add an action"),
     "action": lazy("Action"),
     "name": lazy("Name"),
@@ -327,9 +327,9 @@ def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
             return _(SEPARATORS)
         case "time":
-            return _("Write a time such as 2 s, 1.5 min or 250 ms.")
+            return _("Enter a time such as 2 s, 1.5 min or 250 ms.")
         case "payload":
-            return _("Write the message as JSON, such as {example}.").format(example='{"x": 1}')
+            return _("Enter the message as JSON, such as {example}.").format(example='{"x": 1}')
         case _:
             return ""
 

@@ -73,7 +73,7 @@ class AlarmRow(QWidget):
         """Show the rule; slots that stay keep the keyboard."""
         said = condition_words(rule.condition)
         self.setAccessibleName(said)
-        self.switch.setAccessibleName(_("Watch over it: {condition}").format(condition=said))
+        self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
         self.switch.setChecked(rule.is_on)
         self.snooze.set_icon("bell" if snoozed else "bell-off")
         self.snooze.set_name(_("End the snooze") if snoozed else _("Snooze for 10 min"))

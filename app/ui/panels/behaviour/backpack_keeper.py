@@ -80,12 +80,12 @@ class BackpackKeeper:
         made: list[Packed] = []
         if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
             words = ngettext(
-                "Put {count} block into the backpack", "Put {count} blocks into the backpack", count
+                "Added {count} block to the backpack", "Added {count} blocks to the backpack", count
             )
             ids = [item.id for item in made]
             said = words.format(count=count)
             if left:
-                said = _("{what}. Notes stay here: it keeps blocks only.").format(what=said)
+                said = _("{what}. Notes were left out: the backpack holds blocks only.").format(what=said)
             self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
 
     def _take_out(self, take: Callable[[], list[Packed]], *, emptied: bool) -> None:

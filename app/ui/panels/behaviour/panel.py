@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 LIVE_EVERY = 6  # refreshes of 30 a second: words on sensor blocks are renewed five times a second
 PINNED = "toolbox_pinned"
 ALARMS = frozenset({NOT_STOPPED, STOPPING, "silent"})
-WAIT_WORDS = lazy("Getting the blocks ready.")
+WAIT_WORDS = lazy("Loading blocks.")
 WAIT_UNTIL_S = 0.5
 WANTED = {"robot": "robots.virtual", "examples": "help.examples"}
 """The commands behind the buttons of an empty canvas."""
@@ -245,7 +245,7 @@ class BehaviourPanel(PanelWidget):
             return None
         editor.changed.connect(self._edited)
         editor.recovered.connect(
-            lambda: self.context.toast(_("The block editor was started again. Undo begins anew."))
+            lambda: self.context.toast(_("The block editor was restarted. Undo history was cleared."))
         )
         editor.history_changed.connect(self._history)
         editor.key_pressed.connect(self._key)
@@ -506,7 +506,7 @@ def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
     found = []
     for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):
         running = runs.active and runs.document is document
-        where = str(document.path) if document.path is not None else _("Not saved in a file yet")
+        where = str(document.path) if document.path is not None else _("Not saved to a file yet")
         found.append(
             TabFacts(
                 document.key,

@@ -49,7 +49,7 @@ class ProgramView(QPlainTextEdit):
         self.setProperty("bare", "true")
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
-        self.setAccessibleName(_("The program in Python"))
+        self.setAccessibleName(_("Python program"))
         self.document().setDocumentMargin(16)
         self._colours = _Colours(self.document(), theme)
         EditMenu(theme, self)

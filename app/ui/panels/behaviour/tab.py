@@ -69,9 +69,9 @@ class BehaviourTab(PaintedButton):
         self.facts = facts
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
-        states = [word for word, so in ((_("not saved"), facts.dirty), (_("runs"), facts.runs)) if so]
+        states = [word for word, so in ((_("not saved"), facts.dirty), (_("running"), facts.runs)) if so]
         self.say(facts.name, ", ".join([facts.name, *states]))
-        said = _("The behaviour that shows") if current else _("Another open behaviour")
+        said = _("The active behaviour") if current else _("Another open behaviour")
         self.setAccessibleDescription(said)
         self.setToolTip(plain.tip(facts.tip or self.accessibleName()))
         self.update()
@@ -214,7 +214,7 @@ class NameField(QLineEdit):
         """``why_not`` says in a sentence why a name can't be had, "" when it can."""
         super().__init__(name, parent)
         self._theme, self._why_not, self._ended = theme, why_not, False
-        self.setAccessibleName(_("Name of the behaviour"))
+        self.setAccessibleName(_("Behaviour name"))
         self.setProperty("focusRadius", theme.radius("small"))
         self.setMaxLength(MOST_LETTERS)
         self.setFont(theme.font("label"))

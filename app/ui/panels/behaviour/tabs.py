@@ -288,10 +288,10 @@ class BehaviourTabs(QWidget):
             (_("Duplicate"), "copy", "tab.duplicate"),
             (_("Save"), "save", "tab.save"),
             (_("Save as"), "", "tab.save_as"),
-            (_("Show the file's folder"), "folder-open", "tab.folder"),
+            (_("Show in folder"), "folder-open", "tab.folder"),
             ("", "", ""),
             (_("Close"), "x", "tab.close"),
-            (_("Close the others"), "", "tab.close_others"),
+            (_("Close other behaviours"), "", "tab.close_others"),
         ):
             if not command:
                 menu.addSeparator()

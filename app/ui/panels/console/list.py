@@ -245,7 +245,7 @@ class LineList(QListView):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName(_("What happened, newest first"))
+        self.setAccessibleName(_("Events, newest first"))
         self.setUniformItemSizes(True)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -270,8 +270,8 @@ class FindWords(SearchField):
     left = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, _("Find words"))
-        self.setAccessibleName(_("Find words in the lines"))
+        super().__init__(theme, _("Find text"))
+        self.setAccessibleName(_("Find text in the lines"))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:

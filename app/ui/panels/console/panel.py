@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from app.core.console import ConsoleRecord
 
 FROM = {
-    "debug": lazy("Everything, also details"),
+    "debug": lazy("All, including details"),
     "all": lazy("Everything"),
     "warn": lazy("Warnings and errors"),
     "error": lazy("Errors only"),
@@ -55,7 +55,7 @@ class ConsolePanel(PanelWidget):
         self._unseen = 0
         self.level = "all"
         self.node = ""
-        self.filter = IconButton(self.theme, "filter", _("Choose what is shown"), size=26)
+        self.filter = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
         self.words = FindWords(self.theme)
@@ -64,7 +64,7 @@ class ConsolePanel(PanelWidget):
         self.words.hide()
         self.model = ConsoleModel()
         self.list = self._make_list()
-        self.empty = EmptyState(self.theme, "terminal", _("Nothing happened yet"), "")
+        self.empty = EmptyState(self.theme, "terminal", _("No events yet"), "")
         self.newer = Button(self.theme, "", "arrow-up", size="small")
         self.newer.setParent(self.list)
         self.newer.hide()
@@ -99,7 +99,7 @@ class ConsolePanel(PanelWidget):
         self._copy_all.triggered.connect(self._copy_everything)
         self._clear = QAction(_("Clear"), self)
         self._clear.triggered.connect(self.clear)
-        self._find = QAction(_("Find words"), self)
+        self._find = QAction(_("Find text"), self)
         self._find.triggered.connect(self.focus_filter)
         return made
 
@@ -152,7 +152,7 @@ class ConsolePanel(PanelWidget):
             said = ngettext("{count} new", "{count} new", self._unseen)
             self.newer.set_word(said.format(count=grouped(self._unseen)), "arrow-up")
         else:
-            self.newer.set_word(_("To the newest"), "arrow-up")
+            self.newer.set_word(_("Jump to newest"), "arrow-up")
         self.newer.setVisible(away)
         self.newer.adjustSize()
         self._place_newer()
@@ -165,14 +165,14 @@ class ConsolePanel(PanelWidget):
     def _say_nothing(self) -> None:
         chosen = self.level in {"warn", "error"} or self.node or self.words.text()
         if not chosen:
-            self.empty.say(_("Nothing happened yet"), _("What programs and robots say appears here."))
+            self.empty.say(_("No events yet"), _("Log messages of programs and robots appear here."))
             self.empty.set_actions([self.why()])
         elif self.node or self.words.text():
-            self.empty.say(_("No line fits"), _("Show all lines again, or wait for one that fits."))
+            self.empty.say(_("No matching lines"), _("Show all lines, or wait for a matching one."))
             self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
         else:
             said = _("Choose “{everything}” to see all lines.").format(everything=_(FROM["all"]))
-            self.empty.say(_("No problem was told"), said)
+            self.empty.say(_("No problems reported"), said)
             self.empty.set_actions([])
 
     def hindrances(self) -> list[Hindrance]:
@@ -210,7 +210,7 @@ class ConsolePanel(PanelWidget):
         self.refresh()
 
     def _name_filter(self) -> None:
-        said = _("Shown: {level} of {node}") if self.node else _("Shown: {level}")
+        said = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
         self.filter.set_name(said.format(level=_(FROM[self.level]), node=self.node))
         self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
@@ -222,7 +222,7 @@ class ConsolePanel(PanelWidget):
         nodes = sorted({record.origin for record in self.session.shown_console.records} | {self.node} - {""})
         if nodes:
             menu.addSeparator()
-            self._offer(menu, _("Of everybody"), not self.node, partial(self.set_node, ""))
+            self._offer(menu, _("From everyone"), not self.node, partial(self.set_node, ""))
         for node in nodes[:MOST_NODES]:
             if node:
                 self._offer(menu, node, node == self.node, partial(self.set_node, node))

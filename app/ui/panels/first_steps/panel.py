@@ -25,7 +25,7 @@ HINT_AFTER_S = 20.0
 MARK = 22
 ALL_DONE = lazy("First steps done")
 LOOSE = lazy("Drag it up until it snaps below “{start}”.")
-WHAT_NEXT = lazy("You can build, run and stop. An example shows more; each has things to try.")
+WHAT_NEXT = lazy("You can now build, run and stop a behaviour. Open an example to learn more.")
 
 
 class _Mark(QWidget):
@@ -142,13 +142,13 @@ class FirstStepsPanel(PanelWidget):
             _(WHAT_NEXT),
             [
                 EmptyAction(_("Open an example"), lambda: context.run("help.examples"), primary=True),
-                EmptyAction(_("Start again"), self.start_again),
+                EmptyAction(_("Start over"), self.start_again),
             ],
         )
         self.pages: QStackedWidget = self.show_one_of(steps, self.end)
         self.chip = Chip(self.theme, "", "off")
         self.chips = [self.chip]
-        self._again = QAction(_("Start again"), self)
+        self._again = QAction(_("Start over"), self)
         self._again.triggered.connect(self.start_again)
         self._show()
 

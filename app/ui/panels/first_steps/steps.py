@@ -29,15 +29,29 @@ class Lesson:
 
 
 STEPS: tuple[Lesson, ...] = (
-    Lesson("robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"),
-    Lesson("start", lazy("Drag “{start}” onto the page"), lazy("It is in Events, on the left."), takes=START),
-    Lesson("say", lazy("Put “{say}” below it"), lazy("It is in Speech, on the left."), takes=SAY),
-    Lesson("run", lazy("Press Run and listen"), lazy("It is green, at the top left."), button="run.run"),
-    Lesson("turn", lazy("Put “{turn}” below “{say}”"), lazy("It is in Movement, on the left."), takes=TURN),
+    Lesson("robot", lazy("Use the virtual robot"), lazy("It is part of Studio."), button="robots.virtual"),
+    Lesson(
+        "start",
+        lazy("Drag “{start}” onto the page"),
+        lazy("You'll find it under Events, on the left."),
+        takes=START,
+    ),
+    Lesson(
+        "say", lazy("Place “{say}” below it"), lazy("You'll find it under Speech, on the left."), takes=SAY
+    ),
+    Lesson(
+        "run", lazy("Press Run and listen"), lazy("The button is green, at the top left."), button="run.run"
+    ),
+    Lesson(
+        "turn",
+        lazy("Place “{turn}” below “{say}”"),
+        lazy("You'll find it under Movement, on the left."),
+        takes=TURN,
+    ),
     Lesson(
         "stop",
-        lazy("Press Run, then Stop while it turns"),
-        lazy("Stop is red, at the top right. F12 does the same."),
+        lazy("Press Run, then Stop while the robot turns"),
+        lazy("The Stop button is red, at the top right. F12 does the same."),
         button="run.run",
     ),
 )

@@ -91,7 +91,7 @@ class GraphCard(QWidget):
         self.content: CardContent | None = None
         self.title = ElidedLabel("code", "text", least=60)
         self.kind = label("", "small", role="textTertiary")
-        self.close_button = IconButton(theme, "x", _("Close the card"), size=24)
+        self.close_button = IconButton(theme, "x", _("Close"), size=24)
         self.close_button.clicked.connect(self.closed)
         self._inside = QWidget()
         self._column = QVBoxLayout(self._inside)
@@ -113,7 +113,7 @@ class GraphCard(QWidget):
         column.addWidget(self.foot)
         self._figures: list[_FigureBox] = []
         self._tables: list[_Table] = []
-        self.setAccessibleName(_("What is chosen"))
+        self.setAccessibleName(_("Selection"))
         self.hide()
 
     def _make_steps(self) -> None:
@@ -124,7 +124,7 @@ class GraphCard(QWidget):
         self.plot.clicked.connect(self._plot)
         self.alarm = Button(theme, _("New alarm"), "bell", size="form")
         self.alarm.clicked.connect(self._warn)
-        self.record = Button(theme, _("Record it"), "circle-dot", size="form")
+        self.record = Button(theme, _("Record topic"), "circle-dot", size="form")
         self.record.clicked.connect(self._record)
         self.steps = QWidget()
         flow = Flow(self.steps, gap=8, row_gap=6)
@@ -333,7 +333,7 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
     rate, sent = known_figure(topic.rate_hz), known_figure(topic.bandwidth_Bps)
     size = sent / rate if sent and rate else None
     rates = tuple(topic.rates)
-    least = _("least {rate} lately").format(rate=rate_words(min(rates))) if len(rates) > 1 else ""
+    least = _("recent minimum {rate}").format(rate=rate_words(min(rates))) if len(rates) > 1 else ""
     figures = (
         CardFigure(_("Rate"), f"{rate_words(rate)} /s" if rate is not None else "", least, rates),
         CardFigure(
@@ -380,9 +380,7 @@ def _received(received: int | None, lost: int | None) -> tuple[str, str]:
 
 
 def _more(count: int) -> str:
-    return ngettext("{count} more is not listed", "{count} more are not listed", count).format(
-        count=grouped(count)
-    )
+    return ngettext("{count} more not listed", "{count} more not listed", count).format(count=grouped(count))
 
 
 def _lost(topic: Topic) -> CardFigure:
@@ -399,7 +397,7 @@ def _latency(topic: Topic) -> CardFigure:
     newest = topic.newest
     latency = newest.latency_s if newest is not None else None
     if latency is None:
-        return CardFigure(_("Latency"), "", _("known while you look at it"))
+        return CardFigure(_("Latency"), "", _("measured while open"))
     return CardFigure(_("Latency"), latency_words(latency), _("of the newest message"))
 
 
@@ -440,7 +438,7 @@ def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: Card
         lines.append(_("pid {number}").format(number=entry.pid))
     if entry.since_ns and entry.gone_s is None:
         since = max(0.0, (facts.now_ns() - entry.since_ns) / 1e9)
-        lines.append(_("here for {age}").format(age=age_words(since - since % 10)))
+        lines.append(_("connected for {age}").format(age=age_words(since - since % 10)))
     if entry.gone_s is not None:
         lines.append(_("gone"))
     figures = (CardFigure(_("Processor"), cpu_words(entry.cpu_ratio), _("of one core")),)
@@ -483,4 +481,4 @@ def clock_words(view: GraphView | None) -> str:
     known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]
     if not known:
         return ""
-    return _("Clocks are known within {time} ms").format(time=number(max(known) / 1e6, ".1f"))
+    return _("Clock offset known to ±{time} ms").format(time=number(max(known) / 1e6, ".1f"))

@@ -63,7 +63,7 @@ from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy, ngettext
 
-SVG = FileKind(lazy("Picture that stays sharp at any size"), ".svg")
+SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
 MOST_AT_ONCE = 500
 """Lines of a scene that are made and painted in one tick."""
@@ -98,7 +98,7 @@ class GraphPanel(PanelWidget):
         self.count = label("", "small", role="textSecondary")
         self.export = Button(theme, _("Export"), "download", size="small")
         self._menu = Menu(theme, self.export)
-        for words, kind in ((_("Picture (SVG)"), SVG), (_("Graph (DOT)"), DOT)):
+        for words, kind in ((_("Image (SVG)"), SVG), (_("Graph (DOT)"), DOT)):
             self._menu.addAction(words).triggered.connect(lambda _on=False, kind=kind: self._ask_file(kind))
         self.export.clicked.connect(
             lambda: self._menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
@@ -125,7 +125,7 @@ class GraphPanel(PanelWidget):
         self._own = QAction(_("Show NEP's own topics"), self)
         self._own.setCheckable(True)
         self._own.toggled.connect(lambda on: self._choose(shows_own=on))
-        self._anew = QAction(theme.icon("refresh-cw"), _("Arrange anew"), self)
+        self._anew = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
         self._anew.triggered.connect(lambda _on=False: self._arrange_anew())
 
     def _connect(self) -> None:
@@ -275,7 +275,7 @@ class GraphPanel(PanelWidget):
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
             return
         said = _("Programs appear here as soon as they join the master.")
-        self.empty.say(_("Nobody is here yet"), said, "workflow")
+        self.empty.say(_("No nodes yet"), said, "workflow")
         doctor = EmptyAction(
             _("Open the connection doctor"), lambda: self.context.why(self, ""), "stethoscope", primary=True
         )
@@ -304,13 +304,13 @@ class GraphPanel(PanelWidget):
         words = []
         if layout.left_out:
             left = ngettext(
-                "{count} line is not drawn: there are too many",
-                "{count} lines are not drawn: there are too many",
+                "{count} line is hidden: too many to draw",
+                "{count} lines are hidden: too many to draw",
                 layout.left_out,
             )
             words.append(left.format(count=grouped(layout.left_out)))
         if layout.is_plain:
-            words.append(_("The nodes stand in rows: they could not be arranged"))
+            words.append(_("The nodes are shown in rows: no better layout was found"))
         self.note.setText(". ".join(words))
         self.note.setVisible(bool(words))
 
@@ -391,7 +391,7 @@ class GraphPanel(PanelWidget):
         if node is None:
             return []
         if node.entry is None:
-            return [RowAction(_("Open the group"), "box", lambda: self.canvas.open_group(node.key))]
+            return [RowAction(_("Expand the group"), "box", lambda: self.canvas.open_group(node.key))]
         return node_actions(self.context, node.entry.network, node.entry.name)
 
     def _chosen(self, _choice: object) -> None:
@@ -455,7 +455,7 @@ class GraphPanel(PanelWidget):
             return ""
         outgoing = [line for line in scene.graph.lines if node.key in line.sources]
         incoming = [line for line in scene.graph.lines if node.key in line.targets]
-        said = _("{node}, {facts}. Lines to others: {out}. Lines from others: {into}.")
+        said = _("{node}, {facts}. Outgoing lines: {out}. Incoming lines: {into}.")
         return said.format(
             node=node_name(node, self._host), facts=node_line(node), out=len(outgoing), into=len(incoming)
         )
@@ -500,7 +500,7 @@ class GraphPanel(PanelWidget):
         try:
             write_atomically(path, data)
         except OSError as error:
-            said = _("The graph can't be saved: {why}")
+            said = _("Can't save the graph: {why}")
             self.context.toast(said.format(why=error.strerror or str(error)))
         else:
             self.context.toast(_("Saved {name}").format(name=path.name))

@@ -23,7 +23,7 @@ class GraphTools(QWidget):
         self.filter = FilterField(theme, _("Filter the graph"))
         self.group = Segments(
             theme,
-            [("computer", _("Computer"), None), ("robot", _("Robot"), None), ("nothing", _("Nothing"), None)],
+            [("computer", _("Computer"), None), ("robot", _("Robot"), None), ("nothing", _("None"), None)],
             size="small",
             name=_("Group by"),
         )
@@ -83,7 +83,7 @@ class GraphLegend(QWidget):
             ("topic", _("topic; thicker carries more")),
             ("service", _("service")),
             ("chosen", _("chosen topic")),
-            ("gone", _("gone, or quiet")),
+            ("gone", _("gone or quiet")),
         ):
             flow.addWidget(_Entry(theme, kind, words))
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)

@@ -51,17 +51,17 @@ class LookBar(QWidget):
         self.brightness = self._slider(theme, _("Brightness"), self._set_brightness)
         self.contrast = self._slider(theme, _("Contrast"), self._set_contrast)
         maps = [(name, _(WORDS[name])) for name in COLOUR_MAPS]
-        names = [("", _("Usual colours")), *maps]
-        self.colours = ComboBox(theme, names, name=_("Colours of numbers"))
+        names = [("", _("Default colours")), *maps]
+        self.colours = ComboBox(theme, names, name=_("Colour map"))
         self.colours.activated.connect(lambda _at: self._set(replace(self.look, colours=self.colours.value)))
-        self.own_range = ToggleButton(theme, _("Own range"), "ruler")
+        self.own_range = ToggleButton(theme, _("Custom range"), "ruler")
         self.own_range.toggled.connect(self._set_own_range)
         self.low, self.high = (_EndEdit(theme, None, None) for _end in range(2))
-        for field, name in ((self.low, _("First colour from")), (self.high, _("Last colour from"))):
+        for field, name in ((self.low, _("First colour at")), (self.high, _("Last colour at"))):
             field.setAccessibleName(name)
             field.setFixedWidth(92)
             field.number.connect(lambda _value: self._read_range())
-        self.again = Button(theme, _("As it came"), "undo-2", size="small")
+        self.again = Button(theme, _("Original"), "undo-2", size="small")
         self.again.clicked.connect(lambda: self._set(PLAIN, show=True))
         flow = Flow(self, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 12, 6)

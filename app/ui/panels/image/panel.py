@@ -54,12 +54,12 @@ class ImagePanel(PanelWidget):
         self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
         self._there: bool | None = None
-        self.choose = IconButton(self.theme, "chevron-down", _("Choose a picture topic"), size=26)
+        self.choose = IconButton(self.theme, "chevron-down", _("Choose an image topic"), size=26)
         self.choose.setProperty("place", "start")
         self.choose.clicked.connect(self._show_menu)
         self.chips = [self.choose]
         self.view = ClickablePicture(self.theme)
-        self.view.setAccessibleName(_("Picture"))
+        self.view.setAccessibleName(_("Image"))
         self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
@@ -100,9 +100,9 @@ class ImagePanel(PanelWidget):
             "point": lambda: self._publish_points(on=not self.points.is_on),
         }
         self.actions_of = PictureActions(self.theme, self.view, own)
-        self._look_inside = QAction(self.theme.icon("list-tree"), _("Show in the inspector"), self)
+        self._look_inside = QAction(self.theme.icon("list-tree"), _("Open in the Inspector"), self)
         self._look_inside.triggered.connect(self._inspect)
-        self._sequence = QAction(self.theme.icon("film"), _("Record the sequence"), self)
+        self._sequence = QAction(self.theme.icon("film"), _("Record a sequence"), self)
         self._sequence.triggered.connect(self.save_sequence)
         self._line = QAction(self)
         self._line.setSeparator(True)
@@ -110,9 +110,9 @@ class ImagePanel(PanelWidget):
         self.job.saved.connect(self._saved)
         self.job.copied.connect(self._copied)
         self.job.failed.connect(self._failed)
-        self.fit = IconButton(self.theme, "maximize", _("Whole picture"), "0", size=26)
+        self.fit = IconButton(self.theme, "maximize", _("Fit image"), "0", size=26)
         self.freeze = IconButton(
-            self.theme, "snowflake", _("Freeze this picture"), "Space", checkable=True, size=26
+            self.theme, "snowflake", _("Freeze this image"), "Space", checkable=True, size=26
         )
         self.keep = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
         self.fit.clicked.connect(self.view.show_whole)
@@ -120,7 +120,7 @@ class ImagePanel(PanelWidget):
         self.keep.clicked.connect(self.save_picture)
         tune = _("Brightness, contrast and colours")
         self.tune: IconButton = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
-        self.layers = IconButton(self.theme, "layers", _("What messages draw on it"), size=26)
+        self.layers = IconButton(self.theme, "layers", _("Annotations from messages"), size=26)
         self.layers.clicked.connect(self._show_layers)
         self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
 
@@ -185,8 +185,8 @@ class ImagePanel(PanelWidget):
         if self._stream.picture is not None:
             self._page(there=True)
         elif self._stream.error:
-            self.empty.say(_("This can't be shown as a picture"), f"{self._stream.error}.", "circle-x")
-            look = EmptyAction(_("Look at the message"), self._inspect, "list-tree")
+            self.empty.say(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
+            look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
             self.empty.set_actions([look, self.why(self._topic)])
         elif self.session.replay is not None and self._there:  # before the topic's first picture
             self.view.clear()
@@ -204,12 +204,12 @@ class ImagePanel(PanelWidget):
 
     def _say_nothing(self) -> None:
         if self._topic:
-            words = _("The next picture on {topic} appears here.").format(topic=topic_words(self._topic))
-            self.empty.say(_("No pictures yet"), words, "image")
+            words = _("The next image on {topic} appears here.").format(topic=topic_words(self._topic))
+            self.empty.say(_("No images yet"), words, "image")
             self.empty.set_actions([self.why(self._topic)])
         else:
-            words = _("Pictures appear here as soon as a camera publishes them.")
-            self.empty.say(_("No pictures yet"), words, "image")
+            words = _("Images appear here as soon as a camera publishes them.")
+            self.empty.say(_("No images yet"), words, "image")
             robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
             self.empty.set_actions([robot, self.why()])
         self._page(there=False)
@@ -289,10 +289,10 @@ class ImagePanel(PanelWidget):
         self.context.toast(_("Copied the picture, {size}").format(size=size))
 
     def _failed(self, sentence: str) -> None:
-        said = _("the picture can't be kept: {reason}").format(reason=sentence)
+        said = _("can't save the image: {reason}").format(reason=sentence)
         self.session.console.add("error", "image", said)
         self.session.alerts.put(
-            "snapshot", "error", _("The picture can't be kept."), sentence, button=_("Look at the console"),
+            "snapshot", "error", _("Can't save the image."), sentence, button=_("Open the console"),
             action="panel:console",
         )  # fmt: skip
 
@@ -313,7 +313,7 @@ class ImagePanel(PanelWidget):
             action.setChecked(name in self.overlays.chosen)
             action.toggled.connect(lambda on, name=name: self.overlays.choose(name, on))
         if menu.isEmpty():
-            menu.addAction(_("No topic draws on pictures now")).setEnabled(False)
+            menu.addAction(_("No topic annotates images now")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.layers)
 
@@ -325,7 +325,7 @@ class ImagePanel(PanelWidget):
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
         if menu.isEmpty():  # Qt shows no empty menu, and would keep it
-            menu.addAction(_("No camera sends pictures now")).setEnabled(False)
+            menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.choose)
 
@@ -333,7 +333,7 @@ class ImagePanel(PanelWidget):
         for action in (self._look_inside, self._sequence):
             action.setEnabled(bool(self._topic))
         plays = self.session.replay is not None
-        self._sequence.setText(_("Save the sequence as files") if plays else _("Record the sequence"))
+        self._sequence.setText(_("Save the sequence as files") if plays else _("Record a sequence"))
         return [*self.actions_of.listed(), self._line, self._sequence, self._look_inside]
 
     def save_state(self) -> dict[str, object]:

@@ -36,7 +36,7 @@ class PointStrip(ArmedStrip):
         super().__init__(context)
 
     def off_words(self) -> str:
-        return _("A click sends nothing until this is armed")
+        return _("Clicks send nothing until armed")
 
     def arm(self) -> str:
         return self._arm()
@@ -63,14 +63,14 @@ class PointBar(QWidget):
         self.count = self.heard = 0
         theme = context.theme
         self.topic = QLineEdit()
-        self.topic.setAccessibleName(_("Topic of the points"))
+        self.topic.setAccessibleName(_("Topic for points"))
         self.topic.setMaxLength(MOST_LETTERS)
         self.topic.setMinimumWidth(round(theme.scaled(TOPIC_PX)))
         self.topic.setProperty("focusRadius", theme.radius("control"))
         self.topic.textEdited.connect(lambda _text: self._changed())
         EditMenu(theme, self.topic)
-        self.kind = ComboBox(theme, [(each, each) for each in TYPES], name=_("Type of the points"))
-        self.close_button = IconButton(theme, "x", _("Publish no points any more"), size=26)
+        self.kind = ComboBox(theme, [(each, each) for each in TYPES], name=_("Point type"))
+        self.close_button = IconButton(theme, "x", _("Stop publishing points"), size=26)
         self.close_button.clicked.connect(self.left)
         self.problem = label("", "small", role="error", wrap=True)
         self.problem.setMinimumWidth(0)
@@ -146,7 +146,7 @@ class PointBar(QWidget):
             problem = str(error) if self._pictures else ""
         self.problem.setText(problem)
         self.problem.setVisible(bool(problem))
-        self.let.set_word(_("Send them"), "lock")
+        self.let.set_word(_("Send points"), "lock")
         self.let.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
         self.refresh()
 

@@ -76,7 +76,7 @@ class SnapshotJob(QObject):
         except NepError as error:
             made = str(error)
         except OSError as error:
-            what = error.filename or _("the picture")
+            what = error.filename or _("image")
             made = f"{what}: {(error.strerror or str(error)).lower()}"
         except Exception as error:  # noqa: BLE001  a job that ends without a word would be busy for ever
             made = f"{type(error).__name__}: {error}"

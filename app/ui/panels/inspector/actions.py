@@ -52,10 +52,10 @@ class InspectorActions(QObject):
             (_("Copy the message as JSON"), "Ctrl+Shift+J", "braces", self.copy_message),
             (_("Plot"), "Ctrl+Shift+L", "chart-line", self.plot),
             (_("Find a key or value"), "Ctrl+F", "search", find),
-            (_("Next one"), "F3", "", lambda: body.finder.step(1)),
-            (_("Previous one"), "Shift+F3", "", lambda: body.finder.step(-1)),
-            (_("Message before"), "Alt+Left", "step-back", lambda: body.history.step(-1)),
-            (_("Message after"), "Alt+Right", "step-forward", lambda: body.history.step(1)),
+            (_("Next"), "F3", "", lambda: body.finder.step(1)),
+            (_("Previous"), "Shift+F3", "", lambda: body.finder.step(-1)),
+            (_("Previous message"), "Alt+Left", "step-back", lambda: body.history.step(-1)),
+            (_("Next message"), "Alt+Right", "step-forward", lambda: body.history.step(1)),
         )
         self._find = find
         panel.installEventFilter(self)
@@ -109,7 +109,7 @@ class InspectorActions(QObject):
         if path:
             self._plot(path)
         elif node is not None:
-            self._toast(_("{path} is no number, text or yes or no").format(path=node.path))
+            self._toast(_("{path} is not a number, text or boolean").format(path=node.path))
 
     def copy_message(self) -> None:
         """Put the whole message on the clipboard: JSON as it was sent, anything else as JSON."""

@@ -76,7 +76,7 @@ class InspectorBody(QWidget):
         self.finder.field.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
         modes = [("tree", _("Tree"), None), ("table", _("Table"), None), ("raw", _("Raw"), None)]
         self.mode = Segments(theme, modes, size="small", name=_("Show as"))
-        compare = _("Compare with the message before")
+        compare = _("Compare with the previous message")
         self.compare = IconButton(theme, "equal", compare, checkable=True, size=26)
         self.strip = CompareStrip(theme)
         self.query = QueryStrip()
@@ -136,7 +136,7 @@ class InspectorBody(QWidget):
         if published:
             words = _("The next message on {topic} appears here.")
         else:
-            words = _("Nobody publishes it now. The next message on {topic} appears here.")
+            words = _("No publisher now. The next message on {topic} appears here.")
         words = words.format(topic=topic)
         if words != self._waiting:
             self._waiting = words
@@ -148,7 +148,7 @@ class InspectorBody(QWidget):
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
-            self.empty.say(_("It can't be read here"), words)
+            self.empty.say(_("Can't be decoded here"), words)
             self.empty.set_actions([why])
 
     def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
@@ -157,16 +157,16 @@ class InspectorBody(QWidget):
         if topic:
             self.say_waiting(topic, published=True, why=why)
         else:
-            self.empty.say(_("Nothing chosen"), _("Click a topic to see its newest message."))
+            self.empty.say(_("Nothing selected"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
         """There is a large message; ``read`` reads it when a person asks for it."""
-        self.large.say(_("A message of {size}").format(size=size_words(size_bytes)), words)
+        self.large.say(_("Message of {size}").format(size=size_words(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:
-            action = EmptyAction(_("Read the newest one"), read, "list-tree", primary=True)
+            action = EmptyAction(_("Decode the newest"), read, "list-tree", primary=True)
             self.large.set_actions([action])
 
     def reveal(self, path: object) -> None:

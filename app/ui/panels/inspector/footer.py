@@ -57,7 +57,7 @@ def _latency_facts(message: Message) -> list[str]:
     if uncertainty_s and -uncertainty_s <= latency_s < 0:
         return [_("latency under {latency}").format(latency=latency_words(uncertainty_s))]
     if not 0 <= latency_s < 3600:
-        return [] if uncertainty_s is not None else [_("clocks of two computers, not corrected")]
+        return [] if uncertainty_s is not None else [_("clocks of two computers, uncorrected")]
     words = latency_words(latency_s)
     if uncertainty_s:
         words = _("{latency} ± {uncertainty}").format(
@@ -69,11 +69,11 @@ def _latency_facts(message: Message) -> list[str]:
 def _untold(message: Message, network: str) -> Iterator[str]:
     """What can't be known of a message, because its network does not tell it."""
     if message.seq is None and message.stamp_ns is None:
-        yield _("{network} tells no seq and no latency").format(network=network)
+        yield _("{network} does not report sequence numbers or latency").format(network=network)
     elif message.seq is None:
-        yield _("{network} tells no seq").format(network=network)
+        yield _("{network} does not report sequence numbers").format(network=network)
     elif message.stamp_ns is None:
-        yield _("{network} tells no latency").format(network=network)
+        yield _("{network} does not report latency").format(network=network)
 
 
 class Legend(QWidget):

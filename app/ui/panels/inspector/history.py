@@ -35,10 +35,10 @@ class HistoryStrip(QWidget):
         self._topic = ""
         self._said: tuple[int, int, int | None] = (0, 0, None)
         self._ticks = 0
-        self.back = IconButton(theme, "step-back", _("Message before"), size=24)
+        self.back = IconButton(theme, "step-back", _("Previous message"), size=24)
         self.track = Track(theme, 0)
         self.track.setAccessibleName(_("Messages of this topic"))
-        self.on = IconButton(theme, "step-forward", _("Message after"), size=24)
+        self.on = IconButton(theme, "step-forward", _("Next message"), size=24)
         self.newest = IconButton(theme, "chevron-last", _("Follow the newest message"), size=24)
         self.words = FixedWidthLabel("small", "textSecondary")
         self.back.clicked.connect(lambda: self.step(-1))
@@ -136,7 +136,7 @@ class HistoryStrip(QWidget):
             return _("the newest of {count}").format(count=len(self.kept))
         message = self.shown()
         if message is None:
-            return _("not kept any more")
+            return _("no longer available")
         words = _("{place} of {count}").format(place=place + 1, count=len(self.kept))
         if message.stamp_ns is not None and 0 <= message.stamp_ns < 2**62:
             words = f"{words}   {clock_words(message.stamp_ns)}"

@@ -61,12 +61,12 @@ class ObjectsView(QWidget):
         self._row_height = 26
         self.table: TableView[ObjectRow] | None = None
         self.words = ElidedLabel("small", "textSecondary")
-        self.choose = IconButton(theme, "chevron-down", _("Choose a list of the message"), size=24)
+        self.choose = IconButton(theme, "chevron-down", _("Choose a list in the message"), size=24)
         self.choose.clicked.connect(self._show_lists)
         self.copy = IconButton(theme, "copy", _("Copy the table as CSV"), size=24)
         self.copy.clicked.connect(self.copy_csv)
         self.empty = EmptyState(
-            theme, "table-2", _("No list of objects"), _("A table shows lists whose values are objects.")
+            theme, "table-2", _("No lists of objects"), _("A table shows lists whose values are objects.")
         )
         row = QHBoxLayout()
         row.setContentsMargins(12, 3, 8, 3)
@@ -205,7 +205,7 @@ class ObjectsView(QWidget):
     def _show_lists(self) -> None:
         menu = Menu(self._theme, self)
         for steps in lists_of_objects(self._value):
-            action = menu.addAction(plain.entry(path_text(steps) if steps else _("The message")))
+            action = menu.addAction(plain.entry(path_text(steps) if steps else _("Message")))
             action.setCheckable(True)
             action.setChecked(steps == self._steps)
             action.triggered.connect(lambda _on=False, steps=steps: self._choose(steps))
@@ -225,7 +225,7 @@ class ObjectsView(QWidget):
         if self._steps is not None:
             steps = (*self._steps, int(key))
             show = lambda: self.revealed.emit(steps)  # noqa: E731
-            menu.addAction(self._theme.icon("list-tree"), _("Show it in the tree"), show)
+            menu.addAction(self._theme.icon("list-tree"), _("Show in the tree"), show)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(at)
 

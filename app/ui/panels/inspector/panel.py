@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 FIRST_ROWS = 24
 FADES_HZ = 7.0  # slower than messages are shown, which paint the marks too
-BEFORE, PINNED = lazy("Message before"), lazy("Pinned message")
+BEFORE, PINNED = lazy("Previous message"), lazy("Pinned message")
 
 
 class InspectorPanel(PanelWidget):
@@ -72,7 +72,7 @@ class InspectorPanel(PanelWidget):
         theme = self.theme
         self.live = Chip(theme, "", "info", "")
         self.freeze = IconButton(theme, "snowflake", _("Freeze this panel"), checkable=True, size=26)
-        pin = _("Pin this message and compare with it")
+        pin = _("Pin this message to compare others with it")
         self.pin = IconButton(theme, "pin", pin, checkable=True, size=26)
         self.freeze.toggled.connect(lambda _on: self._refresh_now())
         self.pin.toggled.connect(self._pin)
@@ -209,7 +209,7 @@ class InspectorPanel(PanelWidget):
         elif not self.reader.ask_at_leisure(message, self.clock()):
             return
         if self._shown is None or self.body.page == LARGE:
-            self.body.say_large(message.size_bytes, _("It is being read."))
+            self.body.say_large(message.size_bytes, _("Reading the message."))
             self._page(LARGE)
 
     def _show_read(self, done: Reading) -> None:
@@ -280,15 +280,13 @@ class InspectorPanel(PanelWidget):
         self._shown = message
         self.foot.show_facts(self._facts(message))
         self.bytes.show_bytes(message.data)
-        said = _("This can't be read as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
+        said = _("Can't be decoded as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
         self.body.sentence.setText(said if sentence else "")
         self._page(RAW)
 
     def _offer_large(self, message: Message) -> None:
         self._shown = message
-        words = _("Messages of {codec} above 1 MB are read only when you ask for it.").format(
-            codec=message.codec
-        )
+        words = _("Messages of {codec} above 1 MB are decoded on request only.").format(codec=message.codec)
         self.body.say_large(message.size_bytes, words, self._read_large)
         self._page(LARGE)
 
@@ -298,7 +296,7 @@ class InspectorPanel(PanelWidget):
             self._allowed = self._shown
             self.freeze.setChecked(True)
             self.reader.ask(self._shown)
-            self.body.say_large(self._shown.size_bytes, _("It is being read."))
+            self.body.say_large(self._shown.size_bytes, _("Reading the message."))
 
     def _page(self, page: int) -> None:
         self.body.show_page(page, comparing=self.comparing)
@@ -415,7 +413,9 @@ class InspectorPanel(PanelWidget):
             menu.addSeparator()
             menu.addAction(self.theme.icon("bell"), _("New alarm"), lambda: self.context.run(what))
             publish = f"publish.topic:{self._topic}"
-            menu.addAction(self.theme.icon("send"), _("Publish to it"), lambda: self.context.run(publish))
+            menu.addAction(
+                self.theme.icon("send"), _("Publish to this topic"), lambda: self.context.run(publish)
+            )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.tree.viewport().mapToGlobal(at))
 

@@ -123,7 +123,7 @@ def image_summary(message: Message) -> Mapping[str, object]:
         [*shape, 0, 0][: max(2, len(shape))] if isinstance(shape, (list, tuple)) else (0, 0)
     )
     return {
-        "encoding": message.extension.get("encoding", _("not told")),
+        "encoding": message.extension.get("encoding", _("not reported")),
         "width": width,
         "height": height,
         "channels": depth[0] if depth else 1,

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 WORDS = TableWords(
     title=lazy("Nodes"),
     filter=lazy("Filter nodes"),
-    nothing_fits=lazy("No node has these words"),
+    nothing_fits=lazy("No matching nodes"),
     clear_the_filter=lazy("Clear the filter to see all nodes."),
-    not_recorded=lazy("A recording does not tell which programs there were"),
+    not_recorded=lazy("Recordings don't contain programs"),
 )
 SORT_EVERY = 30  # refreshes of 30 a second: what moves is sorted once a second
 LIVELY = frozenset({"cpu"})
@@ -134,7 +134,7 @@ class NodesPanel(NetworkTable[NodeRow]):
     def _say_chosen(self) -> None:
         row = self.model.row_at(self.table.currentIndex())
         shown = self.pages.currentIndex() == 0
-        words = _("Open a node to see its topics") if row is None else facts_of(row.node)
+        words = _("Expand a node to see its topics") if row is None else facts_of(row.node)
         limits = limits_of(row.node) if row is not None else ""
         if row is not None:
             limits = "\n".join(filter(None, (limits, lack_of_parameters(row.node))))
@@ -149,7 +149,7 @@ class NodesPanel(NetworkTable[NodeRow]):
         if row is None:
             return
         if row.is_pattern and self.session.topic(row.topic_key) is None:
-            said = _("{pattern} has wildcards: it stands for all topics that match")
+            said = _("{pattern} has wildcards and matches several topics")
             self.context.toast(said.format(pattern=row.topic))
         elif row.topic:
             show_messages(self.context, row.topic_key)
@@ -166,7 +166,7 @@ class NodesPanel(NetworkTable[NodeRow]):
             return (copies(self.context, row.topic),)  # it stands for many topics
         if row.topic:
             return topic_actions(self.context, row.topic_key)
-        shows = RowAction(_("Show its topics"), "list-tree", lambda: self.open_row(key))
+        shows = RowAction(_("Show topics"), "list-tree", lambda: self.open_row(key))
         return (shows, *node_actions(self.context, row.node.network, row.node.name))
 
     def _fold(self, key: str, opened: bool) -> None:

@@ -42,8 +42,8 @@ def allowed_words(parameter: ShownParameter) -> str:
     if least is not None and most is not None:
         return _("{least} to {most}").format(least=text_of(least), most=text_of(most))
     if least is not None:
-        return _("{least} and more").format(least=text_of(least))
-    return _("{most} and less").format(most=text_of(most)) if most is not None else ""
+        return _("{least} or more").format(least=text_of(least))
+    return _("{most} or less").format(most=text_of(most)) if most is not None else ""
 
 
 class ParametersPart(QWidget):
@@ -171,7 +171,7 @@ class ParametersPart(QWidget):
         for widget in (self.name, self.editors, self.button):
             paint.show_when(widget, shown)
         if parameter is None or node is None:
-            self._say(_("Choose a parameter to give it another value."))
+            self._say(_("Choose a parameter to change its value."))
             return
         self.name.setText(parameter.name)
         self.name.setToolTip(plain.tip(_tip(parameter)))

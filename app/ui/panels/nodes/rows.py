@@ -20,21 +20,22 @@ from nep.protocol.topic_pattern import is_pattern
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
 UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
-NOT_SERVED = lazy("NEP {version} is not served: nobody understands its messages. Install 0.5.4.8 or 0.5.4.5.")
+NOT_SERVED = lazy(
+    "NEP {version} is not supported: other versions can't decode its messages. Install 0.5.4.8 or 0.5.4.5."
+)
 LIMITS = lazy(
-    "A program of {nep}: it sends no numbers and no times, so what was lost and how old a message is can't "
-    "be known."
+    "A program that uses {nep}. It sends no sequence numbers or time stamps, so losses and "
+    "message ages are unknown."
 )
 LIMITS_OF_NETWORK = lazy(
-    "A node of {network}: nobody tells there in which process it runs, since when, and what it takes of a"
-    " processor."
+    "A node of {network}. This network doesn't report its process, start time or processor load."
 )
-ORIGINAL = lazy("the original NEP")
+ORIGINAL = lazy("original NEP")
 BRIDGE = lazy(
-    "A bridge: it joins topics of this network with those of another. How many messages it has carried and "
-    "lost is on {topic}."
+    "A bridge that forwards topics between this network and others. {topic} has its counts of "
+    "forwarded and lost messages."
 )
-VERSIONS = {"A": lazy("the original NEP up to 0.5.4.5"), "B": lazy("the original NEP 0.5.4.8")}
+VERSIONS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5.4.8")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +104,8 @@ def lack_of_parameters(node: NodeEntry) -> str:
         return ""
     kind = kind_named(node.network)
     if kind is not None and not kind.tells_figures:
-        return _("Parameters of nodes on {network} can't be seen here.").format(network=kind.words)
-    return _("It has no parameters: a program declares them with {call}.").format(
+        return _("Parameters of nodes on {network} can't be read.").format(network=kind.words)
+    return _("This node has no parameters. Programs declare them with {call}.").format(
         call="node.parameters.declare"
     )
 
@@ -121,7 +122,7 @@ def facts_of(node: NodeEntry) -> str:
         parts.append(node.language)
     if node.since_ns:
         clock = time.strftime("%H:%M:%S", time.localtime(node.since_ns / 1e9))
-        parts.append(_("here since {clock}").format(clock=clock))
+        parts.append(_("connected since {clock}").format(clock=clock))
     return ", ".join(parts)
 
 
@@ -145,7 +146,7 @@ def generation_cell(row: NodeRow) -> Cell:
         rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
         said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
         if row.is_pattern:
-            said = _("all that match")
+            said = _("all matching topics")
         return Cell(said, role=_ink(row, "textTertiary"))
     if row.node.is_bridge:
         return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
@@ -162,7 +163,7 @@ def cpu_cell(row: NodeRow) -> Cell:
         return _of_node(_cpu)(row)
     if row.node.cpu_ratio is not None:
         return _of_node(_cpu)(row)
-    return Cell(pgettext("figure", "not told"), role=_ink(row, "textTertiary"))
+    return Cell(pgettext("figure", "not reported"), role=_ink(row, "textTertiary"))
 
 
 def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
@@ -187,9 +188,9 @@ def _name_tip(row: NodeRow) -> str:
     if not row.topic:
         return facts_of(row.node)
     if row.is_pattern:
-        said = _("{node} subscribes all topics that match {pattern}")
+        said = _("{node} subscribes to all topics that match {pattern}")
         return said.format(node=row.node.name, pattern=row.topic)
-    said = _("{node} publishes {topic}") if row.way == PUBLISHES else _("{node} subscribes {topic}")
+    said = _("{node} publishes {topic}") if row.way == PUBLISHES else _("{node} subscribes to {topic}")
     return said.format(node=row.node.name, topic=row.topic)
 
 
@@ -198,7 +199,7 @@ def _generation_tip(row: NodeRow) -> str:
         return _name_tip(row)
     if row.node.network:
         return limits_of(row.node) or _("On {network}").format(network=generation_words(row.node))
-    said = _("Made with nep: nothing is lost unseen, every message has its number and time")
+    said = _("Uses nep: messages have sequence numbers and time stamps, and losses are counted")
     return limits_of(row.node) or said
 
 
@@ -206,7 +207,7 @@ def _cpu_tip(row: NodeRow) -> str:
     kind = kind_named(row.node.network)
     if kind is not None and row.node.cpu_ratio is None:
         return limits_of(row.node)
-    return _("The share of one processor core that its process used in the last second")
+    return _("Share of one processor core used by the process in the last second")
 
 
 COLUMNS: tuple[Column[NodeRow], ...] = (
@@ -241,7 +242,7 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         lambda r: len(r.node.subscribes), figures=True, yields=2,
     ),
     Column(
-        "since", lazy("Here for"), 62, _of_node(_since),
+        "since", lazy("Connected for"), 62, _of_node(_since),
         lambda r: r.node.since_ns, figures=True, yields=6,
     ),
 )  # fmt: skip

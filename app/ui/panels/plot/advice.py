@@ -46,7 +46,7 @@ class PlotAdvice(QWidget):
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []
         self.topic = topics[0] if topics else ""
         if self.topic:
-            said = _("Nothing came yet that can be plotted.")
+            said = _("No values that can be plotted yet.")
         self._words.setText(said)
         show_when(self.why, bool(self.topic))
         show_when(self, bool(said))

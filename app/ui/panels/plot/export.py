@@ -24,8 +24,8 @@ from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
 from nep.i18n import _, lazy
 
-CSV = FileKind(lazy("Numbers (CSV)"), ".csv")
-PNG = FileKind(lazy("Picture (PNG)"), ".png")
+CSV = FileKind(lazy("Values (CSV)"), ".csv")
+PNG = FileKind(lazy("Image (PNG)"), ".png")
 SVG = FileKind(lazy("Drawing (SVG)"), ".svg")
 RATIO = 2
 WAITS_S = 3.0
@@ -52,7 +52,7 @@ class CsvWriter:
         except OSError as error:
             self._done = error.strerror or type(error).__name__
         except MemoryError:
-            self._done = _("there is not enough memory")
+            self._done = _("not enough memory")
         else:
             self._done = ""
 
@@ -118,7 +118,7 @@ class PlotPicture:
         """As PNG, twice as fine as on the screen."""
         image = QImage(self.size * RATIO, QImage.Format.Format_RGB32)
         if image.isNull():
-            raise OSError(errno.ENOMEM, _("there is not enough memory"))
+            raise OSError(errno.ENOMEM, _("not enough memory"))
         image.setDevicePixelRatio(RATIO)
         painter = QPainter(image)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -127,7 +127,7 @@ class PlotPicture:
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
         if not image.save(buffer, "PNG"):  # type: ignore[call-overload]
-            raise OSError(errno.ENOMEM, _("there is not enough memory"))
+            raise OSError(errno.ENOMEM, _("not enough memory"))
         return bytes(buffer.data().data())
 
     def svg(self) -> bytes:
@@ -186,7 +186,7 @@ class PlotExport:
                 self._tell(path, "")
             return
         if self._writer is not None and self._writer.take() is None:
-            self._context.toast(_("The export before is not done yet"))
+            self._context.toast(_("The previous export is still running"))
             return
         curves = [each.curve for each in self._curves() if not each.hidden]
         origin_ns = self._context.session.series.origin_ns
@@ -200,7 +200,7 @@ class PlotExport:
 
     def _tell(self, path: Path, reason: str) -> None:
         if reason:
-            said = _("{file} can't be written: {reason}").format(file=path.name, reason=reason)
+            said = _("can't write {file}: {reason}").format(file=path.name, reason=reason)
         else:
             said = _("Exported {file}").format(file=path.name)
         self._context.toast(said)

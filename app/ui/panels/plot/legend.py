@@ -152,7 +152,7 @@ class LegendTable(TableView[ShownCurve]):
 
     def __init__(self, theme: Theme, model: TableModel[ShownCurve]) -> None:
         super().__init__(theme, model)
-        self.setAccessibleName(_("Curves and their figures"))
+        self.setAccessibleName(_("Curves and their values"))
         self.clicked.connect(self._press)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._show_menu)
@@ -223,7 +223,7 @@ class LegendTable(TableView[ShownCurve]):
             self.theme.icon("eye" if shown.hidden else "eye-off"), _("Show") if shown.hidden else _("Hide")
         )
         hide.triggered.connect(lambda: self.hide_or_show(shown))
-        copy = menu.addAction(self.theme.icon("copy"), _("Copy its name"))
+        copy = menu.addAction(self.theme.icon("copy"), _("Copy name"))
         copy.triggered.connect(lambda: self.chosen_copy.emit(shown.name))
         remove = menu.addAction(self.theme.icon("trash-2"), _("Remove"))
         remove.triggered.connect(lambda: self.removed.emit(shown.name))
@@ -249,27 +249,27 @@ def next_look(there: Sequence[ShownCurve]) -> CurveLook:
 
 def foot_words(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
     """What the figures are about, how far A and B are apart, and what is not there."""
-    about = _("Min, max and mean are between A and B")
-    parts = [about if has_cursors else _("Min, max and mean of what is shown")]
+    about = _("Min, max and mean between A and B")
+    parts = [about if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:
         parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
     for count, words in (
         (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
         (
             curves.unread,
-            ngettext("{count} message can't be read", "{count} messages can't be read", curves.unread),
+            ngettext("{count} message can't be decoded", "{count} messages can't be decoded", curves.unread),
         ),
         (
             curves.undone,
             ngettext(
-                "{count} point gone: the clock was set back",
-                "{count} points gone: the clock was set back",
+                "{count} point discarded: the clock was set back",
+                "{count} points discarded: the clock was set back",
                 curves.undone,
             ),
         ),
         (
             curves.forgotten,
-            ngettext("{count} old point forgotten", "{count} old points forgotten", curves.forgotten),
+            ngettext("{count} old point discarded", "{count} old points discarded", curves.forgotten),
         ),
     ):
         if count:

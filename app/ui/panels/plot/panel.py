@@ -118,7 +118,7 @@ class PlotPanel(PanelWidget):
             theme,
             "chart-line",
             _("No curves yet"),
-            _("Drag a number from the Inspector here, or type its path."),
+            _("Drag a number here from the Inspector, or type its path."),
             [EmptyAction(_("Add a curve"), self.focus_filter, "plus", primary=True)],
         )
         self.pages = QStackedWidget()
@@ -205,7 +205,7 @@ class PlotPanel(PanelWidget):
             self.add.complain(_sentence(error))
             return
         if not made:
-            self.add.complain(_("{field} is there already.").format(field=text))
+            self.add.complain(_("{field} is already shown.").format(field=text))
             return
         self.add.clear()
         self.add.shut()
@@ -328,7 +328,7 @@ class PlotPanel(PanelWidget):
         self.about.setText(foot_words(self.curves, has_cursors=both is not None, distance=distance))
         count, whole = self._points
         points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
-        words = _("{points}, all drawn") if whole else _("{points}, 2 per px")
+        words = _("{points}, all shown") if whole else _("{points}, 2 per px")
         self.points.setText(words.format(points=points))
         self.advice.show_for(self.curves, self.shown)
 
@@ -360,8 +360,8 @@ class PlotPanel(PanelWidget):
             self.view.hold((self.canvas.begin_s, self.canvas.end_s))
         else:
             self.view.go_on()
-        self.freeze.set_word(_("Go on") if paused else _("Pause"), "play" if paused else "pause")
-        self.paused.set(_("paused, the data goes on") if paused else "", "off", "pause")
+        self.freeze.set_word(_("Resume") if paused else _("Pause"), "play" if paused else "pause")
+        self.paused.set(_("paused; data is still recorded") if paused else "", "off", "pause")
         self._say_span()
         self._soon()
 

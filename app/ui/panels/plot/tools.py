@@ -94,7 +94,7 @@ class _Matches(QWidget):
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
-        self.list = EntryList(theme, _("Fields that fit"))
+        self.list = EntryList(theme, _("Matching fields"))
         self.foot = label("", "small", role="textTertiary")
         self.foot.setContentsMargins(14, 2, 10, 5)
         column = QVBoxLayout(self)
@@ -246,7 +246,7 @@ class AddCurve(SearchField):
     def _show_foot(self, count: int) -> None:
         if self._matches is None:
             return
-        words = _("Tab completes, Enter: left axis, Shift+Enter: right axis")
+        words = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
         fit = ngettext("{count} field", "{count} fields", count).format(count=count)
         self._matches.foot.setText(self.sentence or f"{words} · {fit}")
         self._matches.foot.setProperty("role", "error" if self.sentence else "textTertiary")
@@ -346,13 +346,13 @@ class PlotTools(QWidget):
             [(value, _(SPAN_WORDS[value]), None) for value, _s in SPANS],
             "60",
             size="small",
-            name=_("How much time is shown"),
+            name=_("Time range shown"),
         )
         self.cursors = ToggleButton(theme, _("A and B"), "ruler")
         self.states = ToggleButton(theme, _("States"), "rows-3")
         self.states.setChecked(True)
         self.across = ToggleButton(theme, _("X and Y"), "chart-spline")
-        self.across.setToolTip(plain.tip(_("Draw the second curve over the first")))
+        self.across.setToolTip(plain.tip(_("Plot the second curve against the first")))
         self.across.setProperty("tip", True)
         self.export = MenuButton(theme, _("Export"), "download", size="small")
         row = Flow(self, gap=8, row_gap=6)

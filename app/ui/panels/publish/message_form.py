@@ -96,7 +96,7 @@ class MessageForm(QWidget):
         EditMenu(theme, self.name)
         self.topic = TopicEdit(theme)
         self.kind = QLineEdit()
-        self.kind.setAccessibleName(_("Type of the messages"))
+        self.kind.setAccessibleName(_("Message type"))
         self.kind.setPlaceholderText("json")
         EditMenu(theme, self.kind)
         for field in (self.name, self.kind):
@@ -109,17 +109,17 @@ class MessageForm(QWidget):
 
     def _make_text(self) -> None:
         theme = self._theme
-        self.template = Button(theme, _("From the last message"), "history", kind="ghost", size="small")
-        self.template.setToolTip(plain.tip(_("Takes the topic's last message, or what its type has")))
-        self.tidy = Button(theme, _("Tidy"), "wand-sparkles", kind="ghost", size="small")
-        self.tidy.setToolTip(plain.tip(_("One line for each field")))
+        self.template = Button(theme, _("Use the last message"), "history", kind="ghost", size="small")
+        self.template.setToolTip(plain.tip(_("Copies the topic's last message, or the fields of its type")))
+        self.tidy = Button(theme, _("Format"), "wand-sparkles", kind="ghost", size="small")
+        self.tidy.setToolTip(plain.tip(_("One line per field")))
         for button in (self.template, self.tidy):
             button.let_shrink()
-        self.edit = JsonEdit(theme, _("The message"))
+        self.edit = JsonEdit(theme, _("Message"))
         self.fault_icon = StatusIcon(theme, "error", height=20)
         self.sentence = label("", "small", role="error", wrap=True)
         self.sentence.setMinimumWidth(0)
-        self.mend = Button(theme, _("Put it right"), "wrench", size="small")
+        self.mend = Button(theme, _("Fix it"), "wrench", size="small")
         self.template.clicked.connect(self.template_wanted)
         self.tidy.clicked.connect(self.make_tidy)
         self.mend.clicked.connect(self.put_right)
@@ -129,11 +129,11 @@ class MessageForm(QWidget):
     def _make_buttons(self) -> None:
         theme = self._theme
         self.send = Button(theme, _("Send"), "send", kind="primary")
-        self.send.setToolTip(plain.tip(tip_with_key(_("Sends it once"), "Ctrl+Enter")))
+        self.send.setToolTip(plain.tip(tip_with_key(_("Sends the message once"), "Ctrl+Enter")))
         self.last = ElidedLabel("small", "textSecondary")
         self.repeat = Button(theme, _("Start sending"), "repeat")
         self.rate = NumberEdit(theme, LEAST_HZ, MOST_HZ, _("/s"), 1)
-        self.rate.setAccessibleName(_("Messages a second"))
+        self.rate.setAccessibleName(_("Messages per second"))
         self.rate.setFixedWidth(round(theme.scaled(RATE_PX)))
         self.rate.number.connect(lambda value: self._edit(rate_hz=value))
         self.count = ElidedLabel("small", "textSecondary")
@@ -145,7 +145,7 @@ class MessageForm(QWidget):
         self.repeat.clicked.connect(self.repeat_wanted)
 
     def _say_rate(self, problem: str) -> None:
-        said = _("0.1 to 50 a second; ends by itself when no longer armed")
+        said = _("0.1 to 50 per second; stops when disarmed")
         self.rate_hint.setText(problem or said)
 
     def _arrange(self) -> None:
@@ -237,7 +237,7 @@ class MessageForm(QWidget):
     def say_problem(self, problem: str) -> None:
         """Why it can't be sent; empty when it can."""
         fault = self.read.fault
-        words = _("{problem} It cannot be sent yet.").format(problem=problem) if problem else ""
+        words = _("{problem} It can't be sent yet.").format(problem=problem) if problem else ""
         if words != self.sentence.text():
             self.sentence.setText(words)
         self.fault_icon.setVisible(bool(problem))

@@ -53,15 +53,15 @@ class PublishPanel(PanelWidget):
         self.header = [self.new]
         self.strip = ArmedStrip(context)
         self._minutes = ArmedMinutes(self.theme, self, self.acting)
-        self.filter = FilterField(self.theme, _("Filter the kept messages"))
+        self.filter = FilterField(self.theme, _("Filter saved messages"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ShelfList(self.theme, lambda each: state_cell(each, self.acting))
         self.form = MessageForm(self.theme, self._type_of)
         self.empty = EmptyState(
             self.theme,
             "send",
-            _("No messages kept"),
-            _("Right click a topic or a message, or begin one."),
+            _("No saved messages"),
+            _("Right-click a topic or a message, or create one."),
             [EmptyAction(_("New"), lambda: self.begin(""), "plus", primary=True)],
         )
         self._connect()
@@ -84,7 +84,7 @@ class PublishPanel(PanelWidget):
         form.template_wanted.connect(self.take_template)
 
     def _arrange(self) -> None:
-        scroll = ScrollColumn(_("The chosen message"))
+        scroll = ScrollColumn(_("Selected message"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
@@ -145,7 +145,7 @@ class PublishPanel(PanelWidget):
         self._wanted = ""
         self.list.tell_visible_changed()
         self.pages.setCurrentIndex(1 if messages else 0)
-        said = ngettext("{count} message kept", "{count} messages kept", len(messages))
+        said = ngettext("{count} saved message", "{count} saved messages", len(messages))
         self.count.setText(said.format(count=len(messages)) if messages else "")
         self._show_chosen()
 
@@ -177,7 +177,7 @@ class PublishPanel(PanelWidget):
         form.send.set_word(_("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock")
         form.repeat.setEnabled(can_send or is_going)
         form.repeat.set_word(
-            _("End sending") if is_going else _("Start sending"), "square" if is_going else "repeat"
+            _("Stop sending") if is_going else _("Start sending"), "square" if is_going else "repeat"
         )
         form.rate.setEnabled(not is_going)
         form.last.setText(self._last_words(message))
@@ -214,7 +214,7 @@ class PublishPanel(PanelWidget):
         msg_type = self._type_of(topic) or "json"
         made = kept[-1] if kept else self.acting.new_message(topic, msg_type, text_of_type(msg_type))
         if made is None:
-            said = _("{count} messages are kept, and no more can be: delete one first.")
+            said = _("You have {count} saved messages, the maximum. Delete one first.")
             self.context.toast(said.format(count=MOST_MESSAGES))
             return
         self._wanted = made.id
@@ -235,7 +235,7 @@ class PublishPanel(PanelWidget):
             self._end_peek()
             self.form.put_text(text_of_type(message.msg_type))
             if topic is None or not topic.publishers:
-                self.context.toast(_("Nobody publishes it now: these are the fields of its type"))
+                self.context.toast(_("No publisher now: these are the fields of its type"))
             return
         if topic.msg_type != message.msg_type:
             self.form.set_type(topic.msg_type)
@@ -261,7 +261,7 @@ class PublishPanel(PanelWidget):
         if self._peek is not None:
             self._peek.close()
             self._peek = None
-            self.form.template.set_word(_("From the last message"), "history")
+            self.form.template.set_word(_("Use the last message"), "history")
 
     def _changed(self, message: object) -> None:
         if isinstance(message, KeptMessage):
@@ -317,7 +317,7 @@ class PublishPanel(PanelWidget):
     def menu_of(self, id: str) -> Menu:
         """What can be done with a message of the list."""
         is_going = self.acting.outbox.is_going(id)
-        words = _("End sending") if is_going else _("Start sending")
+        words = _("Stop sending") if is_going else _("Start sending")
         actions = [
             RowAction(_("Send"), "send", self.send),
             RowAction(words, "square" if is_going else "repeat", self.repeat),

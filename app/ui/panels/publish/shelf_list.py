@@ -60,7 +60,7 @@ class ShelfList(TableView[KeptMessage]):
         )
         super().__init__(theme, TableModel(columns, lambda each: each.id))
         self.horizontalHeader().hide()
-        self.setAccessibleName(_("Kept messages"))
+        self.setAccessibleName(_("Saved messages"))
         self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
         theme.changed.connect(self.fit_rows)
         self.fit_rows()

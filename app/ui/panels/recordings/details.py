@@ -37,7 +37,7 @@ from nep.recordings.export import ALL_OF_IT, Part, takes
 
 BAR_PX = 120
 FORMAT_WORDS = {
-    "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Pictures"), "mp4": lazy("MP4"),
+    "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
 }  # fmt: skip
 """As what a recording is exported, by the names of `nep.recordings.export`."""
@@ -77,7 +77,7 @@ class RecordingDetails(QWidget):
         theme = self._theme
         self.strip = FilmStrip(theme)
         self.strip.changed.connect(self._show_part)
-        self.topics = PatternField(theme, _("Topics that are exported"), _("all topics; or /odom *camera*"))
+        self.topics = PatternField(theme, _("Topics to export"), _("all topics; or /odom *camera*"))
         self.topics.changed.connect(self._typed)
         self._is_none_chosen = False
         self.pick = ToggleButton(theme, _("From a list"), "list")
@@ -86,11 +86,11 @@ class RecordingDetails(QWidget):
         self.pick.toggled.connect(self._show_list)
         self.list.chosen.connect(self._choose_topics)
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
-        self.times = Segments(theme, times, size="small", name=_("Times"))
+        self.times = Segments(theme, times, size="small", name=_("Count"))
         self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
         self.part_words = label("", "small", role="textSecondary", wrap=True)
         self.about = label("", "small", role="textSecondary", wrap=True)
-        what = _("What the messages have. The files can be smaller or larger than that.")
+        what = _("Size of the messages. The files can be smaller or larger.")
         self.about.setToolTip(plain.tip(what))
         self.format.changed.connect(lambda _kind: self._show_part())
         self._recording: Path | None = None
@@ -99,7 +99,7 @@ class RecordingDetails(QWidget):
         self.into = ElidedLabel("body", "text", least=60)
         self.files = label("", "small", role="textSecondary")
         self.choose = Button(theme, _("Choose"), "folder-open", size="small")
-        self.choose.setAccessibleName(_("Choose the folder of what is exported"))
+        self.choose.setAccessibleName(_("Choose the export folder"))
 
     def _arrange(self) -> None:
         acts = Flow(gap=8, row_gap=6)
@@ -137,7 +137,7 @@ class RecordingDetails(QWidget):
         form.setHorizontalSpacing(12)
         form.setVerticalSpacing(8)
         form.setColumnStretch(1, 1)
-        rows = ((_("Export as"), kinds), (_("Topics"), topics), (_("Times"), times), (_("Into"), places))
+        rows = ((_("Export as"), kinds), (_("Topics"), topics), (_("Count"), times), (_("Save in"), places))
         for place, (title, row) in enumerate(rows):
             name = label(title, "small", role="textSecondary")
             form.addWidget(name, 2 * place, 0, Qt.AlignmentFlag.AlignTop)
@@ -241,7 +241,7 @@ class RecordingDetails(QWidget):
             self.part_words.setText("")
             return
         if part is None:
-            self.part_words.setText(_("No topic of it fits"))
+            self.part_words.setText(_("No matching topics in this recording"))
             return
         count = len(look.topics if part.topics is None else part.topics)
         said = ngettext("{count} of {all} topics", "{count} of {all} topics", len(look.topics))
@@ -261,7 +261,9 @@ class RecordingDetails(QWidget):
                 for each in look.topics
                 if (part.topics is None or each.name in part.topics) and takes(self.format.value, each.codec)
             }
-            words = self._size_words(look, names) if names else _("nothing of it can become that")
+            words = (
+                self._size_words(look, names) if names else _("This value can't be converted to this type")
+            )
             count = min(len(names), 1) if self.format.value == "mcap" else len(names)
         self.about.setText(words)
         self.files.setText(ngettext("{count} file", "{count} files", count).format(count=grouped(count)))

@@ -75,7 +75,7 @@ class FilmStrip(QWidget):
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
         """Whether times are those of the clock here, not from the recording's start."""
-        self.begin = StripHandle(theme, self, _("Begin of the part"))
+        self.begin = StripHandle(theme, self, _("Start of the part"))
         self.end = StripHandle(theme, self, _("End of the part"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
         self.end.moved.connect(lambda by_ns: self.set_part(self.begin_ns, self.end_ns + by_ns))

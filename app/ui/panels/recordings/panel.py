@@ -38,7 +38,7 @@ from nep.system.replace_file import replace_file
 WORDS = TableWords(
     title=lazy("Recordings"),
     filter=lazy("Filter names, notes and topics"),
-    nothing_fits=lazy("No recording has these words"),
+    nothing_fits=lazy("No matching recordings"),
     clear_the_filter=lazy("Clear the filter to see all recordings."),
 )
 ROW = 56
@@ -165,7 +165,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.count.setText(words.format(count=grouped(count), size=size) if count else "")
         self.filter.setVisible(count > 0)
         left_out = self._look.left_out
-        older = ngettext("{count} older one is not listed", "{count} older ones are not listed", left_out)
+        older = ngettext(
+            "{count} older recording not listed", "{count} older recordings not listed", left_out
+        )
         self.foot.setText(older.format(count=grouped(left_out)) if left_out else "")
         self.foot.setVisible(bool(left_out))
         self.line.setVisible(bool(left_out))
@@ -181,16 +183,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         folder = self._recordings.folder
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
         if not self._has_looked:
-            said = _("Its recordings appear here in a moment.")
-            self.empty.say(_("Looking into the folder"), said, "folder-open")
+            said = _("Recordings in this folder appear here in a moment.")
+            self.empty.say(_("Reading the folder"), said, "folder-open")
             self.empty.set_actions([])
         elif self._look.problem and is_own:
             said = _("{folder}: {reason}.").format(folder=folder, reason=self._look.problem)
-            self.empty.say(_("The folder for recordings is not there"), said, "folder-open")
+            self.empty.say(_("The recordings folder doesn't exist"), said, "folder-open")
             choose = EmptyAction(_("Choose a folder"), lambda: self.context.run("recording.folder"), "folder")
             self.empty.set_actions([choose])
         else:
-            said = _("Record, or keep the last seconds when something happened.")
+            said = _("Start recording, or save the last seconds when something happened.")
             self.empty.say(_("No recordings yet"), said, "film")
             record = EmptyAction(
                 _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", primary=True
@@ -298,7 +300,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _rename(self, key: str) -> None:
         facts = self._facts_of(key)
         if facts is None or self._is_written(facts):
-            self.context.toast(_("It is being recorded: it can be renamed when it has ended"))
+            self.context.toast(_("A recording can be renamed after it has ended"))
             return
         table = self.table
         if isinstance(table, RecordingTable):
@@ -313,7 +315,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             return False
         new = path.with_name(f"{stem}{path.suffix}")
         if new.exists():
-            self.context.toast(_("There is a recording “{name}” already").format(name=stem))
+            self.context.toast(_("A recording named “{name}” already exists").format(name=stem))
             return False
         if not self._moved(path, new):
             return False
@@ -328,7 +330,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             if beside.exists():
                 replace_file(beside, new.with_name(new.name + SIDECAR))
         except OSError as error:
-            words = _("{file} can't be renamed: {reason}")
+            words = _("Can't rename {file}: {reason}")
             self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
             return False
         return True
@@ -347,12 +349,12 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _delete(self, key: str) -> None:
         facts = self._facts_of(key)
         if facts is None or self._is_written(facts):
-            self.context.toast(_("It is being recorded: it can be deleted when it has ended"))
+            self.context.toast(_("A recording can be deleted after it has ended"))
             return
         path = facts.path
         bin_file = QFile(str(path))
         if not bin_file.moveToTrash():
-            words = _("{file} can't be moved to the bin: {reason}")
+            words = _("Can't move {file} to the bin: {reason}")
             self.context.toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
             return
         self._put(path, None)
@@ -370,7 +372,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             about = there.parent.parent / "info" / f"{there.name}.trashinfo"
             about.unlink(missing_ok=True)
         except OSError as error:
-            words = _("{file} could not be put back: {reason}")
+            words = _("Can't restore {file}: {reason}")
             self.context.toast(words.format(file=path.name, reason=(error.strerror or str(error)).lower()))
             return
         self._wanted = str(path)
@@ -379,7 +381,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
     def _show_file(self, key: str) -> None:
         path = Path(key)
         if not open_outside(QUrl.fromLocalFile(str(path.parent))):
-            self.context.toast(_("The file is {path}").format(path=path))
+            self.context.toast(_("File: {path}").format(path=path))
 
     # ---- export
 
@@ -388,7 +390,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if facts is None or self._job is not None:
             return
         if part is None:
-            self.context.toast(_("No topic of it fits"))
+            self.context.toast(_("No matching topics in this recording"))
             return
         folder = free(self.details.place() or facts.path.with_suffix(""), is_folder=True)
         self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_opener())

@@ -63,7 +63,7 @@ class RecordingTable(TableView[RecordingFacts]):
         left = row.left() + EDGE + round(self.theme.scaled(PICTURE.width())) + GAP - 8
         high = min(row.height() - 8, round(self.theme.scaled(32)))
         rect = QRect(left, row.center().y() - high // 2, max(80, row.right() - left - 8), high)
-        said = _("Name of the recording")
+        said = _("Recording name")
         self.field = RenameField(self.theme, self.viewport(), rect, name, take, said)
         self.field.ended.connect(self._renamed)
 

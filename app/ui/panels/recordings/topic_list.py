@@ -39,7 +39,7 @@ class TopicList(QWidget):
         self.count = ElidedLabel("small", "textSecondary", least=60)
         self.model: TableModel[RecordedTopic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[RecordedTopic] = TableView(theme, self.model, "topic")
-        self.table.setAccessibleName(_("Topics that are exported"))
+        self.table.setAccessibleName(_("Topics to export"))
         self.table.opened.connect(self._toggle)
         self.table.order_changed.connect(self._show_rows)
         self.table.filter_wanted.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
@@ -59,8 +59,8 @@ class TopicList(QWidget):
     def _columns(self) -> tuple[Column[RecordedTopic], ...]:
         def is_there(topic: RecordedTopic) -> Cell:
             if topic.name in self._names:
-                return Cell(icon="check", role="accentText", said=_("is exported"))
-            return Cell(icon="minus", role="textTertiary", said=_("left out"))
+                return Cell(icon="check", role="accentText", said=_("exported"))
+            return Cell(icon="minus", role="textTertiary", said=_("excluded"))
 
         def ink(topic: RecordedTopic) -> str:
             return "text" if topic.name in self._names else "textTertiary"

@@ -85,7 +85,7 @@ class RobotPanel(OneRobotPanel):
         self.header = [self.add, self.reset, self.large]
         self._make_stage()
         title = _("No robot is connected")
-        text = _("With the virtual robot you can try everything at once.")
+        text = _("With a virtual robot you can try everything right away.")
         start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
         self._no_robot = NoRobot(self.empty, title, text, [start])
@@ -96,7 +96,7 @@ class RobotPanel(OneRobotPanel):
         """The buttons that add to the room and put it back: in the title, and once more in the large room."""
         add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
         add.clicked.connect(lambda: self._show_room_menu("", None, add))
-        reset = IconButton(self.theme, "rotate-cw", _("Put the robot and its room back"), size=size)
+        reset = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
         reset.clicked.connect(self._put_back)
         return add, reset
 
@@ -124,7 +124,7 @@ class RobotPanel(OneRobotPanel):
         column.addWidget(self.view, 1)
         column.addWidget(self.say)
         self.stage = stage
-        self.sound = IconButton(self.theme, "volume-2", _("Hear the robots"), size=26)
+        self.sound = IconButton(self.theme, "volume-2", _("Unmute the robots"), size=26)
         self.sound.clicked.connect(self._switch_sound)
         self.say.add(self.sound)
         self._sound_shown: object = None
@@ -163,7 +163,7 @@ class RobotPanel(OneRobotPanel):
             action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.choose(name))
         if self._robot in self.session.launcher.wanted:
             menu.addSeparator()
-            away = menu.addAction(plain.entry(_("Put {robot} away").format(robot=self._robot)))
+            away = menu.addAction(plain.entry(_("Remove {robot}").format(robot=self._robot)))
             away.triggered.connect(
                 lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
             )
@@ -181,12 +181,12 @@ class RobotPanel(OneRobotPanel):
     def _say_nothing(self, link: RobotLink) -> None:
         self.pages.setCurrentWidget(self.empty)
         if link.virtual:
-            title = _("{robot} is coming").format(robot=link.name)
-            self.empty.say(title, _("It is drawn as soon as it tells where it is."))
+            title = _("{robot} is starting").format(robot=link.name)
+            self.empty.say(title, _("The robot is drawn as soon as it reports its position."))
             self.empty.set_actions([])
         else:
             self.empty.say(link.name, _where_to_look(link))
-            show = EmptyAction(_("Show its actions"), lambda: self.context.run("panel:robots"), "bot")
+            show = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
             self.empty.set_actions([show])
 
     def _awaited(self, event: Event, name: str) -> Sequence[str]:
@@ -210,7 +210,7 @@ class RobotPanel(OneRobotPanel):
             return
         self._sound_shown = (on, problem)
         self.sound.set_icon("volume-2" if on and not problem else "volume-x")
-        words = _("Mute the robots") if on else _("Hear the robots")
+        words = _("Mute the robots") if on else _("Unmute the robots")
         self.sound.set_name(words)
         self.sound.setAccessibleDescription(problem if on else "")
         if on and problem:
@@ -281,8 +281,8 @@ class RobotPanel(OneRobotPanel):
                 action = menu.addAction(self.theme.icon(icon), _(words))
                 action.triggered.connect(lambda _on=False, kind=kind: self._add(kind))
             menu.addSeparator()
-        menu.addAction(self.theme.icon("rotate-cw"), _("Put the room back")).triggered.connect(self._put_back)
-        start = menu.addAction(_("Begin each run at the start position"))
+        menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._put_back)
+        start = menu.addAction(_("Reset robots to their start position before each run"))
         start.setCheckable(True)
         start.setChecked(self.session.fleet.begins_at_start)
         start.triggered.connect(lambda: self.context.run("run.from_start"))
@@ -300,7 +300,7 @@ class RobotPanel(OneRobotPanel):
         x, y = room.nearest_free(state.x + 1.0, state.y + 0.9, radius)
         name = self.session.room.add(kind, x, y)
         if name is None:
-            self.context.toast(_("There is no more room for that; take something away first"))
+            self.context.toast(_("No more room. Remove something first"))
         else:
             self.view.chosen = name
 
@@ -357,12 +357,12 @@ def _where_to_look(link: RobotLink) -> str:
     """What shows how a robot is that is not drawn; only what it has is named."""
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:
-        return _("Its camera and its sensors show how it is.")
+        return _("Its camera and sensors show its state.")
     if True in images:
-        return _("Its camera shows how it is.")
+        return _("Its camera shows its state.")
     if images:
-        return _("Its sensors show how it is.")
-    return _("It tells nothing of itself, but you can try what it can do.")
+        return _("Its sensors show its state.")
+    return _("This robot reports no state, but you can try its actions.")
 
 
 PANEL = Panel("robot", lazy("Robot"), "bot", (), RobotPanel)

@@ -88,11 +88,11 @@ class RoomView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(_("The robots in their room"))
+        self.setAccessibleName(_("Robots in their room"))
         words = _(
-            "Press a head, a hand or the small robot to touch it; drag robots and things; "
-            "double click for a large room\n"
-            "Keys: Tab chooses, arrows move it, Space touches it, H L R touch head and hands"
+            "Click a head, a hand or the small robot to touch it. Drag robots and things. Double-click "
+            "for full size.\nKeys: Tab selects, arrows move, Space touches, H, L and R touch head and "
+            "hands"
         )
         self.setToolTip(plain.tip(words))
         theme.changed.connect(self.update)

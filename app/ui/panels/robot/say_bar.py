@@ -75,7 +75,7 @@ class SayBar(QWidget):
         self._robot: Robot | None = None
         self.field = SayField(theme)
         self.words = IconButton(theme, "chevron-down", _("Words to say"), size=26)
-        self.events = IconButton(theme, "zap", _("Let something happen"), size=26)
+        self.events = IconButton(theme, "zap", _("Simulate an event"), size=26)
         self.field.said.connect(self.said)
         self.field.asked.connect(self.show_words)
         self.words.clicked.connect(self.show_words)
@@ -122,7 +122,7 @@ class SayBar(QWidget):
                 lambda _on=False, word=word: self.field.say(word)
             )
         if menu.isEmpty():
-            menu.addAction(_("No program waits for a word")).setEnabled(False)
+            menu.addAction(_("No program is waiting for words")).setEnabled(False)
         self._pop_up(menu, self.words)
 
     # -- what else may happen ---------------------------------------------------------------------

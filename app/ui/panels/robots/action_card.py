@@ -61,12 +61,12 @@ class ActionCard(Card):
         self.try_button = Button(theme, _("Try"), "play")
         self.try_button.setAccessibleName(_("Try {action}").format(action=action.title))
         self.try_button.clicked.connect(self._press)
-        tries = _("Last tries of {action}").format(action=action.title)
+        tries = _("Recent tries of {action}").format(action=action.title)
         self.past = IconButton(theme, "history", tries, size=30)
         self.past.setCheckable(True)
         self.past.toggled.connect(self._show_past)
         self.past.hide()
-        self.fold = IconButton(theme, "chevron-down", _("Show its values"), size=30)
+        self.fold = IconButton(theme, "chevron-down", _("Show values"), size=30)
         self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
         self.fold.setVisible(folded and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
@@ -102,7 +102,7 @@ class ActionCard(Card):
         self._folded = folded
         self.form.setVisible(not folded and bool(self.action.parameters))
         self.fold.set_icon("chevron-down" if folded else "chevron-up")
-        self.fold.set_name(_("Show its values") if folded else _("Hide its values"))
+        self.fold.set_name(_("Show values") if folded else _("Hide values"))
         self._say_summary()
 
     def _say_summary(self) -> None:

@@ -129,10 +129,10 @@ class RobotList(QWidget):
         column = QVBoxLayout(card)
         column.setContentsMargins(14, 12, 14, 12)
         column.setSpacing(6)
-        column.addWidget(label(_("Robot not in the list?"), "label"))
-        said = _("Check that it is on and that its driver runs.")
+        column.addWidget(label(_("Is your robot missing?"), "label"))
+        said = _("Check that it is switched on and that its driver is running.")
         column.addWidget(label(said, "body", role="textSecondary", wrap=True))
-        self.why = Button(self._theme, _("Find out why"), "stethoscope", size="small")
+        self.why = Button(self._theme, _("Find the cause"), "stethoscope", size="small")
         self.why.clicked.connect(lambda: run("help.doctor"))
         self.turtle = Button(self._theme, _("Use a virtual Turtle"), "bot", kind="ghost", size="small")
         self.turtle.setAccessibleName(_("Use the virtual Turtle"))
@@ -204,7 +204,7 @@ class RobotList(QWidget):
             return None
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction(_("Find out why")).triggered.connect(lambda: self._run("help.doctor"))
+        menu.addAction(_("Find the cause")).triggered.connect(lambda: self._run("help.doctor"))
         forget = menu.addAction(plain.entry(_("Forget {robot}").format(robot=item.name)))
         forget.triggered.connect(lambda: self.forgotten.emit(item.name))
         return menu

@@ -120,7 +120,7 @@ class RobotsPanel(OneRobotPanel):
     def _lay_out(self) -> None:
         theme = self.theme
         title = _("No robot is connected")
-        text = _("What a robot can do appears here as soon as it is there.")
+        text = _("A robot's actions appear here once it is connected.")
         start = EmptyAction(
             _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot", primary=True
         )
@@ -159,7 +159,7 @@ class RobotsPanel(OneRobotPanel):
         scroll = ScrollColumn(_("Actions"), margins=(16, 14, 16, 14), gap=12)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self._card_column = scroll.column
-        self.none = label(_("No action has these words."), "bodyLarge", role="textSecondary")
+        self.none = label(_("No matching actions."), "bodyLarge", role="textSecondary")
         self.none.hide()
         self._card_column.insertWidget(0, self.none)
         return scroll

@@ -92,7 +92,7 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
 def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
     """What a try that has not ended does now."""
     if made.state == "sent":
-        return _("asked")
+        return _("sent")
     if made.state == "accepted":
         if made.waits_for:
             return _("waits for {actions}").format(
@@ -100,7 +100,7 @@ def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) 
             )
         if made.replaces:
             return _("replaces {actions}").format(actions=listed([title_of(name) for name in made.replaces]))
-        return _("asked")
+        return _("sent")
     took = _("for {duration}").format(duration=seconds_words(made.elapsed_s))
     return feedback_words(action, made.feedback) or took
 
@@ -125,7 +125,7 @@ def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, st
         reason = made.error if made.error and made.error != "stopped" else ""
         said = _("ended after {duration}") if may_move else _("stopped after {duration}")
         return said.format(duration=took), "off", _sentence(reason)
-    return _("not done"), "error", _sentence(made.error or _("The robot did not say why"))
+    return _("failed"), "error", _sentence(made.error or _("The robot gave no reason"))
 
 
 def _sentence(words: str) -> str:
@@ -154,9 +154,9 @@ class TryRow(PaintedButton):
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        said = _("{when}, {values}, {result}; take these values")
+        said = _("{when}, {values}, {result}; use these values again")
         self.setAccessibleName(said.format(when=self.when, values=self.given, result=self.result))
-        self.setToolTip(plain.tip(_("{result}. Press to take these values").format(result=self.result)))
+        self.setToolTip(plain.tip(_("{result}. Click to use these values again").format(result=self.result)))
 
     def sizeHint(self) -> QSize:
         return QSize(200, round(self._theme.scaled(ROW)))
@@ -197,7 +197,7 @@ class TryList(QWidget):
         self._theme, self._action = theme, action
         self._shown: tuple[str, ...] = ()
         self.rows: list[TryRow] = []
-        self.setAccessibleName(_("The last tries of {action}").format(action=action.title))
+        self.setAccessibleName(_("Recent tries of {action}").format(action=action.title))
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 2, 0, 0)
         self._column.setSpacing(0)

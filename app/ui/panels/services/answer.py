@@ -44,10 +44,10 @@ def answer_rows(answer: object) -> list[AnswerRow]:
     """An answer as rows, those of a part below it; at most 500."""
     found: list[AnswerRow] = []
     for row in (
-        _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("answer"), _words(answer))]
+        _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
     ):
         if len(found) == MOST_ROWS:
-            found.append(AnswerRow("…", 0, "…", _("there is more; it is in the JSON")))
+            found.append(AnswerRow("…", 0, "…", _("there is more; see the JSON")))
             break
         found.append(row)
     return found
@@ -85,8 +85,8 @@ def took_cell(record: CallRecord) -> Cell:
             return Cell(_("waiting"), "circle-dashed", "textSecondary")
         case "answered":
             return Cell(time_words(record.took_s), "circle-check", "ok")
-        case "given up":
-            return Cell(_("given up"), "circle-x", "textSecondary")
+        case "canceled":
+            return Cell(_("canceled"), "circle-x", "textSecondary")
         case _:
             return Cell(record.sentence, "circle-x", "error")
 
@@ -114,7 +114,7 @@ class AnswerView(QWidget):
             name=_("Answer as"),
         )
         self.way.changed.connect(self._turn)
-        self.copy = IconButton(theme, "copy", _("Copy the answer"), size=26)
+        self.copy = IconButton(theme, "copy", _("Copy reply"), size=26)
         self.copy.clicked.connect(self._copy)
         self.model: TableModel[AnswerRow] = TableModel(
             (
@@ -183,9 +183,9 @@ class AnswerView(QWidget):
         if record is None:
             self.chip.set("")
             self.facts.setText("")
-            self.sentence.setText(_("It was not called yet."))
+            self.sentence.setText(_("No calls yet."))
         elif record.state != "waiting":
-            status = "ok" if record.state == "answered" else "off" if record.state == "given up" else "error"
+            status = "ok" if record.state == "answered" else "off" if record.state == "canceled" else "error"
             self.chip.set(call_words(record), status)
         self._say_facts(record)
         if has_answer and record is not None:
@@ -202,7 +202,7 @@ class AnswerView(QWidget):
         elif record.state != "answered":
             self.sentence.setText(record.sentence)
         elif not record.is_kept:
-            self.sentence.setText(_("Its answer is no longer kept: newer ones took its place."))
+            self.sentence.setText(_("The reply was discarded to make room for newer ones."))
         else:
             size = size_words(len(record.text.encode("utf-8", "replace")))
             self.facts.setText(_("{time}, {size}").format(time=clock_of(record), size=size))
@@ -217,7 +217,7 @@ class AnswerView(QWidget):
     def _copy(self) -> None:
         if self.record is not None:
             QGuiApplication.clipboard().setText(self.record.text)
-            self._toast(_("Copied the answer of {service}").format(service=self.record.service))
+            self._toast(_("Copied the reply of {service}").format(service=self.record.service))
 
 
 def _name_cell(row: AnswerRow) -> Cell:

@@ -61,10 +61,10 @@ class ServicesPanel(PanelWidget):
         self.chips = [self.count]
         self.strip = ArmedStrip(context)
         self._minutes = ArmedMinutes(self.theme, self, self.acting)
-        self.filter = FilterField(self.theme, _("Filter the services"))
+        self.filter = FilterField(self.theme, _("Filter services"))
         self.filter.setMaximumWidth(16_777_215)
         self.list = ServiceList(self.theme)
-        self.empty = EmptyState(self.theme, "spline", _("Nobody offers a service"), "")
+        self.empty = EmptyState(self.theme, "spline", _("No services available"), "")
         self._make_request()
         self._make_calls()
         self._connect()
@@ -78,18 +78,18 @@ class ServicesPanel(PanelWidget):
             theme, [("form", _("Form"), None), ("json", _("JSON"), None)], size="small", name=_("Request as")
         )
         self.form = RequestForm(theme)
-        self.edit = JsonEdit(theme, _("The request"), least_lines=4)
+        self.edit = JsonEdit(theme, _("Request"), least_lines=4)
         self.requests = QStackedWidget()
         self.requests.addWidget(self.form)
         self.requests.addWidget(self.edit)
         self.sentence = label("", "small", role="error", wrap=True)
         self.sentence.setMinimumWidth(0)
-        self.mend = Button(theme, _("Put it right"), "wrench", size="small")
+        self.mend = Button(theme, _("Fix it"), "wrench", size="small")
         self.call_button = Button(theme, _("Call"), "play", kind="primary")
-        self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls it"), "Ctrl+Enter")))
-        self.give_up = Button(theme, _("Give up"), "x")
+        self.call_button.setToolTip(plain.tip(tip_with_key(_("Calls the service"), "Ctrl+Enter")))
+        self.give_up = Button(theme, _("Cancel"), "x")
         self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"), 1)
-        self.seconds.setAccessibleName(_("Waits at most, in seconds"))
+        self.seconds.setAccessibleName(_("Time limit in seconds"))
         self.seconds.setFixedWidth(round(theme.scaled(SECONDS_PX)))
         self.seconds.show_number(TIMEOUT_S)
         self.timeout_s = TIMEOUT_S
@@ -108,12 +108,12 @@ class ServicesPanel(PanelWidget):
                 stretch=True,
                 tip=lambda each: each.request[:2000],
             ),
-            Column("took", lazy("Took"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
+            Column("took", lazy("Duration"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
         )
         self.calls_model: TableModel[CallRecord] = TableModel(columns, lambda each: str(each.number))
         self.calls = TableView(self.theme, self.calls_model)
         self.calls.setAccessibleName(_("Calls"))
-        self._clear = QAction(_("Clear the calls"), self)
+        self._clear = QAction(_("Clear the call history"), self)
         self._clear.triggered.connect(self._clear_calls)
 
     def _connect(self) -> None:
@@ -162,7 +162,7 @@ class ServicesPanel(PanelWidget):
         limit = QWidget()
         beside = QHBoxLayout(limit)
         beside.setContentsMargins(0, 0, 0, 0)
-        beside.addWidget(label(_("waits at most"), "small", role="textSecondary"))
+        beside.addWidget(label(_("time limit"), "small", role="textSecondary"))
         beside.addWidget(self.seconds)
         buttons.addWidget(limit)
         self._asks = QWidget()
@@ -175,7 +175,7 @@ class ServicesPanel(PanelWidget):
         request.addLayout(buttons)
         self.answer.setMinimumHeight(round(self.theme.scaled(110)))
         self.calls.setMinimumHeight(round(self.theme.scaled(90)))
-        scroll = ScrollColumn(_("The chosen service"))
+        scroll = ScrollColumn(_("Selected service"))
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for place, (widget, stretch) in enumerate(
             (
@@ -245,8 +245,8 @@ class ServicesPanel(PanelWidget):
             start = self.session.launcher.ensure_master
             self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
         else:
-            said = _("Services appear here as soon as a program makes a server.")
-            self.empty.say(_("Nobody offers a service"), said, "spline")
+            said = _("Services appear here as soon as a program offers one.")
+            self.empty.say(_("No services available"), said, "spline")
             self.empty.set_actions([self.why()])
 
     @property
@@ -407,7 +407,7 @@ class ServicesPanel(PanelWidget):
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(
-            self.theme.icon("repeat"), _("Ask the same again"), lambda: self._put_text(record.request)
+            self.theme.icon("repeat"), _("Repeat the call"), lambda: self._put_text(record.request)
         )
         menu.addAction(self.theme.icon("copy"), _("Copy the request"), lambda: self._copy(record.request))
         menu.popup(at)

@@ -81,14 +81,12 @@ class RequestForm(QWidget):
         for name, value in some.items():
             self._show(name, value)
         if not isinstance(request, Mapping):
-            self.nothing.setText(_("This is no map of names and values: change it as JSON."))
+            self.nothing.setText(_("The request must be an object with names and values. Edit it as JSON."))
         elif not given:
-            said = _(
-                "Nothing is known of what it takes. It is asked with an empty map, or what you write as JSON."
-            )
+            said = _("This service doesn't describe its request. Studio sends {} or the JSON you write.")
             self.nothing.setText(said)
         elif len(given) > MOST_FIELDS:
-            self.nothing.setText(_("There are more fields; all of them are in the JSON."))
+            self.nothing.setText(_("Not all fields are shown; the JSON has all of them."))
         self.nothing.setVisible(not given or len(given) > MOST_FIELDS)
 
     def _kind(self, name: str, value: object) -> str:

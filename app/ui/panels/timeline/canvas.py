@@ -81,7 +81,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self._loop: tuple[int, int] | None = None
         self._follows = True
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(_("Time line"))
+        self.setAccessibleName(_("Timeline"))
         self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.verticalScrollBar().valueChanged.connect(lambda _value: self.renew())
@@ -525,7 +525,7 @@ class TimelineCanvas(QAbstractScrollArea):
         wide = min(round(scaled(FIELD_WIDE)), view.width())
         left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - wide))
         place = QRect(left, round(scaled(RULER)), wide, round(scaled(MARKS)))
-        self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Name of the bookmark"))
+        self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Bookmark name"))
         self.field.ended.connect(self._renamed)
 
     def _renamed(self) -> None:

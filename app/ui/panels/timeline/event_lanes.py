@@ -95,7 +95,7 @@ class EventLanes:
         font, ink = theme.font("small"), theme.colour("accentText")
         if not marks:
             tertiary = theme.colour("textTertiary")
-            paint.words(painter, box.adjusted(FLAG, 0, 0, 0), _("B makes one"), font, tertiary)
+            paint.words(painter, box.adjusted(FLAG, 0, 0, 0), _("Press B to add one"), font, tertiary)
         made, free = [], box.left() - 1.0
         for mark in marks:
             x = self._x_of(mark.at_ns)

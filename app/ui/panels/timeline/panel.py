@@ -109,7 +109,7 @@ class TimelinePanel(PanelWidget):
         status = replay.status if replay is not None else None
         words: tuple[object, ...]
         if replay is None or status is None:
-            words = (_("No recording is open"), _("Open one, or drop it here."), True)
+            words = (_("No recording is open"), _("Open a recording or drop one here."), True)
         elif status.stage == "failed":
             words = (
                 _("{name} can't be played.").format(name=replay.name),
@@ -242,7 +242,7 @@ class TimelinePanel(PanelWidget):
         if mark is not None:
             do(mark)
         else:
-            self.context.toast(_("No bookmark is at the playhead: press one, or B to make one"))
+            self.context.toast(_("No bookmark at the playhead. Select one, or press B to add one"))
 
     def _show_menu(self, mark: Bookmark, place: QPoint) -> None:
         """What can be done with a bookmark."""
@@ -276,7 +276,7 @@ class TimelinePanel(PanelWidget):
 
     def _is_note(self, mark: Bookmark) -> bool:
         if mark.is_note:
-            self.context.toast(_("It was made while it was recorded, and stands in the file: it stays"))
+            self.context.toast(_("Notes made while recording are part of the file and can't be changed"))
         return mark.is_note
 
     def _try(self, change: Callable[[], object]) -> bool:
@@ -284,7 +284,7 @@ class TimelinePanel(PanelWidget):
         try:
             change()
         except RecordingError as error:
-            self.context.toast(_("The bookmark can't be kept: {reason}").format(reason=error.reason))
+            self.context.toast(_("Can't save the bookmark: {reason}").format(reason=error.reason))
             return False
         except ValueError:  # it is gone already
             return True
@@ -295,7 +295,7 @@ class TimelinePanel(PanelWidget):
         path = self._shown.path if self._shown is not None else None
         rows = (
             (_("Open a recording"), "folder-open", "replay.open"),
-            *([(_("Export a part of it"), "download", f"recording.export:{path}")] if path else []),
+            *([(_("Export a part"), "download", f"recording.export:{path}")] if path else []),
             (_("Back to live"), "radio-tower", "replay.live"),
         )
         for words, icon, command in rows:

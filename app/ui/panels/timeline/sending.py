@@ -59,8 +59,8 @@ class ReplayStrip(ArmedStrip):
         heard = max(each.heard for each in going)
         sent = ngettext("{count} sent", "{count} sent", count).format(count=grouped(count))
         late = [late_words(skipped)] if skipped else []
-        ears = ngettext("heard by {count}", "heard by {count}", heard).format(count=heard)
-        return ", ".join((sent, *late, ears if heard else _("nobody hears it")))
+        ears = ngettext("received by {count}", "received by {count}", heard).format(count=heard)
+        return ", ".join((sent, *late, ears if heard else _("no subscribers")))
 
     def token_words(self, target: Target) -> str:
         routes = self.sending.routes if self.sending is not None else {}
@@ -101,7 +101,7 @@ class SendChooser(QWidget):
         self.problem = label("", "small", role="error", wrap=True)
         self.problem.setMinimumWidth(0)
         self.name = QLineEdit()
-        self.name.setAccessibleName(_("Name under which it is sent"))
+        self.name.setAccessibleName(_("Name it is sent under"))
         self.name.setProperty("focusRadius", theme.radius("control"))
         self.name.setMinimumWidth(round(theme.scaled(NAME_PX) / 2))
         self.name.setMaximumWidth(round(theme.scaled(NAME_PX)))
@@ -122,7 +122,7 @@ class SendChooser(QWidget):
         foot.addWidget(label(_("Sent as"), "small", role="textSecondary"))
         for field in (self.name, self.arm, self.cancel):
             foot.addWidget(field)
-        scroll = ScrollColumn(_("What is sent"), margins=(12, 8, 12, 8), gap=6)
+        scroll = ScrollColumn(_("Topics sent"), margins=(12, 8, 12, 8), gap=6)
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         below = QWidget()
         below.setLayout(foot)
@@ -151,9 +151,9 @@ class SendChooser(QWidget):
             return
         self._seen = (sending, sending.revision)
         self._show_rows()
-        said = _("While it is armed, what is played of these topics is sent on the live network, too.")
-        moving = _("One that moves a robot is marked, and asked for again.")
-        reading = _("It is still being read which topics move robots.")
+        said = _("While armed, these topics are also sent to the live network during playback.")
+        moving = _("Topics that move a robot are marked and need confirmation.")
+        reading = _("Finding out which topics move robots.")
         self.words.setText(f"{said} {moving if sending.is_known else reading}")
         self.problem.setVisible(bool(self.problem.text()))
         self.arm.setEnabled(bool(sending.routes) and sending.is_known)
@@ -215,8 +215,8 @@ class SendChooser(QWidget):
 def _columns() -> tuple[Column[SendRow], ...]:
     def is_sent(row: SendRow) -> Cell:
         if row.name is not None:
-            return Cell(icon="check", role="accentText", said=_("is sent"))
-        return Cell(icon="minus", role="textTertiary", said=_("is not sent"))
+            return Cell(icon="check", role="accentText", said=_("sent"))
+        return Cell(icon="minus", role="textTertiary", said=_("not sent"))
 
     def moves(row: SendRow) -> Cell:
         return Cell(icon="triangle-alert", role="warn", said=_("moves a robot")) if row.moves else Cell()
@@ -226,7 +226,7 @@ def _columns() -> tuple[Column[SendRow], ...]:
         Column("topic", lazy("Topic"), 170, lambda row: Cell(row.topic, mono=True),
                key=lambda row: row.topic, stretch=True, tip=lambda row: row.topic),
         Column("moves", "", 40, moves, words=lazy("Moves a robot"),
-               tip=lambda row: _("It moves a robot, and is asked for again.") if row.moves else ""),
+               tip=lambda row: _("Moves a robot; needs confirmation.") if row.moves else ""),
         Column("as", lazy("Sent as"), 190, lambda row: Cell(row.name or "", mono=True, role="accentText"),
                tip=lambda row: row.name or ""),
         Column("messages", lazy("Messages"), 90, lambda row: Cell(grouped(row.messages)),

@@ -38,11 +38,11 @@ class TransportRow(QWidget):
             label("", "body", role="textSecondary"),
             label("", "body", role="textSecondary"),
         )
-        self.previous = IconButton(theme, "skip-back", _("Previous mark"), "Ctrl+Left")
-        self.back = IconButton(theme, "step-back", _("Previous message of the chosen topic"))
+        self.previous = IconButton(theme, "skip-back", _("Previous bookmark"), "Ctrl+Left")
+        self.back = IconButton(theme, "step-back", _("Previous message of the selected topic"))
         self.play = Button(theme, _("Play"), "play", kind="primary")
-        self.on = IconButton(theme, "step-forward", _("Next message of the chosen topic"))
-        self.next = IconButton(theme, "skip-forward", _("Next mark"), "Ctrl+Right")
+        self.on = IconButton(theme, "step-forward", _("Next message of the selected topic"))
+        self.next = IconButton(theme, "skip-forward", _("Next bookmark"), "Ctrl+Right")
         self.speed = Track(theme, SPEED_STEPS)
         self.speed.setAccessibleName(_("Speed"))
         self.speed.setValue(SPEED_STEPS // 2)
@@ -51,7 +51,7 @@ class TransportRow(QWidget):
         self.loop = ToggleButton(theme, _("Loop"), "repeat")
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="small")
         self.armed = Switch(theme, _("Armed"))
-        self.nothing = label(_("Nothing is sent"), "small", role="textSecondary")
+        self.nothing = label(_("Sending is off"), "small", role="textSecondary")
         self._build()
         self._connect()
 
@@ -124,7 +124,9 @@ class TransportRow(QWidget):
         asked, true = player.speed, player.true_speed
         is_slow = player.is_playing and true is not None and true < SLOW * asked
         if is_slow:
-            words = _("asked {asked}, is {true}\u2009\u00d7").format(asked=f"{asked:.3g}", true=f"{true:.2g}")
+            words = _("requested {asked}, actual {true} \u00d7").format(
+                asked=f"{asked:.3g}", true=f"{true:.2g}"
+            )
         else:
             words = f"{asked:.1f}\u2009\u00d7" if asked >= 1 else f"{asked:.2g}\u2009\u00d7"
         if words != self.said.text():

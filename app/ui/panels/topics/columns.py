@@ -90,7 +90,7 @@ def _is_unheard(topic: Topic) -> bool:
 
 def _bandwidth_tip(topic: Topic) -> str:
     if _is_unheard(topic):
-        return _("Not subscribed: messages are counted, but their size is unknown")
+        return _("No subscribers: messages are counted, their size is unknown")
     return _not_told(topic)
 
 
@@ -125,7 +125,7 @@ def loss_cell(topic: Topic) -> Cell:
 
 def _publishers_tip(topic: Topic) -> str:
     if not topic.publisher_nodes:
-        return _("Nobody publishes it")
+        return _("No publisher")
     return _("Published by {nodes}").format(nodes=", ".join(topic.publisher_nodes))
 
 
@@ -133,8 +133,8 @@ def _curve_tip(topic: Topic) -> str:
     if len(topic.rates) < 2:
         if untold(topic) is not None:
             return _not_told(topic)
-        return _("Nobody has told a rate yet")
-    said = _("Rate lately: {least} to {most} /s")
+        return _("No rate reported yet")
+    said = _("Recent rate: {least} to {most} /s")
     return said.format(least=rate_words(min(topic.rates)), most=rate_words(max(topic.rates)))
 
 
@@ -143,7 +143,7 @@ def _shown_tip(topic: Topic) -> str:
     if not (topic.dropped or topic.missed):
         return ""
     shown, sent = topic.shown_of
-    return _("Shown {shown} of {sent} sent").format(shown=grouped(shown), sent=grouped(sent))
+    return _("{shown} of {sent} messages shown").format(shown=grouped(shown), sent=grouped(sent))
 
 
 def _network_tip(topic: Topic) -> str:
@@ -151,8 +151,8 @@ def _network_tip(topic: Topic) -> str:
     if kind is None:
         return _("Studio's own network")
     if topic.stale:
-        return _("{network} does not answer; this is how it was last").format(network=kind.words)
-    return _("On {network}, beside Studio's own network").format(network=kind.words)
+        return _("{network} does not respond; these are its last known values").format(network=kind.words)
+    return _("On {network}, separate from Studio's own network").format(network=kind.words)
 
 
 def _not_told(topic: Topic) -> str:
@@ -161,22 +161,20 @@ def _not_told(topic: Topic) -> str:
     if kind is None:
         return ""
     if topic.counted is not None:
-        return _("Counted here while you look: on {network} nobody tells it").format(network=kind.words)
-    return _("Not known on {network}: nobody tells it. What you look at is counted here").format(
-        network=kind.words
-    )
+        return _("Measured here while it is open: {network} doesn't report it").format(network=kind.words)
+    return _("{network} doesn't report it. Topics you open are measured here").format(network=kind.words)
 
 
 def _rate_tip(topic: Topic) -> str:
-    return _not_told(topic) or _shown_tip(topic) or _("Messages a second, as the publishers tell")
+    return _not_told(topic) or _shown_tip(topic) or _("Messages per second, as reported by the publishers")
 
 
 def _loss_tip(topic: Topic) -> str:
     shown, kind = _shown_tip(topic), untold(topic)
     if topic.lost is None and kind is not None:
-        lost = _("Not known on {network}: what is lost there is not counted").format(network=kind.words)
+        lost = _("{network} doesn't count lost messages").format(network=kind.words)
     elif topic.lost is None:
-        lost = _("No subscriber tells what is lost")
+        lost = _("No subscriber reports losses")
     else:
         lost = ngettext("{count} message lost", "{count} messages lost", topic.lost)
         lost = lost.format(count=grouped(topic.lost))
@@ -259,13 +257,13 @@ def _folder_loss(folder: TopicFolder) -> Cell:
 def _folder_loss_tip(folder: TopicFolder) -> str:
     lost = folder.figures.lost
     if lost is None:
-        return _("No subscriber tells what is lost")
+        return _("No subscriber reports losses")
     said = ngettext("{count} message lost below {folder}", "{count} messages lost below {folder}", lost)
     return said.format(count=grouped(lost), folder=folder.path)
 
 
 def _sum_tip(folder: TopicFolder) -> str:
-    return _("The sum of what is below {folder}").format(folder=folder.path)
+    return _("Total below {folder}").format(folder=folder.path)
 
 
 FolderColumn = tuple[
@@ -284,7 +282,7 @@ FOLDERS: dict[str, FolderColumn] = {
     "age": (
         lambda f: Cell(age_words(f.figures.age_s)),
         lambda f: f.figures.age_s,
-        lambda f: _("The newest message below {folder}").format(folder=f.path),
+        lambda f: _("Newest message below {folder}").format(folder=f.path),
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip

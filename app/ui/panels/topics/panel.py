@@ -30,18 +30,18 @@ if TYPE_CHECKING:
     from app.core.network.topics import Topic
     from app.core.networks.kinds import NetworkKind
 
-FOOT = lazy("Rates come from the publishers; nothing is subscribed but what you look at")
+FOOT = lazy("Rates are reported by the publishers; Studio subscribes only to the topics you open")
 FOOT_OF_NETWORKS = lazy(
-    "Rates come from the publishers; on {networks} nobody tells rates or losses, and what you look at is"
-    " counted here"
+    "Rates are reported by the publishers. {networks} report neither rates nor losses; topics "
+    "you open there are measured here"
 )
-RECORDED_FOOT = lazy("As recorded; an age is how long before the playhead")
+RECORDED_FOOT = lazy("Recorded values; ages are relative to the playhead")
 WORDS = TableWords(
     title=lazy("Topics"),
     filter=lazy("Filter topics"),
-    nothing_fits=lazy("No topic has these words"),
+    nothing_fits=lazy("No matching topics"),
     clear_the_filter=lazy("Clear the filter to see all topics."),
-    not_recorded=lazy("There are no topics in the recording yet"),
+    not_recorded=lazy("The recording has no topics yet"),
 )
 FIGURES_EVERY = 6  # refreshes of 30 a second: nobody reads figures that are others ten times a second
 SORT_EVERY = 30
@@ -77,7 +77,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._tree: TopicTree | None = None
         super().__init__(context, WORDS, "radio-tower")
         self.as_tree = IconButton(
-            self.theme, "list-tree", _("As a tree by the slashes in the names"), checkable=True, size=26
+            self.theme, "list-tree", _("Group by the slashes in topic names"), checkable=True, size=26
         )
         self.as_tree.toggled.connect(lambda _on: self.rebuild())
         self.count = ElidedLabel("small", "textSecondary", least=60)
@@ -180,10 +180,10 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def say_empty(self) -> None:
         if self.session.master.kind == "searching":
             said = _("At {address}.").format(address=self.session.master.address)
-            self.empty.say(_("Looking for a master"), said, "radio-tower")
+            self.empty.say(_("Searching for a master"), said, "radio-tower")
             self.empty.set_actions([])
         else:
-            self.empty.say(_("No topics yet"), _("They appear as soon as a program publishes."), "list")
+            self.empty.say(_("No topics yet"), _("Topics appear as soon as a program publishes."), "list")
             self.empty.set_actions(
                 [EmptyAction(_("Use the virtual robot"), self._use_virtual, "bot", primary=True)]
             )
@@ -236,13 +236,13 @@ class TopicsPanel(NetworkTable[TreeRow]):
         folder = self._folder(key)
         if folder is None:
             return topic_actions(self.context, key)
-        fold = _("Close the folder") if folder.is_open else _("Open the folder")
+        fold = _("Collapse the folder") if folder.is_open else _("Expand the folder")
         return (
             RowAction(
                 fold, "chevron-right" if folder.is_open else "chevron-down", lambda: self.open_row(key)
             ),
-            RowAction(_("Open all folders"), "list-tree", lambda: self._fold_all(is_open=True)),
-            RowAction(_("Close all folders"), "list", lambda: self._fold_all(is_open=False)),
+            RowAction(_("Expand all folders"), "list-tree", lambda: self._fold_all(is_open=True)),
+            RowAction(_("Collapse all folders"), "list", lambda: self._fold_all(is_open=False)),
             copies(self.context, split_key(key)[1]),
         )
 

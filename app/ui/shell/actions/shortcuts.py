@@ -25,7 +25,7 @@ from app.ui.widgets import IconButton
 from nep.i18n import _, lazy
 
 STOP_KEY = "F12"
-NEEDS_WITH = lazy("A key alone is for typing. Hold Ctrl or Alt with it, or use a function key.")
+NEEDS_WITH = lazy("A single letter can't be a shortcut. Hold Ctrl or Alt with it, or use a function key.")
 ALONE = range(Qt.Key.Key_F1, Qt.Key.Key_F35 + 1)
 HOLDS = (
     Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
@@ -42,71 +42,69 @@ class Fixed:
 
 
 FIXED: tuple[Fixed, ...] = (
-    Fixed(lazy("Everywhere"), lazy("Close the palette or what else is open, leave a field"), "Esc"),
-    Fixed(lazy("Everywhere"), lazy("Next control in the panel"), "Tab"),
-    Fixed(lazy("Everywhere"), lazy("Control before it"), "Shift+Tab"),
-    Fixed(lazy("Everywhere"), lazy("Press the chosen button"), "Space"),
+    Fixed(lazy("Everywhere"), lazy("Close the palette or another open surface, or leave a field"), "Esc"),
+    Fixed(lazy("Everywhere"), lazy("Next control"), "Tab"),
+    Fixed(lazy("Everywhere"), lazy("Previous control"), "Shift+Tab"),
+    Fixed(lazy("Everywhere"), lazy("Press the selected button"), "Space"),
     Fixed(lazy("Tables and trees"), lazy("Go to the filter"), "/"),
-    Fixed(lazy("Tables and trees"), lazy("Row above or below"), "Up, Down"),
-    Fixed(lazy("Tables and trees"), lazy("Open the row"), "Enter"),
-    Fixed(lazy("Tables and trees"), lazy("Open or close what is inside"), "Right, Left"),
+    Fixed(lazy("Tables and trees"), lazy("Previous or next row"), "Up, Down"),
+    Fixed(lazy("Tables and trees"), lazy("Open row"), "Enter"),
+    Fixed(lazy("Tables and trees"), lazy("Expand or collapse"), "Right, Left"),
     Fixed(lazy("Inspector"), lazy("Find a key or value"), "Ctrl+F"),
-    Fixed(lazy("Inspector"), lazy("Copy the value"), "Ctrl+C"),
-    Fixed(lazy("Inspector"), lazy("Copy the path"), "Ctrl+Shift+C"),
+    Fixed(lazy("Inspector"), lazy("Copy value"), "Ctrl+C"),
+    Fixed(lazy("Inspector"), lazy("Copy path"), "Ctrl+Shift+C"),
     Fixed(lazy("Inspector"), lazy("Plot the value"), "Ctrl+Shift+L"),
     Fixed(lazy("Plot"), lazy("Add a curve"), "C"),
-    Fixed(lazy("Plot"), lazy("Pause, or go on"), "Space"),
-    Fixed(lazy("Plot"), lazy("Show A and B, or hide them"), "M"),
-    Fixed(lazy("Plot"), lazy("Put A, or B, where the mouse is"), "A, B"),
-    Fixed(lazy("Plot"), lazy("Move A or B by a value, with Shift by ten"), "Left, Right"),
-    Fixed(lazy("Plot"), lazy("Less time, more time, everything"), "+, -, 0"),
-    Fixed(lazy("Plot"), lazy("Hide the chosen curve, or show it"), "H"),
-    Fixed(lazy("Plot"), lazy("Remove the chosen curve"), "Delete"),
-    Fixed(lazy("Timeline"), lazy("Play, or pause"), "Space"),
+    Fixed(lazy("Plot"), lazy("Pause or resume"), "Space"),
+    Fixed(lazy("Plot"), lazy("Show or hide A and B"), "M"),
+    Fixed(lazy("Plot"), lazy("Place A or B at the mouse"), "A, B"),
+    Fixed(lazy("Plot"), lazy("Move A or B by one value, with Shift by ten"), "Left, Right"),
+    Fixed(lazy("Plot"), lazy("Shorter, longer, entire time range"), "+, -, 0"),
+    Fixed(lazy("Plot"), lazy("Show or hide the selected curve"), "H"),
+    Fixed(lazy("Plot"), lazy("Remove the selected curve"), "Delete"),
+    Fixed(lazy("Timeline"), lazy("Play or pause"), "Space"),
     Fixed(
         lazy("Timeline"),
-        lazy("Message before or after, of the chosen topic; with Shift a second"),
+        lazy("Previous or next message of the selected topic; with Shift one second"),
         "Left, Right",
     ),
-    Fixed(lazy("Timeline"), lazy("Mark before or after"), "Ctrl+Left, Ctrl+Right"),
-    Fixed(lazy("Timeline"), lazy("Beginning and end"), "Home, End"),
-    Fixed(lazy("Timeline"), lazy("Begin, or end, the loop here"), "[, ]"),
-    Fixed(lazy("Timeline"), lazy("Loop, or no more"), "L"),
-    Fixed(lazy("Timeline"), lazy("Make a bookmark"), "B"),
-    Fixed(lazy("Timeline"), lazy("Less time, more time, everything"), "+, -, 0"),
+    Fixed(lazy("Timeline"), lazy("Previous or next bookmark"), "Ctrl+Left, Ctrl+Right"),
+    Fixed(lazy("Timeline"), lazy("Start and end"), "Home, End"),
+    Fixed(lazy("Timeline"), lazy("Set the start or end of the loop here"), "[, ]"),
+    Fixed(lazy("Timeline"), lazy("Turn looping on or off"), "L"),
+    Fixed(lazy("Timeline"), lazy("Add bookmark"), "B"),
+    Fixed(lazy("Timeline"), lazy("Shorter, longer, entire time range"), "+, -, 0"),
     Fixed(lazy("Sliders"), lazy("One step"), "Left, Right"),
     Fixed(lazy("Sliders"), lazy("Ten steps"), "PgUp, PgDown"),
     Fixed(lazy("Sliders"), lazy("Lowest and highest"), "Home, End"),
-    Fixed(lazy("Blocks"), lazy("Move through blocks and gaps"), "Up, Down, Left, Right"),
-    Fixed(lazy("Blocks"), lazy("Open the field of the block, or take it from the toolbox"), "Enter"),
+    Fixed(lazy("Blocks"), lazy("Move between blocks and slots"), "Up, Down, Left, Right"),
+    Fixed(lazy("Blocks"), lazy("Open the block's field, or take the block from the toolbox"), "Enter"),
     Fixed(lazy("Blocks"), lazy("Run from the block, or show its value"), "Ctrl+Enter"),
-    Fixed(lazy("Blocks"), lazy("Open the menu of the block or of the page"), "Shift+F10"),
+    Fixed(lazy("Blocks"), lazy("Open the menu of the block or canvas"), "Shift+F10"),
     Fixed(lazy("Blocks"), lazy("Copy, cut, paste blocks"), "Ctrl+C, Ctrl+X, Ctrl+V"),
-    Fixed(lazy("Blocks"), lazy("Put the block, with all below it, into the backpack"), "Ctrl+Shift+P"),
+    Fixed(lazy("Blocks"), lazy("Add the block and all blocks below it to the backpack"), "Ctrl+Shift+P"),
     Fixed(lazy("Blocks"), lazy("Select all blocks and notes"), "Ctrl+A"),
-    Fixed(lazy("Blocks"), lazy("Duplicate the block"), "Ctrl+D"),
-    Fixed(lazy("Blocks"), lazy("Delete the block"), "Delete, Backspace"),
-    Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter puts it down"), "Ctrl+M"),
-    Fixed(lazy("Blocks"), lazy("Move it with all blocks below it"), "Ctrl+Shift+M"),
+    Fixed(lazy("Blocks"), lazy("Duplicate block"), "Ctrl+D"),
+    Fixed(lazy("Blocks"), lazy("Delete block"), "Delete, Backspace"),
+    Fixed(lazy("Blocks"), lazy("Move the block with the arrow keys; Enter places it"), "Ctrl+M"),
+    Fixed(lazy("Blocks"), lazy("Move the block with all blocks below it"), "Ctrl+Shift+M"),
     Fixed(lazy("Blocks"), lazy("Take the block out of its stack"), "Ctrl+Shift+X"),
-    Fixed(lazy("Blocks"), lazy("Switch the block off, or on again"), "Ctrl+E"),
-    Fixed(lazy("Blocks"), lazy("Tidy up the page"), "Ctrl+L"),
+    Fixed(lazy("Blocks"), lazy("Disable or enable the block"), "Ctrl+E"),
+    Fixed(lazy("Blocks"), lazy("Clean up the canvas"), "Ctrl+L"),
     Fixed(lazy("Blocks"), lazy("Go to the toolbox"), "Ctrl+B"),
-    Fixed(lazy("Blocks"), lazy("Go to the page"), "Ctrl+Shift+B"),
-    Fixed(lazy("Blocks"), lazy("Go to the next stack, or to the one before it"), "Alt+Down, Alt+Up"),
-    Fixed(lazy("Blocks"), lazy("Show what the block does, in a few words"), "Ctrl+J"),
-    Fixed(
-        lazy("Blocks"), lazy("Let a screen reader say the block, or what it is inside"), "Alt+I, Alt+Shift+I"
-    ),
-    Fixed(lazy("Room"), lazy("Next robot or thing"), "Tab"),
-    Fixed(lazy("Room"), lazy("Move the chosen one; with Shift a little"), "Up, Down, Left, Right"),
-    Fixed(lazy("Room"), lazy("Touch the robot: its head, or its bumper"), "Space"),
-    Fixed(lazy("Room"), lazy("Touch its head, its left hand, its right hand"), "H, L, R"),
-    Fixed(lazy("Room"), lazy("Take the chosen thing away"), "Delete"),
-    Fixed(lazy("Room"), lazy("Open the menu of the room or of the chosen thing"), "Shift+F10"),
+    Fixed(lazy("Blocks"), lazy("Go to the canvas"), "Ctrl+Shift+B"),
+    Fixed(lazy("Blocks"), lazy("Go to the next or previous stack"), "Alt+Down, Alt+Up"),
+    Fixed(lazy("Blocks"), lazy("Show a short description of the block"), "Ctrl+J"),
+    Fixed(lazy("Blocks"), lazy("Read the block or its surroundings aloud"), "Alt+I, Alt+Shift+I"),
+    Fixed(lazy("Room"), lazy("Next robot or object"), "Tab"),
+    Fixed(lazy("Room"), lazy("Move the selection; with Shift in small steps"), "Up, Down, Left, Right"),
+    Fixed(lazy("Room"), lazy("Touch the robot's head or bumper"), "Space"),
+    Fixed(lazy("Room"), lazy("Touch head, left hand, right hand"), "H, L, R"),
+    Fixed(lazy("Room"), lazy("Remove the selected object"), "Delete"),
+    Fixed(lazy("Room"), lazy("Open the menu of the room or selection"), "Shift+F10"),
     Fixed(lazy("Palette"), lazy("Choose"), "Up, Down"),
-    Fixed(lazy("Palette"), lazy("Do it"), "Enter"),
-    Fixed(lazy("Palette"), lazy("Change the shortcut"), "Ctrl+Enter"),
+    Fixed(lazy("Palette"), lazy("Activate"), "Enter"),
+    Fixed(lazy("Palette"), lazy("Change shortcut"), "Ctrl+Enter"),
 )
 
 
@@ -182,14 +180,14 @@ class Shortcuts(QObject):
         """Why a key can't be a command's, in a sentence; "" when it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
-            return "" if name == STOP else _("F12 is Stop in every program state, and stays so.")
+            return "" if name == STOP else _("F12 always stops and can't be changed.")
         held = pressed.keyboardModifiers() & HOLDS
         if not held and pressed.key() not in ALONE:
             return _(NEEDS_WITH)
         for fixed in FIXED:
             own = key in self.default(name)  # Ctrl+F finds in the Inspector there, else in the blocks
             if key in [normal(each) for each in fixed.key.split(", ")] and held and not own:
-                return _("{key} stays “{command}” ({place}).").format(
+                return _("{key} is reserved for “{command}” ({place}).").format(
                     key=spoken_key(key), command=_(fixed.words), place=_(fixed.place)
                 )
         return ""

@@ -30,9 +30,9 @@ LEAST_ROOM = 44  # px of the field: less than that for the words, and only icon 
 CHIP_WORDS = {
     "ready": lazy("{robot} ready"),
     "busy": lazy("{robot} moving"),
-    "away": lazy("{robot} away"),
-    "connecting": lazy("{robot} is being connected"),
-    "paused": lazy("{robot} holds still"),
+    "away": lazy("{robot} not running"),
+    "connecting": lazy("connecting {robot}"),
+    "paused": lazy("{robot} is paused"),
     "running": lazy("{robot} running"),
 }
 """What the only robot does, for a person or for its program."""
@@ -252,9 +252,9 @@ def robots_chip(session: Session) -> tuple[str, str]:
         return words.format(count=len(stopping)), "running"
     silent = [link for link in links if link.state == "silent"]
     if silent:
-        words = silent[0].silent or _("silent")
+        words = silent[0].silent or _("not responding")
         if len(silent) > 1:
-            words = ngettext("{count} robot silent", "{count} robots silent", len(silent))
+            words = ngettext("{count} robot not responding", "{count} robots not responding", len(silent))
             return words.format(count=len(silent)), "error"
         if len(links) > 1:
             return _("{robot}: {state}").format(robot=silent[0].name, state=words), "error"

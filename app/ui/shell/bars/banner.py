@@ -167,7 +167,7 @@ class Banner(AlertBox):
         self.second = Button(theme, "", size="form")
         for button in (self.button, self.second):
             button.let_shrink()
-        self.close_button = IconButton(theme, "x", _("Close this message"), size=26)
+        self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
         self.text_column.addWidget(self.words)
         for widget in (self.more, self.second, self.button, self.close_button):
             self.button_row.addWidget(widget)

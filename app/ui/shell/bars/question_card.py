@@ -56,7 +56,7 @@ class QuestionCard(FloatingCard):
         self.choices.chosen.connect(self._send)
         self._offered = Scrolled(self.choices)
         self.choices.reached.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
-        self._hint = label(_("Press Go on first"), "small", role="textSecondary")
+        self._hint = label(_("Press Resume first"), "small", role="textSecondary")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # while it is held, there is nothing else for the keys
         row = QHBoxLayout()
         row.setSpacing(10)
@@ -87,7 +87,7 @@ class QuestionCard(FloatingCard):
             self._hold(held=held)
 
     def _open(self, question: AskedQuestion) -> None:
-        words = question.words.strip() or _("The behaviour asks you something")
+        words = question.words.strip() or _("The behaviour has a question")
         self.words.setText(words)
         self.setAccessibleName(words)
         self.field.setAccessibleName(words)
@@ -140,7 +140,7 @@ class QuestionCard(FloatingCard):
         if had and not held and self.hasFocus():
             self.choices.take_keyboard()
         self.field.setReadOnly(held)
-        self.field.setPlaceholderText(_("Press Go on first") if held else "")
+        self.field.setPlaceholderText(_("Press Resume first") if held else "")
         self.button.setEnabled(not held)
 
     def place(self) -> None:

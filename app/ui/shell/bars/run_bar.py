@@ -301,7 +301,7 @@ class RunBar(Bar):
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
         self.setAccessibleName(_("Run and stop"))
-        self.run = RunButton(theme, _("Run"), "play", widest=max(_("Go on"), _("Restart"), key=len))
+        self.run = RunButton(theme, _("Run"), "play", widest=max(_("Resume"), _("Restart"), key=len))
         self.pause = RunButton(theme, _("Pause"), "pause")
         self.step = RunButton(theme, _("Step"), "step-forward")
         self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)

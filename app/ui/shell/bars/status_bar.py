@@ -69,18 +69,18 @@ class StatusFacts:
         wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
         if wrong:
             icon, status = _worst(wrong)
-            words = _("{robot}: {count} to look at")
+            words = _("{robot}: {count} to check")
             if len(links) > 1:
                 words = ngettext(
-                    "{robots} robot: {count} to look at", "{robots} robots: {count} to look at", len(links)
+                    "{robots} robot: {count} warning", "{robots} robots: {count} warnings", len(links)
                 )
             return icon, words.format(robot=links[0].name, robots=len(links), count=len(wrong)), status
         if any(link.state == STOPPING for link in links):
-            return "circle-dashed", _("Waiting for the answer to Stop"), "off"
+            return "circle-dashed", _("Waiting for Stop to be confirmed"), "off"
         name, count = links[0].name, len(links)
         if all(has_told(link, facts) for link, facts in found):
-            words = ngettext("{count} robot is well", "{count} robots are well", count)
-            words = words if count > 1 else _("{robot} is well")
+            words = ngettext("{count} robot: no problems", "{count} robots: no problems", count)
+            words = words if count > 1 else _("{robot}: no problems")
             return "circle-check", words.format(robot=name, count=count), "ok"
         words = ngettext("{count} robot is connected", "{count} robots are connected", count)
         words = words if count > 1 else _("{robot} is connected")
@@ -90,9 +90,9 @@ class StatusFacts:
         """When the behaviour was saved, or that it is not saved yet, and whether it is kept all the same."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
-            return "circle-x", _("Not saved, not kept"), "error"
+            return "circle-x", _("Not saved · no backup"), "error"
         if document.dirty:
-            words = _("Not saved, kept safe") if document.path is None else _("Changes kept safe")
+            words = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
             return "save", words, None
         if document.saved_at is None:
             return NOTHING
@@ -102,7 +102,7 @@ class StatusFacts:
     def topics(self) -> Fact:
         """How many topics are live."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
-        return "", ngettext("{count} topic live", "{count} topics live", live).format(count=live), None
+        return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
     def remote_access(self) -> Fact:
         """Who can reach this master."""
@@ -119,7 +119,7 @@ class StatusFacts:
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
         if master.kind == "searching":
-            words = _("Looking for the master {address}").format(address=master.address)
+            words = _("Searching for the master {address}").format(address=master.address)
             return "circle-dashed", words, "off"
         return "circle-dashed", _("No master"), "off"
 
@@ -153,7 +153,7 @@ class StatusFacts:
         if not recordings.is_recording:
             return NOTHING
         if state.phase == "starting":
-            return "circle-dot", _("Recording begins"), "recording"
+            return "circle-dot", _("Starting to record"), "recording"
         lost = state.lost + state.unkept
         losses = ngettext("{count} lost", "{count} lost", lost).format(count=grouped(lost))
         words = _("Recording {time}, {size}, {losses}").format(
@@ -191,7 +191,7 @@ class StatusFacts:
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return NOTHING
-        return "history", _("{count} s can be kept").format(count=round(seconds)), None
+        return "history", _("last {count} s available").format(count=round(seconds)), None
 
     def replayed(self) -> tuple[Fact, ...]:
         """Which recording shows, from when to when, what is in it, and what was lost while it was made."""
@@ -218,14 +218,14 @@ class StatusFacts:
 
     def live_goes_on(self) -> Fact:
         """That a recording does not hide from robots, Stop and alarms what happens now."""
-        return "radio-tower", _("Live network goes on"), None
+        return "radio-tower", _("The live network keeps running"), None
 
     def shown(self) -> Fact:
         """How many messages of the topics that are looked at were shown; nothing when all were."""
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return NOTHING
-        words = _("Shown {shown} of {sent} in 30 s")
+        words = _("{shown} of {sent} shown in 30 s")
         return "", words.format(shown=grouped(traffic.shown_30s), sent=grouped(traffic.sent_30s)), None
 
     def window(self) -> Fact:

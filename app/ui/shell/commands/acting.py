@@ -26,7 +26,7 @@ class ActingCommands:
     def publish(self, key: str = "") -> bool:
         """A message for this topic, or for one that is chosen then."""
         if split_key(key)[0]:
-            self._shell.say(_("Only topics of Studio's own network can be published by hand"))
+            self._shell.say(_("Only topics of Studio's own network can be published to"))
             return False
         return self._begin("publish", key)
 

@@ -168,7 +168,7 @@ class BehaviourCommands:
         """
         session = self._session
         if session.runs.active:
-            return _("another behaviour runs")
+            return _("another behaviour is running")
         document = next((each for each in session.documents if session.documents.title(each) == name), None)
         if document is not None:
             self._files.show(document)
@@ -348,9 +348,9 @@ class BehaviourCommands:
     def forget_recent(self) -> None:
         """Clear the list of recent files; it can be taken back."""
         before: list[RecentFile] = self._session.settings.recent_known
-        words = _("Cleared the list of recent files")
+        words = _("Recent files cleared")
         if not self._set_recent([]):
-            words = _("The list of recent files comes back at the next start: the change can't be saved")
+            words = _("Can't save this change: the recent files will return at the next start")
         self._shell.say(words, _("Undo"), lambda: self._set_recent(before))
 
     def _set_recent(self, files: list[RecentFile]) -> bool:
@@ -374,23 +374,23 @@ class BehaviourCommands:
                 unsaved.journal.unlink(missing_ok=True)
 
         offer(
-            _("Put back the unsaved work?"),
+            _("Restore unsaved work?"),
             unsaved_words(rest),
-            (_("Put it back"), lambda: self._files.recover(rest)),
-            (_("Throw it away"), throw_away),
+            (_("Restore"), lambda: self._files.recover(rest)),
+            (_("Discard"), throw_away),
         )
 
 
 def unsaved_words(left: Sequence[Unsaved]) -> str:
     """Which behaviours were not saved."""
     if len(left) == 1:
-        return _("“{name}” was not saved when Studio ended last time.").format(name=left[0].name)
+        return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)
     if len(left) == 2:
-        return _("“{name}” and “{other}” were not saved when Studio ended last time.").format(
+        return _("“{name}” and “{other}” weren't saved before Studio closed.").format(
             name=left[0].name, other=left[1].name
         )
     return ngettext(
-        "“{name}” and {count} other were not saved when Studio ended last time.",
-        "“{name}” and {count} others were not saved when Studio ended last time.",
+        "“{name}” and {count} other weren't saved before Studio closed.",
+        "“{name}” and {count} others weren't saved before Studio closed.",
         len(left) - 1,
     ).format(name=left[0].name, count=len(left) - 1)

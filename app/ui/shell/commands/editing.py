@@ -57,7 +57,7 @@ class EditCommands:
         field = self._field()
         if field is not None:
             return _("This text can't be changed") if what in CHANGES and field.isReadOnly() else ""
-        return "" if self._shell.showing == "behaviour" else _("Only for blocks and in text fields")
+        return "" if self._shell.showing == "behaviour" else _("Only for blocks and text fields")
 
     def _field(self) -> Field | None:
         had = self._had if self._had is not None and isValid(self._had) else None

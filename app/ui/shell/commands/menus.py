@@ -78,7 +78,7 @@ class MenuLists:
         for file in recent:
             words = file.name
             if not file.there:
-                words = _("{file} (not there any more)").format(file=file.name)
+                words = _("{file} (missing)").format(file=file.name)
             entry = self._recent.addAction(plain.entry(words))
             entry.setToolTip(plain.tip(str(file.path)))
             entry.setEnabled(file.there)

@@ -67,7 +67,7 @@ class PaletteEntries:
             key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
             made.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
             if panel.several and panel.name in opened:
-                words = _("One more: {panel}").format(panel=_(panel.title))
+                words = _("Another panel: {panel}").format(panel=_(panel.title))
                 made.append(Entry(f"another:{panel.name}", words, "plus"))
         return made
 
@@ -89,7 +89,7 @@ class PaletteEntries:
             when = day_words(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = ""
             if not file.there:
-                reason = _("Not in {folder} any more").format(folder=file.path.parent.name)
+                reason = _("No longer in {folder}").format(folder=file.path.parent.name)
             made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
         return made
 

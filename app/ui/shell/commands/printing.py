@@ -50,7 +50,7 @@ class Printing:
     def ask(self) -> None:
         """Ask on which printer and how; where there is none, where to save a PDF."""
         if not self._printers():
-            self._shell.say(_("No printer is set up on this computer. The pages can be saved as a PDF."))
+            self._shell.say(_("No printer is set up on this computer. Save the pages as PDF instead."))
             self.ask_pdf()
             return
         from PySide6.QtPrintSupport import QPrintDialog, QPrinter  # noqa: PLC0415 - only who prints needs it
@@ -75,14 +75,14 @@ class Printing:
             elif paint_pdf(data, printer):
                 self._shell.say(_("Sent to the printer {name}").format(name=printer.printerName()))
             else:
-                self._shell.say(_("The printer {name} does not answer").format(name=printer.printerName()))
+                self._shell.say(_("The printer {name} does not respond").format(name=printer.printerName()))
 
         self._make(printer.pageLayout(), paint)
 
     def ask_pdf(self) -> None:
         """Ask where, then save a PDF there."""
         self._asks.save_as(
-            _("Save the blocks as PDF"),
+            _("Save blocks as PDF"),
             beside(self._session.document),
             (FileKind("PDF", ".pdf"),),
             lambda path, _kind: self.save(path),
@@ -99,7 +99,7 @@ class Printing:
             try:
                 write_atomically(whole, data)
             except OSError as error:
-                self._shell.say(_("The PDF can't be saved: {why}").format(why=error.strerror or str(error)))
+                self._shell.say(_("Can't save the PDF: {why}").format(why=error.strerror or str(error)))
             else:
                 self._shell.say(_("Saved {name}").format(name=whole.name))
 
@@ -113,7 +113,7 @@ class Printing:
             editor.pdf(self._session.document.name, date, layout, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("There are no blocks on this page"))
+        self._shell.say(_("This page has no blocks"))
 
 
 def known_printers() -> list[str]:

@@ -17,14 +17,14 @@ from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, lazy
 
 ON_WHITE = (
-    FileKind(lazy("Picture"), ".png"),
-    FileKind(lazy("Picture that stays sharp at any size"), ".svg"),
+    FileKind(lazy("Image"), ".png"),
+    FileKind(lazy("An image that stays sharp at any size"), ".svg"),
 )
 KINDS = (
     ON_WHITE[0],
-    FileKind(lazy("Picture without background"), ".png"),
+    FileKind(lazy("Image with transparent background"), ".png"),
     ON_WHITE[1],
-    FileKind(lazy("Picture that stays sharp, without background"), ".svg"),
+    FileKind(lazy("Vector image with transparent background"), ".svg"),
 )
 
 
@@ -56,7 +56,7 @@ class ProgramPictures:
         def take(path: Path, kind: FileKind) -> None:
             self.save(path, kind.ending.lstrip("."), kind in ON_WHITE)
 
-        self._asks.save_as(_("Save a picture of the blocks"), suggestion, KINDS, take)
+        self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
         """Write a "png" or "svg" there; a name with another ending gets the right one."""
@@ -69,9 +69,7 @@ class ProgramPictures:
             try:
                 write_atomically(whole, data)
             except OSError as error:
-                self._shell.say(
-                    _("The picture can't be saved: {why}").format(why=error.strerror or str(error))
-                )
+                self._shell.say(_("Can't save the image: {why}").format(why=error.strerror or str(error)))
             else:
                 self._shell.say(_("Saved {name}").format(name=whole.name))
 
@@ -86,7 +84,7 @@ class ProgramPictures:
                 self._say_nothing_there()
                 return
             QGuiApplication.clipboard().setImage(image)
-            self._shell.say(_("The picture is on the clipboard"))
+            self._shell.say(_("Copied the image"))
 
         self._make("png", True, put)
 
@@ -96,4 +94,4 @@ class ProgramPictures:
             editor.picture(kind, white, done)
 
     def _say_nothing_there(self) -> None:
-        self._shell.say(_("There are no blocks on this page"))
+        self._shell.say(_("This page has no blocks"))

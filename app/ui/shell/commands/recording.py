@@ -56,11 +56,11 @@ class RecordCommands:
     def _begin(self, choice: RecordingChoice | None = None) -> bool:
         why_not = self._recordings.record(choice=choice)
         if why_not and choice is None:
-            self._shell.say(why_not, _("Choose what to record"), self.open_sheet)
+            self._shell.say(why_not, _("Choose topics to record"), self.open_sheet)
         elif why_not:
             self._shell.say(why_not)
         elif self._session.master.kind != "connected":
-            self._shell.say(_("Recording begins as soon as a master is there"))
+            self._shell.say(_("Recording starts as soon as a master appears"))
         return not why_not
 
     def record_topic(self, key: str) -> bool:
@@ -92,8 +92,8 @@ class RecordCommands:
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.say(
-                _("The flight recorder is off: there are no last seconds to keep"),
-                _("Switch it on"),
+                _("The flight recorder is off: there are no last seconds to save"),
+                _("Turn it on"),
                 self._switch_on,
             )
             return
@@ -104,7 +104,7 @@ class RecordCommands:
     def _switch_on(self) -> None:
         recordings = self._recordings
         recordings.set_wish(replace(recordings.wish, is_on=True))
-        words = _("From now on the last {count} s can be kept")
+        words = _("The flight recorder now keeps the last {count} s")
         self._shell.say(words.format(count=recordings.wish.seconds))
 
     # ---- the files
@@ -125,7 +125,7 @@ class RecordCommands:
         if path.parent == self._recordings.folder:
             self.show(path)
         else:
-            words = _("{file} is in another folder: choose that one for recordings")
+            words = _("{file} is in another folder. Choose that folder for recordings first")
             self._shell.say(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
 
     def choose_folder(self) -> None:
@@ -134,20 +134,20 @@ class RecordCommands:
 
         def take(folder: Path) -> None:
             recordings.set_folder(folder)
-            self._shell.say(_("Recordings go to {folder}").format(folder=folder))
+            self._shell.say(_("Recordings are saved in {folder}").format(folder=folder))
 
         place = recordings.folder
         self._asks.choose_folder(str(place if place.is_dir() else Path.home()), take)
 
     def _made(self, path: Path, kind: str) -> None:
         if kind == "kept":
-            words = _("Kept the last seconds: {file}").format(file=path.stem)
+            words = _("Saved the last seconds: {file}").format(file=path.stem)
         else:
             state = self._recordings.client.state
             words = {
-                "time": _("Recorded {file} for as long as you chose: {length}, {size}"),
-                "size": _("Recorded {file} until it was as large as you chose: {length}, {size}"),
-            }.get(state.limit, _("Recorded {file}: {length}, {size}"))
+                "time": _("Recording stopped at the time limit: {file}, {length}, {size}"),
+                "size": _("Recording stopped at the size limit: {file}, {length}, {size}"),
+            }.get(state.limit, _("Saved recording {file}: {length}, {size}"))
             words = words.format(
                 file=path.stem, length=length_words(state.duration_s), size=size_words(state.size_bytes)
             )

@@ -39,7 +39,7 @@ class ReplayCommands:
     def open(self, path: Path) -> None:
         """Show a recording, with its time line; what is wrong with it becomes an alert."""
         if not path.is_file():
-            self._shell.say(_("{file} is not there any more").format(file=path.name))
+            self._shell.say(_("{file} no longer exists").format(file=path.name))
             return
         self._shell.show_layout("developer")
         self._session.open_recording(path)
@@ -74,9 +74,7 @@ class ReplayCommands:
             made = replay.bookmark()
         except RecordingError as error:
             sentence = f"{error.reason[:1].upper()}{error.reason[1:]}."
-            self._session.alerts.put(
-                "recording:bookmark", "error", _("The bookmark can't be kept."), sentence
-            )
+            self._session.alerts.put("recording:bookmark", "error", _("Can't save the bookmark."), sentence)
             return
         if made is not None:
-            self._shell.say(_("Made a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))
+            self._shell.say(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))

@@ -86,9 +86,9 @@ class ReportCommands:
         """Open the page of releases in the browser, and say which version this is. Nothing is asked here."""
         opened = open_outside(QUrl(page))
         words = (
-            _("This is NEP Studio {version}. Your browser shows the newest one.")
+            _("This is NEP Studio {version}. Your browser shows the newest version.")
             if opened
-            else _("This is NEP Studio {version}. Newer ones are at {page}")
+            else _("This is NEP Studio {version}. You'll find newer versions at {page}")
         )
         self._shell.say(words.format(version=__version__, page=page))
 

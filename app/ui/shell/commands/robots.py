@@ -76,7 +76,7 @@ class RobotCommands:
         self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
-        self._shell.say(_("The virtual Turtle is coming"), until=lambda: not self._is_coming("Turtle"))
+        self._shell.say(_("Starting the virtual Turtle"), until=lambda: not self._is_coming("Turtle"))
 
     def _is_coming(self, name: str) -> bool:
         return name in self._session.coming
@@ -114,7 +114,7 @@ class RobotCommands:
         launcher = self._session.launcher
         launcher.restart_virtual_robot(missing, model)
         self._shell.say(
-            _("The virtual {robot} is coming").format(robot=missing),
+            _("Starting the virtual {robot}").format(robot=missing),
             _("Undo"),
             lambda: launcher.stop_virtual_robot(missing),
             until=lambda: not self._is_coming(missing),
@@ -149,12 +149,12 @@ class RobotCommands:
 
     def ask_before_moving(self) -> None:
         """Ask again before a real robot moves."""
-        words = _("Studio asks again before a real robot moves")
+        words = _("Studio will ask again before a real robot moves")
         try:
             self._session.fleet.permission.forget()
         except SettingsError as error:
             self._shell.complain(str(error))
-            words = _("Studio asks again before a real robot moves, until Studio ends")
+            words = _("Studio will ask again before a real robot moves, until you close it")
         self._shell.say(words)
 
     def ask_about_others(self) -> None:

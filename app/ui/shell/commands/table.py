@@ -31,13 +31,13 @@ from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
 
 A = TypeVar("A")
-LOOK, RECORD = lazy("Look"), lazy("Record")
+LOOK, RECORD = lazy("Theme"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
 WHY_NO_RUN = {
-    "stopping": lazy("Robots are being stopped"),
-    "unanswered": lazy("A robot has not confirmed Stop"),
+    "stopping": lazy("Stopping robots"),
+    "unanswered": lazy("Stop not confirmed by a robot"),
 }
-NOTHING_TO_RUN = lazy("There is nothing to run")
+NOTHING_TO_RUN = lazy("Nothing to run")
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,14 @@ def _no_run(do: Handlers) -> str:
 
 
 def _no_restart(do: Handlers) -> str:
-    return "" if do.session.runs.active else _("Nothing runs")
+    return "" if do.session.runs.active else _("Nothing is running")
 
 
 def _no_pause(do: Handlers) -> str:
     view = do.session.runs.view()
     if view.can_pause:
         return ""
-    return _("It is paused already") if view.state == "paused" else _("Nothing runs")
+    return _("Already paused") if view.state == "paused" else _("Nothing is running")
 
 
 def _no_step(do: Handlers) -> str:
@@ -95,17 +95,17 @@ def _no_panels(do: Handlers) -> str:
 def _no_own_layout(do: Handlers) -> str:
     if do.shell.saved_layouts.own(do.shell.showing):
         return ""
-    return _no_panels(do) or _("This layout came with Studio")
+    return _no_panels(do) or _("Built-in layouts can't be changed")
 
 
 def _no_way_back(do: Handlers) -> str:
     if do.shell.showing != START:
         return _("Only on the start page")
-    return "" if do.shell.left else _("Nothing is open")
+    return "" if do.shell.left else _("Nothing open")
 
 
 def _nothing_to_freeze(do: Handlers) -> str:
-    return "" if freezable(do.shell.bench) else _("Nothing here can be frozen")
+    return "" if freezable(do.shell.bench) else _("Nothing to freeze here")
 
 
 def _no_recent(do: Handlers) -> str:
@@ -119,28 +119,28 @@ def _no_recording(do: Handlers) -> str:
 def _not_there_yet(do: Handlers) -> str:
     if do.session.replay is None:
         return _no_recording(do)
-    return "" if do.session.replay.player is not None else _("The recording is not open yet")
+    return "" if do.session.replay.player is not None else _("The recording is still opening")
 
 
 def _no_room(do: Handlers) -> str:
     there = any(link.virtual for link in do.session.fleet.connected)
-    return "" if there else _("No virtual robot is there")
+    return "" if there else _("No virtual robots")
 
 
 def _no_virtual_robot(do: Handlers) -> str:
-    return "" if do.session.launcher.wanted else _("No virtual robot was started here")
+    return "" if do.session.launcher.wanted else _("No virtual robot was started in this window")
 
 
 def _nothing_recorded(do: Handlers) -> str:
-    return "" if do.session.recordings.is_recording else _("Nothing is recorded")
+    return "" if do.session.recordings.is_recording else _("Not recording")
 
 
 def _largest_text(do: Handlers) -> str:
-    return _("Text is as large as it gets") if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
+    return _("Text is at its largest") if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
 
 
 def _smallest_text(do: Handlers) -> str:
-    return _("Text is as small as it gets") if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
+    return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
 
 
 # ---- the tables -------------------------------------------------------------------------------------
@@ -180,8 +180,8 @@ def releases(page: str) -> tuple[C, ...]:
     if not page:
         return ()
     return (
-        C("help.releases", lazy("Look for a new version"), lambda do: do.reports.look_for_new_version(page),
-          "Help", icon="external-link", tip=lazy("Opens the page of releases in your browser")),
+        C("help.releases", lazy("Check for updates"), lambda do: do.reports.look_for_new_version(page),
+          "Help", icon="external-link", tip=lazy("Opens the releases page in your browser")),
     )  # fmt: skip
 
 
@@ -192,19 +192,19 @@ COMMANDS: tuple[C, ...] = (
     C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
-    C("picture.save", lazy("Save a picture of the blocks"), lambda do: do.behaviours.pictures.ask(), "File",
+    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.ask(), "File",
       icon="image-down", why_not=_no_editor),
-    C("print.ask", lazy("Print the blocks"), lambda do: do.behaviours.printing.ask(), "File", ("Ctrl+P",),
+    C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.ask(), "File", ("Ctrl+P",),
       "printer", why_not=_no_editor),
-    C("print.pdf", lazy("Save the blocks as PDF"), lambda do: do.behaviours.printing.ask_pdf(), "File",
+    C("print.pdf", lazy("Save blocks as PDF"), lambda do: do.behaviours.printing.ask_pdf(), "File",
       icon="file-text", why_not=_no_editor),
     C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.earlier_versions(), "File"),
     C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
     C("tab.rename", lazy("Rename the behaviour"), lambda do: do.behaviours.rename_current(), "File", ("F2",),
       "pencil"),
-    C("tab.reopen", lazy("Open the closed one again"), lambda do: do.files.reopen(), "File",
+    C("tab.reopen", lazy("Reopen closed behaviour"), lambda do: do.files.reopen(), "File",
       ("Ctrl+Shift+T",), "history"),
-    C("file.forget_recent", lazy("Clear the list of recent files"), lambda do: do.behaviours.forget_recent(),
+    C("file.forget_recent", lazy("Clear recent files"), lambda do: do.behaviours.forget_recent(),
       why_not=_no_recent),
     C("file.start_page", lazy("Start page"), lambda do: do.view.start_page(), "File", ("Alt+Home",),
       "house", above=True, mac=("Ctrl+Shift+H",)),
@@ -220,11 +220,11 @@ COMMANDS: tuple[C, ...] = (
     _edit("copy", lazy("Copy"), "Ctrl+C", "copy"),
     _edit("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
     _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
-    C("picture.copy", lazy("Copy the blocks as a picture"), lambda do: do.behaviours.pictures.copy(),
+    C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
       "Edit", icon="image", above=True, why_not=_no_editor),
     C("blocks.find", lazy("Find in the blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
       ("Ctrl+F",), "search", above=True),
-    C("blocks.search", lazy("Find a block to add"), lambda do: do.behaviours.find_blocks(to_add=True),
+    C("blocks.search", lazy("Find and add a block"), lambda do: do.behaviours.find_blocks(to_add=True),
       "Edit"),
     C("variable.new", lazy("New variable"), lambda do: do.variables.new(is_list=False), "Edit",
       icon="variable", above=True),
@@ -237,17 +237,17 @@ COMMANDS: tuple[C, ...] = (
       ("Alt+1",), "blocks", group="layout", above=True, mac=("Ctrl+Alt+1",)),
     C("layout.developer", lazy("Developer layout"), lambda do: do.view.show_layout("developer"), "View",
       ("Alt+2",), "activity", group="layout", mac=("Ctrl+Alt+2",)),
-    C("layout.keep", lazy("Keep this layout as"), lambda do: do.view.keep_layout(), "View",
+    C("layout.keep", lazy("Save layout as"), lambda do: do.view.keep_layout(), "View",
       under=lazy("Layouts"), why_not=_no_panels),
-    C("layout.rename", lazy("Rename this layout"), lambda do: do.view.rename_layout(), "View",
+    C("layout.rename", lazy("Rename layout"), lambda do: do.view.rename_layout(), "View",
       under=lazy("Layouts"), why_not=_no_own_layout),
-    C("layout.delete", lazy("Delete this layout"), lambda do: do.view.delete_layout(), "View", icon="trash-2",
+    C("layout.delete", lazy("Delete layout"), lambda do: do.view.delete_layout(), "View", icon="trash-2",
       under=lazy("Layouts"), why_not=_no_own_layout),
-    C("layout.export", lazy("Save this layout as a file"), lambda do: do.view.export_layout(), "View",
+    C("layout.export", lazy("Save layout to a file"), lambda do: do.view.export_layout(), "View",
       icon="download", under=lazy("Layouts"), why_not=_no_panels),
     C("layout.open", lazy("Open a layout from a file"), lambda do: do.view.ask_layout(), "View",
       icon="folder-open", under=lazy("Layouts")),
-    C("layout.reset", lazy("Put the panels back"), lambda do: do.view.reset_layout(), "View",
+    C("layout.reset", lazy("Reset panels"), lambda do: do.view.reset_layout(), "View",
       why_not=_no_panels),
     C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
       why_not=_no_panels),
@@ -258,20 +258,20 @@ COMMANDS: tuple[C, ...] = (
       above=True, mac=("Meta+Tab", "Ctrl+Shift+]")),
     C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.next_tab(-1), "View",
       ("Ctrl+Shift+Tab",), mac=("Meta+Shift+Tab", "Ctrl+Shift+[")),
-    C("view.freeze", lazy("Freeze what shows"), lambda do: do.view.freeze(), "View", icon="snowflake",
-      tip=lazy("Holds the Inspector and the pictures as they are"), check=True, above=True,
+    C("view.freeze", lazy("Freeze display"), lambda do: do.view.freeze(), "View", icon="snowflake",
+      tip=lazy("Freezes the Inspector and images"), check=True, above=True,
       why_not=_nothing_to_freeze),
     C("replay.live", lazy("Back to live"), lambda do: do.replay.back_to_live(), "View", icon="radio-tower",
-      tip=lazy("Closes the recording and shows the live network"), above=True, why_not=_no_recording),
-    C("replay.play", lazy("Play the recording, or hold it"), lambda do: do.replay.play(), icon="play",
+      tip=lazy("Closes the recording and returns to the live network"), above=True, why_not=_no_recording),
+    C("replay.play", lazy("Play or pause the recording"), lambda do: do.replay.play(), icon="play",
       why_not=_not_there_yet),
-    C("replay.bookmark", lazy("Make a bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
+    C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
       why_not=_not_there_yet),
     C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
       under=LOOK),
     C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme",
       under=LOOK),
-    C("theme.system", lazy("As the system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
+    C("theme.system", lazy("Match system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
       group="theme", under=LOOK),
     C("text.larger", lazy("Larger text"),
       lambda do: do.view.set_text(do.shell.theme.text_percent + TEXT_STEP), "View", ("Ctrl++", "Ctrl+="),
@@ -282,35 +282,35 @@ COMMANDS: tuple[C, ...] = (
     C("text.normal", lazy("Normal text"), lambda do: do.view.set_text(100), "View", ("Ctrl+0",)),
     C("theme.contrast", lazy("High contrast"), lambda do: do.view.choose_contrast(), "View", check=True,
       under=LOOK, above=True),
-    C("theme.motion", lazy("Less motion"), lambda do: do.view.choose_motion(), "View", check=True,
+    C("theme.motion", lazy("Reduce motion"), lambda do: do.view.choose_motion(), "View", check=True,
       under=LOOK),
     C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_go_on(), "Run", ("F5",), "play",
-      lazy("Runs the behaviour; while it runs, begins anew"), why_not=_no_run),
+      lazy("Runs the behaviour, or restarts it"), why_not=_no_run),
     C("run.restart", lazy("Restart"), lambda do: do.behaviours.restart(), "Run", ("Ctrl+F5",), "rotate-ccw",
-      lazy("Stops the program, and runs the behaviour as it is now"), why_not=_no_restart),
+      lazy("Stops the program and runs the behaviour in its current state"), why_not=_no_restart),
     C("run.pause", lazy("Pause"), lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
-      lazy("Holds the program; robots hold still"), why_not=_no_pause),
+      lazy("Pauses the program and its robots"), why_not=_no_pause),
     C("run.step", lazy("Step"), lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",
       lazy("Runs one block"), why_not=_no_step),
     C("run.full_speed", lazy("Full speed"), lambda do: do.session.runs.set_pace(0.0), "Run", group="pace",
       above=True),
-    C("run.slow", lazy("Slow motion: 0.5 s a block"), lambda do: do.session.runs.set_pace(0.5), "Run",
+    C("run.slow", lazy("Slow motion: 0.5 s per block"), lambda do: do.session.runs.set_pace(0.5), "Run",
       group="pace"),
-    C("run.very_slow", lazy("Very slow: 1.5 s a block"), lambda do: do.session.runs.set_pace(1.5), "Run",
+    C("run.very_slow", lazy("Very slow: 1.5 s per block"), lambda do: do.session.runs.set_pace(1.5), "Run",
       group="pace"),
-    C("run.from_start", lazy("Begin each run at the start position"),
+    C("run.from_start", lazy("Reset robots to their start position before each run"),
       lambda do: do.robots.choose_start(), "Run", check=True, above=True,
-      tip=lazy("Virtual robots go back to where they stood at first, before each run")),
+      tip=lazy("Virtual robots return to their start position before each run")),
     # two keys: F12 is one for sound on Macs and many laptops
     C("run.stop", lazy("Stop the program and all robots"), lambda do: do.session.runs.stop(), "Run",
       ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), above=True, everywhere=True),
-    C("run.confirm", lazy("It stands still"), lambda do: do.session.runs.confirm_still(), in_palette=False,
+    C("run.confirm", lazy("Not playing"), lambda do: do.session.runs.confirm_still(), in_palette=False,
       in_shortcuts=False),
     C("robots.virtual", lazy("Use the virtual Pepper"), lambda do: do.robots.virtual_pepper(), "Robots",
       icon="bot"),
     C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.virtual_turtle(), "Robots",
       icon="bot"),
-    C("robots.end_virtual", lazy("Put the virtual robots away"), lambda do: do.robots.end_virtual(), "Robots",
+    C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.end_virtual(), "Robots",
       why_not=_no_virtual_robot),
     C("robots.room", lazy("Room in full screen"), lambda do: do.robots.room_in_full_screen(), "Robots",
       ("F11",), "fullscreen", why_not=_no_room),
@@ -323,24 +323,24 @@ COMMANDS: tuple[C, ...] = (
       "Robots", icon="footprints"),
     C("network.others", lazy("Let other computers connect"), lambda do: do.robots.ask_about_others(),
       "Robots", icon="wifi", above=True),
-    C("network.look", lazy("Look at other networks"), lambda do: do.robots.choose_networks(), "Robots",
+    C("network.look", lazy("Browse other robot networks"), lambda do: do.robots.choose_networks(), "Robots",
       icon="waypoints"),
     C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.show_web_pages(), "Robots",
       icon="wifi"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
       why_not=_no_panels),
     C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
-      tip=lazy("Begins a message; nothing is sent before you arm it")),
+      tip=lazy("Creates a message; nothing is sent until you arm it")),
     C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
-      tip=lazy("Shows what programs offer to be called")),
+      tip=lazy("Shows the services that programs offer")),
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
-      ("Ctrl+R",), "circle-dot", lazy("Records what programs say, until it is stopped"), under=RECORD),
+      ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), under=RECORD),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
       in_shortcuts=False, why_not=_nothing_recorded),
-    C("recording.sheet", lazy("Choose what to record"), lambda do: do.recording.open_sheet(), "View",
+    C("recording.sheet", lazy("Choose topics to record"), lambda do: do.recording.open_sheet(), "View",
       icon="list-checks", under=RECORD),
-    C("recording.keep", lazy("Keep the last seconds"), lambda do: do.recording.keep(), "View", ("F9",),
-      "history", lazy("Makes a recording of what just happened"), under=RECORD, above=True),
+    C("recording.keep", lazy("Save the last seconds"), lambda do: do.recording.keep(), "View", ("F9",),
+      "history", lazy("Records what just happened"), under=RECORD, above=True),
     C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.choose_folder(), "View",
       icon="folder-open", under=RECORD, above=True),
     C("recording.show", lazy("Recordings"), lambda do: do.recording.show(), "View", icon="film",

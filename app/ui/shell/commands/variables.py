@@ -40,8 +40,8 @@ class VariableCommands:
 
     def new(self, *, is_list: bool) -> None:
         """Ask for the name of a new variable, or of a new list."""
-        question = _("Name of the new list") if is_list else _("Name of the new variable")
-        verb = _("Make the list") if is_list else _("Make the variable")
+        question = _("New list") if is_list else _("New variable")
+        verb = _("Create")
 
         def asked() -> None:
             take = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
@@ -64,8 +64,8 @@ class VariableCommands:
                 return
             has_name = id not in workspace.nameless
             self._ask().ask(
-                _("Another name for “{name}”").format(name=old) if has_name else _("Name of the variable"),
-                _("Rename it") if has_name else _("Name it"),
+                _("New name for “{name}”").format(name=old) if has_name else _("Name of the variable"),
+                _("Rename") if has_name else _("Name it"),
                 lambda name: "" if name == old else self.refusal(name, id),
                 lambda name: self._edit({"do": "rename", "id": id, "name": name}),
                 old if has_name else "",
@@ -120,13 +120,11 @@ class VariableCommands:
 
         def take(words: str) -> None:
             if not runs.put_variable(id, value_of(words)):
-                self._shell.say(
-                    _("The behaviour has ended meanwhile: “{name}” is as it was").format(name=name)
-                )
+                self._shell.say(_("The behaviour ended: “{name}” was not changed").format(name=name))
 
         is_number = now is not None and now.kind == "number"
         self._ask().ask(
-            _("Another value for “{name}”").format(name=name),
+            _("New value for “{name}”").format(name=name),
             _("Use it"),
             lambda words: separators_refusal(words) if is_number else "",
             take,
@@ -138,10 +136,10 @@ class VariableCommands:
         if not name:
             return _("A variable needs a name.")
         if len(name) > LONGEST:
-            return _("This name is too long: {most} characters at most.").format(most=LONGEST)
+            return _("This name is too long. Use at most {most} characters.").format(most=LONGEST)
         used = {each.casefold() for id, each in self._workspace().variables.items() if id != own}
         if name.casefold() in used:
-            return _("There is a variable “{name}” already. Choose another name.").format(name=name)
+            return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
 
     # -- inside -----------------------------------------------------------------------------------

@@ -298,13 +298,13 @@ class ViewCommands:
         def keep(name: str) -> None:
             kept = arrangements.keep_as(bench, base, name)
             words = (
-                _("Kept the layout “{name}”")
+                _("Saved layout “{name}”")
                 if kept
-                else _("“{name}” is kept until Studio closes: it can't be saved")
+                else _("Can't save “{name}”: it is kept only until Studio closes")
             )
             shell.say(words.format(name=name))
 
-        self._ask_name().ask(_("Keep this layout as"), _("Keep it"), arrangements.refusal, keep)
+        self._ask_name().ask(_("Save layout as"), _("Keep"), arrangements.refusal, keep)
 
     def rename_layout(self) -> None:
         """Give the own layout that shows another name."""
@@ -312,8 +312,8 @@ class ViewCommands:
         old = arrangements.own(self._shell.showing)
         if old:
             self._ask_name().ask(
-                _("Another name for “{name}”").format(name=old),
-                _("Rename it"),
+                _("New name for “{name}”").format(name=old),
+                _("Rename"),
                 lambda name: arrangements.refusal(name, old),
                 lambda name: arrangements.rename(old, name),
                 old,
@@ -328,7 +328,7 @@ class ViewCommands:
             words = (
                 _("Deleted the layout “{name}”")
                 if kept
-                else _("“{name}” comes back at the next start: the change can't be saved")
+                else _("Can't save this change: “{name}” will return at the next start")
             )
             shell.say(words.format(name=name), _("Undo"), undo)
 
@@ -345,13 +345,13 @@ class ViewCommands:
                 write_atomically(path, layout_bytes(name, base, bench.save()))
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
-                shell.say(_("{file} can't be written: {reason}").format(file=path.name, reason=reason))
+                shell.say(_("can't write {file}: {reason}").format(file=path.name, reason=reason))
             else:
-                shell.say(_("Saved the layout in {file}").format(file=path.name))
+                shell.say(_("Saved the layout to {file}").format(file=path.name))
 
         kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
         suggestion = Path.home() / f"{file_stem(name)}{kind.ending}"
-        self._files.asks.save_as(_("Save this layout as a file"), suggestion, [kind], save)
+        self._files.asks.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
     def ask_layout(self) -> None:
         """Let a person choose a layout's file, and show it."""
@@ -365,11 +365,11 @@ class ViewCommands:
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
-            shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=reason))
+            shell.say(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
             return
         layouts, before = shell.saved_layouts, shell.saved_layouts.own(found.base)
         if not layouts.fits(shell.show_layout(found.base), found.base, found.saved):
-            shell.say(_("{file} can't be opened: {reason}").format(file=path.name, reason=_("it is damaged")))
+            shell.say(_("Can't open {file}: {reason}").format(file=path.name, reason=_("it is damaged")))
             return
         name, _is_kept = layouts.take_in(found.name, found.base, found.saved)
         self.show_own_layout(name)
@@ -383,7 +383,7 @@ class ViewCommands:
         words = _("Opened the layout “{name}”").format(name=name)
         if found.unknown:
             left_out = listed(list(found.unknown[:MOST_NAMED]))
-            words = _("{opened}, without what this Studio does not have: {panels}").format(
+            words = _("{opened}. Missing panels were left out: {panels}").format(
                 opened=words, panels=left_out
             )
         shell.say(words, _("Undo"), undo)
@@ -466,7 +466,7 @@ class ViewCommands:
             folder.mkdir(0o700, parents=True, exist_ok=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            self._shell.say(_("{folder} can't be made: {reason}").format(folder=folder, reason=reason))
+            self._shell.say(_("Can't create {folder}: {reason}").format(folder=folder, reason=reason))
             return
         if not open_outside(QUrl.fromLocalFile(str(folder))):
             self._shell.say(_("The log files are in {folder}").format(folder=folder))

@@ -68,7 +68,7 @@ class AboutSheet(Overlay):
             said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             grid.addWidget(said, row, 1)
         column.addLayout(grid)
-        self.copy = Button(theme, _("Copy the versions"), "copy", size="form")
+        self.copy = Button(theme, _("Copy version information"), "copy", size="form")
         self.copy.clicked.connect(self._copy)
         foot = QHBoxLayout()
         foot.addWidget(self.copy)
@@ -80,7 +80,7 @@ class AboutSheet(Overlay):
     def _copy(self) -> None:
         text = "\n".join(f"{name}: {version}" for name, version in versions())
         QGuiApplication.clipboard().setText(text)
-        self._say(_("Copied the versions"))
+        self._say(_("Copied version information"))
 
     def first(self) -> QWidget:
         return self._close

@@ -65,7 +65,7 @@ class _Foot(QWidget):
     KEYS = (
         (("↑", "↓"), lazy("choose")),
         (("Enter",), lazy("run")),
-        (("Ctrl+Enter",), lazy("change the shortcut")),
+        (("Ctrl+Enter",), lazy("change shortcut")),
     )
 
     def __init__(self, theme: Theme) -> None:
@@ -120,7 +120,7 @@ class Palette(Overlay):
         self.last: list[str] = []
         self.on_last: Callable[[Sequence[str]], object] = lambda _ids: None
         self.field = _Field(theme)
-        self.rows = EntryList(theme, _("What fits"))
+        self.rows = EntryList(theme, _("Matches"))
         self.nothing = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setContentsMargins(20, 14, 20, 16)
         self.foot = _Foot(theme)
@@ -180,7 +180,7 @@ class Palette(Overlay):
                 if heading not in lines:
                     lines.append(heading)
                 lines.append(each)
-        self.nothing.setText(_("Nothing is called “{words}”.").format(words=query))
+        self.nothing.setText(_("No results for “{words}”.").format(words=query))
         paint.show_when(self.nothing, not lines)
         paint.show_when(self.rows, bool(lines))
         self.rows.show_lines(lines)
@@ -201,7 +201,7 @@ class Palette(Overlay):
         for kind, of_kind in kinds.items():
             if of_kind:
                 lines += [Heading(_(TITLES[kind])), *of_kind]
-        self.foot.counted = ngettext("{count} thing", "{count} things", len(entries)).format(
+        self.foot.counted = ngettext("{count} result", "{count} results", len(entries)).format(
             count=len(entries)
         )
         return lines
@@ -253,7 +253,7 @@ TITLES = {
     "recent": lazy("Recently used"),
     "command": lazy("Commands"),
     "panel": lazy("Panels"),
-    "another": lazy("One more panel"),
+    "another": lazy("Another panel"),
     "topic": lazy("Topics"),
     "robot": lazy("Robots"),
     "layout": lazy("Layouts"),

@@ -68,10 +68,10 @@ class FileQuestion:
     kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOURS[0], SUFFIX),)
 
 
-OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours and no folders are in here."))
-SAVE = FileQuestion(lazy("Save the behaviour"), lazy("Save"), lazy("Nothing is in here yet."), saves=True)
+OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours or folders here."))
+SAVE = FileQuestion(lazy("Save behaviour"), lazy("Save"), lazy("This folder is empty."), saves=True)
 PICTURE = FileQuestion(
-    lazy("Choose a picture"), lazy("Choose"), lazy("No pictures and no folders are in here."),
+    lazy("Choose an image"), lazy("Choose"), lazy("No images or folders here."),
     endings=PICTURE_ENDINGS, icon="image",
 )  # fmt: skip
 FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endings=(), wants_folder=True)
@@ -93,8 +93,8 @@ def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...
         FolderPlace(_("Home"), "house", Path.home()),
         FolderPlace(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
         FolderPlace(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
-        FolderPlace(_("Pictures"), "image", Path(pictures_folder())),
-        FolderPlace(_("Kept by Studio"), "archive", studio),
+        FolderPlace(_("Images"), "image", Path(pictures_folder())),
+        FolderPlace(_("Backed up by Studio"), "archive", studio),
         *(FolderPlace(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
     ]
     made: list[FolderPlace] = []
@@ -152,20 +152,20 @@ class FileSheet(Overlay):
         self.question = OPEN
         self.folder = Path.home()
         self.heading = label("", "heading")
-        self.up = IconButton(theme, "arrow-up", _("To the folder above"), "Alt+Up")
+        self.up = IconButton(theme, "arrow-up", _("Parent folder"), "Alt+Up")
         self.up.clicked.connect(lambda: self.go_to(self.folder.parent))
         self.path = ElidedLabel("body", "textSecondary")
         self.new_folder = Button(theme, _("New folder"), "folder-plus", size="small")
         self.new_folder.clicked.connect(self._ask_folder)
         self.folder_name = QLineEdit()
-        self.folder_name.setPlaceholderText(_("Name of the new folder"))
-        self.folder_name.setAccessibleName(_("Name of the new folder"))
-        self.make_folder = Button(theme, _("Make it"), size="small")
+        self.folder_name.setPlaceholderText(_("Folder name"))
+        self.folder_name.setAccessibleName(_("Folder name"))
+        self.make_folder = Button(theme, _("Create"), size="small")
         self.make_folder.clicked.connect(self._make_folder)
-        self.places = ScrollColumn(_("Places"), gap=2)
+        self.places = ScrollColumn(_("Locations"), gap=2)
         self.list = QTreeWidget()
         self.name = QLineEdit()
-        self.name.setAccessibleName(_("Name of the file"))
+        self.name.setAccessibleName(_("File name"))
         self.name.textEdited.connect(lambda _text: self._judge())
         self.name.returnPressed.connect(self._done)
         self.folder_name.returnPressed.connect(self._make_folder)
@@ -173,7 +173,7 @@ class FileSheet(Overlay):
             field.setProperty("focusRadius", theme.radius("control"))
             EditMenu(theme, field)
         self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
-        self.kind = ComboBox(theme, name=_("Kind of file"))
+        self.kind = ComboBox(theme, name=_("File type"))
         self.kind.currentIndexChanged.connect(self._kind_chosen)
         self.said = label("", "body", role="textSecondary", wrap=True)
         self.cancel = Button(theme, _("Cancel"), size="form")
@@ -193,7 +193,7 @@ class FileSheet(Overlay):
         tree.setFrameShape(QFrame.Shape.NoFrame)
         tree.setRootIsDecorated(False)
         tree.setUniformRowHeights(True)
-        tree.setHeaderLabels([_("Name"), _("Changed"), _("Size")])
+        tree.setHeaderLabels([_("Name"), _("Modified"), _("Size")])
         tree.setSortingEnabled(True)
         tree.sortByColumn(NAME, Qt.SortOrder.AscendingOrder)
         tree.header().setHighlightSections(False)
@@ -354,7 +354,7 @@ class FileSheet(Overlay):
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             self._say(
-                _("“{folder}” can't be opened: {reason}.").format(folder=folder.name, reason=reason), "error"
+                _("Can't open “{folder}”: {reason}.").format(folder=folder.name, reason=reason), "error"
             )
             return
         before, self.folder = self.folder, folder
@@ -417,15 +417,15 @@ class FileSheet(Overlay):
 
     def _make_folder(self) -> None:
         name = self.folder_name.text().strip()
-        wrong = name_refusal(name) or ("" if name else _("Give the folder a name."))
+        wrong = name_refusal(name) or ("" if name else _("Enter a folder name."))
         if not wrong and (self.folder / name).exists():
-            wrong = _("“{name}” is there already.").format(name=name)
+            wrong = _("“{name}” already exists.").format(name=name)
         if not wrong:
             try:
                 (self.folder / name).mkdir()
             except OSError as error:
                 reason = (error.strerror or str(error)).lower()
-                wrong = _("“{name}” can't be made: {reason}.").format(name=name, reason=reason)
+                wrong = _("Can't create “{name}”: {reason}.").format(name=name, reason=reason)
         if wrong:
             self._say(wrong, "error")
             return
@@ -468,13 +468,13 @@ class FileSheet(Overlay):
         if wrong:
             self._say(wrong, "error")
         elif not writable:
-            self._say(_("You may not save in this folder. Choose another one."), "error")
+            self._say(_("You don't have permission to save in this folder. Choose another one."), "error")
         elif taken and target is not None:
             name = target.name.removesuffix(SUFFIX)
-            self._say(_("“{name}” is there already. Replace it, or keep both.").format(name=name), "text")
+            self._say(_("“{name}” already exists. Replace it, or keep both.").format(name=name), "text")
         elif wants_folder and target is not None:
             name = target.name or str(target)
-            self._say(_("Pictures will be kept in “{folder}”.").format(folder=name), "text")
+            self._say(_("Images will be saved in “{folder}”.").format(folder=name), "text")
         elif not self.list.topLevelItemCount():
             self._say(_(self.question.empty), "textSecondary")
         else:
@@ -486,7 +486,9 @@ class FileSheet(Overlay):
         if whole is None:
             return name_refusal(name)
         return (
-            "" if whole.parent.is_dir() else _("There is no folder “{folder}”.").format(folder=whole.parent)
+            ""
+            if whole.parent.is_dir()
+            else _("The folder “{folder}” doesn't exist.").format(folder=whole.parent)
         )
 
     def _say(self, words: str, role: str) -> None:

@@ -58,7 +58,7 @@ class MotionQuestion(QWidget):
         self.title = label("", "heading", wrap=True)
         self.sentence = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.always = Switch(theme, "")
-        self.let = Button(theme, _("Let it move"), "footprints", kind="primary", size="form")
+        self.let = Button(theme, _("Allow motion"), "footprints", kind="primary", size="form")
         self.not_now = Button(theme, _("Not now"), size="form")
         self.let.clicked.connect(lambda: self._answer(let=True))
         self.not_now.clicked.connect(lambda: self._answer(let=False))
@@ -110,7 +110,7 @@ class MotionQuestion(QWidget):
             self._always_for = _("Always for {robot}").format(robot=names[0])
         self.always.setAccessibleName(self._always_for)
         self.always.setChecked(False)
-        self.let.set_word(_("Let it move") if len(names) == 1 else _("Let them move"))
+        self.let.set_word(_("Allow motion"))
         self.setAccessibleName(question.title)
         self.setAccessibleDescription(question.sentence)
         if not self.isVisible():

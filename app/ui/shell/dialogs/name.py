@@ -32,7 +32,7 @@ class NameSheet(Overlay):
         EditMenu(theme, self.field)
         self.wrong = label("", "body", role="error", wrap=True)
         self.button = Button(theme, "", kind="primary", size="form")
-        cancel = Button(theme, _("Leave it"), size="form")
+        cancel = Button(theme, _("Cancel"), size="form")
         cancel.clicked.connect(self.shut)
         row = QHBoxLayout()
         row.addStretch(1)

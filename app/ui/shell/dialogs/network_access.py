@@ -14,8 +14,8 @@ from nep.i18n import _, lazy
 
 WIDE = 520
 WARNING = lazy(
-    "Everybody in that network can then read what the robots say and command them. There is no password: do"
-    " this only in a network that you trust, and never in a public one."
+    "Anyone on this network will be able to see and control your robots. There is no password: "
+    "use a network you trust, never a public one."
 )
 
 
@@ -30,14 +30,14 @@ class NetworkAccessSheet(Overlay):
         self.heading = label("", "heading", wrap=True)
         self.warning = label("", "bodyLarge", role="textSecondary", wrap=True)
         self.where = QHBoxLayout()
-        self.where_word = label(_("At the address"), "bodyLarge", role="textSecondary")
+        self.where_word = label(_("Network address"), "bodyLarge", role="textSecondary")
         self.choice: ComboBox | None = None
-        self.typed_word = label(_("Programs there need this setting:"), "body", role="textSecondary")
+        self.typed_word = label(_("On the other computers, set:"), "body", role="textSecondary")
         self.typed = label("", "code")
         self.typed.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.copy = IconButton(theme, "copy", _("Copy the setting"))
+        self.copy = IconButton(theme, "copy", _("Copy setting"))
         self.copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.typed.text()))
-        self.yes = Button(theme, _("Let them connect"), "wifi", kind="primary", size="form")
+        self.yes = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
         self.no = Button(theme, _("Not now"), size="form")
         self.end = Button(theme, _("This computer only"), "lock", size="form")
         self.yes.clicked.connect(self._let_in)
@@ -104,7 +104,7 @@ class NetworkAccessSheet(Overlay):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
         paint.show_when(self.end, is_open and access.is_near)
-        self.no.set_word(_("Leave it as it is") if is_open or not can_open else _("Not now"))
+        self.no.set_word(_("Cancel") if is_open or not can_open else _("Not now"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:
@@ -113,14 +113,18 @@ class NetworkAccessSheet(Overlay):
         if is_open:
             addresses = ", ".join(self._access.hosts)
             return _("Other computers can connect at {addresses}").format(addresses=addresses)
-        return _("Let other computers connect?") if can_open else _("This computer is in no network")
+        return (
+            _("Let other computers connect?")
+            if can_open
+            else _("This computer is not connected to a network")
+        )
 
     def _words(self, *, is_open: bool, can_open: bool) -> str:
         if not self._access.is_near:
-            return _("Who may connect is decided there.")
+            return _("Connections are controlled on that computer.")
         if is_open or can_open:
             return _(WARNING)
-        return _("Join a Wi-Fi or plug in a cable, then open this again.")
+        return _("Join a Wi-Fi network or plug in a cable, then try again.")
 
     def _say_typed(self, host: str) -> None:
         self.typed.setText(self._access.typed_by_others(host))

@@ -23,8 +23,8 @@ SWITCH_WIDE = 132
 LOOK_MS = 300
 SIDE, GAP, SCROLL_BAR = 19, 12, 10
 INTRODUCTION = lazy(
-    "Studio shows its own network. Switch on another one to see its topics and nodes beside it. Studio only"
-    " listens there."
+    "Studio shows its own network. Turn on another network to see its topics and nodes as "
+    "well. Studio only receives there and sends nothing."
 )
 
 
@@ -212,11 +212,11 @@ def state_words(network: OtherNetwork) -> str:
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
     if network.state == "looking":
-        return _("Looking for it.")
+        return _("Searching.")
     if network.state == "off":
         return _(network.kind.hint)
     topics, nodes = len(network.topics), len(network.nodes)
-    return _("There: {topics}, {nodes}.").format(
+    return _("Connected: {topics}, {nodes}.").format(
         topics=ngettext("{count} topic", "{count} topics", topics).format(count=grouped(topics)),
         nodes=ngettext("{count} node", "{count} nodes", nodes).format(count=grouped(nodes)),
     )

@@ -114,10 +114,10 @@ class RecordSheet(Overlay):
 
     def _make_meters(self) -> None:
         self.length = RecordMeter(_("Length"))
-        self.size_so_far = RecordMeter(_("Size so far"))
-        self.unkept = RecordMeter(_("Lost in writing"))
-        self.disk = RecordMeter(_("Disk left"))
-        self.at_end = RecordMeter(_("Will be"))
+        self.size_so_far = RecordMeter(_("Current size"))
+        self.unkept = RecordMeter(_("Write errors"))
+        self.disk = RecordMeter(_("Free disk space"))
+        self.at_end = RecordMeter(_("Expected"))
         self._meters = Card(self.theme)
         row = QHBoxLayout(self._meters)
         row.setContentsMargins(1, 1, 1, 1)
@@ -132,9 +132,13 @@ class RecordSheet(Overlay):
 
     def _make_form(self) -> None:
         theme = self.theme
-        self.name = self._field(_("Name"), _("the time, when it has no name"))
-        self.note = self._field(_("Note"), _("what it is about"))
-        options = [("all", _("All"), None), ("chosen", _("Chosen"), None), ("pattern", _("By pattern"), None)]
+        self.name = self._field(_("Name"), _("the time if left empty"))
+        self.note = self._field(_("Note"), _("subject"))
+        options = [
+            ("all", _("All"), None),
+            ("chosen", _("Selected"), None),
+            ("pattern", _("By pattern"), None),
+        ]
         self.mode = Segments(theme, options, check=True, name=_("Topics"))
         self.mode.changed.connect(self._choose_mode)
         self.count = label("", "small", role="textSecondary")
@@ -143,19 +147,19 @@ class RecordSheet(Overlay):
         self.wrong = label("", "small", role="error", wrap=True)
         self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model, "topic")
-        self.table.setAccessibleName(_("Topics that are recorded"))
+        self.table.setAccessibleName(_("Topics to record"))
         self.table.opened.connect(self._toggle)
         self.table.order_changed.connect(self._show_topics)
         self.table.setMinimumHeight(ROWS_HIGH)
         self.later = label(
-            _("New topics that fit are recorded from their first message."), "small", role="textTertiary",
+            _("New matching topics are recorded from their first message."), "small", role="textTertiary",
             wrap=True,
         )  # fmt: skip
 
         self.ends_min = NumberEdit(theme, LEAST_MIN, MOST_MIN, _("min"), 1, empty=True)
-        self.ends_min.setAccessibleName(_("Minutes after which it ends"))
+        self.ends_min.setAccessibleName(_("Stop after (minutes)"))
         self.ends_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1, empty=True)
-        self.ends_gb.setAccessibleName(_("GB at which it ends"))
+        self.ends_gb.setAccessibleName(_("Stop at (GB)"))
         for field, name in ((self.ends_min, "ends_min"), (self.ends_gb, "ends_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
             field.number.connect(lambda value, name=name: self._change(**{name: value}))
@@ -177,15 +181,15 @@ class RecordSheet(Overlay):
         self.ring = Switch(theme, _("Flight recorder"))
         self.ring.clicked.connect(self._switch_ring)
         self.seconds = NumberEdit(theme, LEAST_S, MOST_S, _("s"))
-        self.seconds.setAccessibleName(_("Seconds that are kept"))
+        self.seconds.setAccessibleName(_("Seconds to keep"))
         self.seconds.number.connect(lambda value: self._wish(seconds=round(value)))
         self.size_gb = NumberEdit(theme, LEAST_GB, MOST_GB, "GB", 1)
-        self.size_gb.setAccessibleName(_("GB on the disk at most"))
+        self.size_gb.setAccessibleName(_("Maximum size on disk (GB)"))
         self.size_gb.number.connect(lambda value: self._wish(size_gb=value))
         for field in (self.seconds, self.size_gb):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
             field.problem.connect(self._ring_problem)
-        self.ring_topics = PatternField(theme, _("Topics that are kept"), _("all topics; or /arm/* *camera*"))
+        self.ring_topics = PatternField(theme, _("Topics to keep"), _("all topics; or /arm/* *camera*"))
         self.ring_topics.settled.connect(self._take_ring_topics)
         self.ring_bar = ValueBar(theme)
         self.ring_words = label("", "small", role="textSecondary", wrap=True)
@@ -195,7 +199,7 @@ class RecordSheet(Overlay):
 
     def _make_foot(self) -> None:
         theme = self.theme
-        self.foot = label(_("A power cut costs 1 s at most"), "small", role="textTertiary", wrap=True)
+        self.foot = label(_("A power failure loses 1 s at most"), "small", role="textTertiary", wrap=True)
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
         self.bookmark.clicked.connect(self._bookmark)
         self.record = Button(theme, _("Record"), "circle-dot", kind="primary", size="form")
@@ -219,7 +223,7 @@ class RecordSheet(Overlay):
         return form
 
     def _ends_row(self) -> Flow:
-        title = label(_("Ends"), "body", role="textSecondary")
+        title = label(_("Stop"), "body", role="textSecondary")
         title.setMinimumWidth(round(self.theme.scaled(LABEL_WIDE)))
         words = [label(_("after")), label(_("or at"))]
         return _flow(title, words[0], self.ends_min, words[1], self.ends_gb, self.ends_words)
@@ -320,7 +324,7 @@ class RecordSheet(Overlay):
         def figures(topic: Topic) -> Cell:
             known = self._recordings.client.state.topics.get(topic.name)
             if not self._has(topic.name):
-                return Cell(_("left out"), role="textTertiary")
+                return Cell(_("excluded"), role="textTertiary")
             return Cell(size_words(known.size_bytes) if known is not None else "")
 
         def lost(topic: Topic) -> Cell:
@@ -332,14 +336,14 @@ class RecordSheet(Overlay):
 
         def is_there(topic: Topic) -> Cell:
             if self._has(topic.name):
-                return Cell(icon="check", role="accentText", said=_("is recorded"))
-            return Cell(icon="minus", role="textTertiary", said=_("left out"))
+                return Cell(icon="check", role="accentText", said=_("recorded"))
+            return Cell(icon="minus", role="textTertiary", said=_("excluded"))
 
         def ink(topic: Topic) -> str:
             return "text" if self._has(topic.name) else "textTertiary"
 
         return (
-            Column("has", "", 40, is_there, words=lazy("Is recorded")),
+            Column("has", "", 40, is_there, words=lazy("Recorded")),
             Column("topic", lazy("Topic"), 170, lambda topic: Cell(topic.name, role=ink(topic), mono=True),
                    key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),
             Column("rate", lazy("Rate /s"), 72,
@@ -348,8 +352,8 @@ class RecordSheet(Overlay):
             Column("bandwidth", lazy("Bandwidth"), 88,
                    lambda topic: Cell(bandwidth_words(topic.bandwidth_Bps), role=ink(topic)),
                    key=lambda topic: topic.bandwidth_Bps, figures=True, yields=2),
-            Column("size", lazy("So far"), 84, figures, figures=True, yields=1),
-            Column("lost", lazy("Lost on the way"), 112, lost, figures=True),
+            Column("size", lazy("Elapsed"), 84, figures, figures=True, yields=1),
+            Column("lost", lazy("Lost in transit"), 112, lost, figures=True),
         )  # fmt: skip
 
     @property
@@ -409,9 +413,9 @@ class RecordSheet(Overlay):
         self._show_ring()
         no_master = self._session.master.kind != "connected"
         self.foot.setText(
-            _("No master is there: it records as soon as one is")
+            _("Waiting for a master; recording starts when one appears")
             if no_master
-            else _("A power cut costs 1 s at most")
+            else _("A power failure loses 1 s at most")
         )
 
     def _show_meters(self) -> None:
@@ -430,13 +434,13 @@ class RecordSheet(Overlay):
             self._written = (elapsed, state.size_bytes)
         speed = self._speed
         begins = state.phase == "starting"
-        self.length.say(length_words(elapsed), _("begins") if begins else _("recording"), "error")
+        self.length.say(length_words(elapsed), _("starting") if begins else _("recording"), "error")
         written = _("{speed} written").format(speed=bandwidth_words(speed)) if speed is not None else ""
         self.size_so_far.say(size_words(state.size_bytes), written)
         count = ngettext("{count} message", "{count} messages", state.unkept)
         self.unkept.say(
             count.format(count=grouped(state.unkept)) if state.unkept else _("none"),
-            _("the disk is too slow") if state.unkept else _("all is written"),
+            _("the disk is too slow") if state.unkept else _("all data written"),
             "warn" if state.unkept else "ok",
         )
         self._show_end(recordings.recorded.end(elapsed, state.size_bytes, speed))
@@ -460,7 +464,7 @@ class RecordSheet(Overlay):
         """What is wrong with a limit, else what the two mean."""
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
-        usual = _("whichever comes first") if both else _("when you end it") if none else ""
+        usual = _("whichever comes first") if both else _("when you stop it") if none else ""
         self.ends_words.setText(sentence or usual)
         set_role(self.ends_words, "error" if sentence else "textSecondary")
 
@@ -489,14 +493,14 @@ class RecordSheet(Overlay):
     def _show_ring(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         wish = recordings.wish
-        self.keep.set_word(_("Keep the last {count} s").format(count=wish.seconds))
+        self.keep.set_word(_("Save the last {count} s").format(count=wish.seconds))
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)
-            self.ring_words.setText(_("It begins.") if wish.is_on else _("It is off: nothing is kept."))
+            self.ring_words.setText(_("Starting.") if wish.is_on else _("Off: nothing is saved."))
             return
         self.ring_bar.set_fraction(state.ring_s / wish.seconds)
-        words = _("{count} s there, {size} of {most}").format(
+        words = _("{count} s buffered, {size} of {most}").format(
             count=round(min(state.ring_s, wish.seconds)),
             size=size_words(state.ring_bytes),
             most=size_words(wish.size_gb * _GB),

@@ -35,15 +35,15 @@ LOOK_MS = 50
 ICON = 15
 ZIP = FileKind(lazy("Zip file"), ENDING)
 INTRODUCTION = lazy(
-    "Studio writes one file that tells how it is on this computer. Nothing is sent: you give the file to"
-    " whoever helps you."
+    "Studio writes a file that describes its state on this computer. Nothing is sent: you give "
+    "the file to the person who helps you."
 )
 NO_BEHAVIOURS = lazy("Your behaviours")
-NO_BEHAVIOURS_UNLESS = lazy("Your behaviours, unless you switch them on below")
+NO_BEHAVIOURS_UNLESS = lazy("Your behaviours, unless you include them below")
 NOT_IN_IT = (
     NO_BEHAVIOURS,
-    lazy("Pictures, sounds, and what robots tell"),
-    lazy("Keys, passwords and access codes; your home folder stands there as ~"),
+    lazy("Images, sounds and robot messages"),
+    lazy("Keys, passwords and access codes. Your home folder appears as ~"),
 )
 
 Behaviours = Callable[[], Sequence[ReportedWork]]
@@ -80,12 +80,12 @@ class ReportSheet(Overlay):
         self.happened = LongText(theme, _("What happened?"))
         self.list = QVBoxLayout()
         self.list.setSpacing(4)
-        self.work = Switch(theme, _("My open behaviours, too"))
+        self.work = Switch(theme, _("Include my open behaviours"))
         self.names = label("", "small", role="textSecondary", wrap=True)
         self.state = label("", "body", role="textSecondary", wrap=True)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.show_file = Button(theme, _("Show the file"), "folder-open", kind="primary", size="form")
-        self.write = Button(theme, _("Write the report"), "file-archive", kind="primary", size="form")
+        self.write = Button(theme, _("Write report"), "file-archive", kind="primary", size="form")
         self._looking = QTimer(self)
         self._looking.setInterval(LOOK_MS)
         self._looking.timeout.connect(self._look)
@@ -130,10 +130,10 @@ class ReportSheet(Overlay):
         inside.addWidget(label(_("What happened?"), "title"))
         inside.addWidget(self.happened)
         inside.addSpacing(6)
-        inside.addWidget(label(_("In the file"), "title"))
+        inside.addWidget(label(_("Included"), "title"))
         inside.addLayout(self.list)
         inside.addSpacing(6)
-        inside.addWidget(label(_("Not in it"), "title"))
+        inside.addWidget(label(_("Not included"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
         self._left_out = [_Line(self.theme, _(words), "x") for words in NOT_IN_IT]
@@ -198,7 +198,7 @@ class ReportSheet(Overlay):
 
     def _ask_where(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
-        self._asks.save_as(_("Write the report"), suggestion, (ZIP,), lambda path, _kind: self._begin(path))
+        self._asks.save_as(_("Write report"), suggestion, (ZIP,), lambda path, _kind: self._begin(path))
 
     def _begin(self, path: Path) -> None:
         parts = self._parts
@@ -209,7 +209,7 @@ class ReportSheet(Overlay):
         # A copy: the settings of now may change while the thread reads them.
         still = replace(parts, settings=dict(parts.settings))
         self._writer = ReportWriter(path, lambda: make_report(still, happened, work))
-        self._tell(_("It is being written."))
+        self._tell(_("Writing the report."))
         self._looking.start()
 
     def _look(self) -> None:

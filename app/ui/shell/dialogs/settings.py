@@ -24,9 +24,9 @@ WIDE = 620
 MODE_WORDS = {
     "light": (lazy("Light"), "sun"),
     "dark": (lazy("Dark"), "moon"),
-    "system": (lazy("As the system"), "monitor"),
+    "system": (lazy("Match system"), "monitor"),
 }
-PREFERENCE_WORDS = {"system": lazy("As the system"), "on": lazy("On"), "off": lazy("Off")}
+PREFERENCE_WORDS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 SIDE_BY_SIDE = 3
 """So many languages stand side by side; more are a list to open."""
@@ -55,23 +55,23 @@ class SettingsSheet(Overlay):
         super().__init__(theme, window, _("Settings"))
         self._state, self._settings, self._files, self._voice = state, settings, files, voice
         self.language = self._language_input()
-        self.from_next_start = label(_("From the next start of Studio"), "body", role="textSecondary")
+        self.from_next_start = label(_("Applies after restarting Studio"), "body", role="textSecondary")
         self.restart = Button(theme, _("Restart now"), "rotate-ccw", size="form")
         self._can_restart = restart is not None
         if restart is not None:
             self.restart.clicked.connect(restart)
         modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
-        look = pgettext("colours of the window", "Look")
+        look = pgettext("colours of the window", "Theme")
         self.mode = Segments(theme, modes, check=True, size="form", name=look)
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
         wishes = [(wish, _(PREFERENCE_WORDS[wish]), None) for wish in PREFERENCES]
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
-        self.motion = Segments(theme, wishes, check=True, size="form", name=_("Less motion"))
-        self.robots = Switch(theme, _("Come back at the next start"))
+        self.motion = Segments(theme, wishes, check=True, size="form", name=_("Reduce motion"))
+        self.robots = Switch(theme, _("Reopen at startup"))
         self.voice = label("", "body", role="textSecondary", wrap=True)
-        self.shortcuts = Button(theme, _("Change the shortcuts"), "keyboard", size="form")
+        self.shortcuts = Button(theme, _("Change shortcuts"), "keyboard", size="form")
         self.folder = ElidedLabel("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
         self.mode.changed.connect(self._mode)
@@ -131,14 +131,14 @@ class SettingsSheet(Overlay):
         heard.addWidget(self.voice, 1)
         rows: tuple[tuple[str, QWidget | QHBoxLayout], ...] = (
             (_("Language"), spoken),
-            (pgettext("colours of the window", "Look"), self.mode),
+            (pgettext("colours of the window", "Theme"), self.mode),
             (_("Text size"), self.text),
             (_("High contrast"), self.contrast),
-            (_("Less motion"), self.motion),
+            (_("Reduce motion"), self.motion),
             (_("Virtual robots"), self.robots),
-            (_("Voice of robots"), heard),
+            (_("Robot voice"), heard),
             (_("Keyboard"), self.shortcuts),
-            (_("Pictures"), pictures),
+            (_("Images"), pictures),
         )
         for row, (words, control) in enumerate(rows):
             said = label(words, "bodyLarge", role="textSecondary")

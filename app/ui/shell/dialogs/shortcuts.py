@@ -30,7 +30,7 @@ ONLY_MODIFIERS = frozenset(
     }
 )
 PLACES = {"file": lazy("File"), "panel": lazy("Panels"), "edit": lazy("Edit")}
-HINT = lazy("Enter or a click gives a command another key. Delete takes its key away.")
+HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove it.")
 
 
 class ShortcutSheet(Overlay):
@@ -43,11 +43,11 @@ class ShortcutSheet(Overlay):
         self._shortcuts = shortcuts
         self._waiting = ""
         self._offer: tuple[str, str] | None = None  # a command and the key that another one has
-        self.field = SearchField(theme, _("Find a command or a key"))
+        self.field = SearchField(theme, _("Find a command or key"))
         self.rows = EntryList(theme, _("Keyboard shortcuts"))
         self.said = label(_(HINT), "body", role="textSecondary", wrap=True)
-        self.swap = Button(theme, _("Swap the two"), size="small")
-        self.reset = Button(theme, _("Reset this one"), size="small")
+        self.swap = Button(theme, _("Swap shortcuts"), size="small")
+        self.reset = Button(theme, _("Reset this shortcut"), size="small")
         self.reset_all = Button(theme, _("Reset all"), size="small")
         self._lay_out()
         self.field.installEventFilter(self)
@@ -125,14 +125,14 @@ class ShortcutSheet(Overlay):
             if not row.in_shortcuts:
                 continue
             keys = "\n".join(self._shortcuts.of(row.id))
-            note = _("yours") if self._shortcuts.own(row.id) else ""
+            note = _("custom") if self._shortcuts.own(row.id) else ""
             place = row.menu or PLACES.get(row.id.partition(".")[0], "View")
             group = groups.setdefault(_(place), [])
             group.append(Entry(f"command:{row.id}", row.words, "", note, keys))
         for number, fixed in enumerate(FIXED):
             keys = "\n".join(fixed.key.split(", "))
             groups.setdefault(_(fixed.place), []).append(
-                Entry(f"fixed:{number}", _(fixed.words), "", _("stays"), keys)
+                Entry(f"fixed:{number}", _(fixed.words), "", _("always"), keys)
             )
         return [(heading, entry) for heading, entries in groups.items() for entry in entries]
 
@@ -152,13 +152,13 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._tell(_("“{command}” keeps its key.").format(command=entry.words))
+            self._tell(_("The shortcut of “{command}” was not changed.").format(command=entry.words))
             return
         self._waiting, self._offer = entry.name, None
         self.rows.look.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
-        words = _("Press the new key for “{command}”. Esc leaves it as it is.")
+        words = _("Press the new shortcut for “{command}”. Esc cancels.")
         self._tell(words.format(command=entry.words))
         self.rows.viewport().update()
 
@@ -214,19 +214,25 @@ class ShortcutSheet(Overlay):
         holder = self._shortcuts.holder(key)
         if holder and holder != name:
             other = self._shortcuts.commands[holder].words
-            said = _("{key} is “{command}” now. Swap the two, or press Enter again.")
+            said = _(
+                "{key} is already the shortcut of “{command}”. Swap them, or press Enter again to replace it."
+            )
             self._stop_waiting(said.format(key=spoken_key(key), command=other))
             self._offer = (name, key)
             paint.show_when(self.swap, True)
             return
-        self._stop_waiting(_("“{command}” has {key} now.").format(command=words, key=spoken_key(key)))
+        self._stop_waiting(
+            _("The shortcut of “{command}” is now {key}.").format(command=words, key=spoken_key(key))
+        )
         self._shortcuts.give(name, key)
 
     def _swap(self) -> None:
         if self._offer is not None:
             name, key = self._offer
             words = self._shortcuts.commands[name].words
-            self._stop_waiting(_("“{command}” has {key} now.").format(command=words, key=spoken_key(key)))
+            self._stop_waiting(
+                _("The shortcut of “{command}” is now {key}.").format(command=words, key=spoken_key(key))
+            )
             self._shortcuts.swap(name, key)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -235,15 +241,15 @@ class ShortcutSheet(Overlay):
         if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
             return
         if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
-            self._tell(_("Stop keeps F12."))
+            self._tell(_("F12 always remains a shortcut of Stop."))
             return
-        said = _("“{command}” has no key of its own now.").format(command=entry.words)
-        self._stop_waiting(_("Stop has only F12 now.") if entry.name == STOP else said)
+        said = _("“{command}” no longer has a shortcut.").format(command=entry.words)
+        self._stop_waiting(_("Stop now has only F12.") if entry.name == STOP else said)
         self._shortcuts.give(entry.name, "")
 
     def _reset(self) -> None:
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
-            self._stop_waiting(_("“{command}” has its first key again.").format(command=entry.words))
+            self._stop_waiting(_("Reset the shortcut of “{command}”.").format(command=entry.words))
             self._shortcuts.reset(entry.name)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)

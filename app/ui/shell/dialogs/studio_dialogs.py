@@ -14,11 +14,11 @@ from app.ui.widgets.file_dialogs import LAYOUTS, FileKind, pictures_folder
 from nep.i18n import lazy
 
 RECORDING = FileQuestion(
-    lazy("Open a recording"), lazy("Open"), lazy("No recordings and no folders are in here."),
+    lazy("Open a recording"), lazy("Open"), lazy("No recordings or folders here."),
     endings=(".mcap",), icon="film",
 )  # fmt: skip
 LAYOUT = FileQuestion(
-    lazy("Open a layout"), lazy("Open"), lazy("No layouts and no folders are in here."),
+    lazy("Open a layout"), lazy("Open"), lazy("No layouts or folders here."),
     endings=(LAYOUTS[1].lstrip("*"),), icon="layout-panel-left",
 )  # fmt: skip
 

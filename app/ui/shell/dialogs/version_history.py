@@ -26,13 +26,13 @@ from app.ui.widgets.lists.fuzzy import Entry, Match
 from nep.i18n import _, day_text, lazy, ngettext
 
 WIDE, MOST_HIGH, EMPTY_HIGH = 680, 560, 330
-HINT = lazy("A copy opens in a tab of its own; the file stays as it is.")
+HINT = lazy("Opens a copy in a new tab. Your file doesn't change.")
 WHAT_MAKES_ONE = lazy(
-    "Studio keeps what the file said before each time that it writes over it: when you save, save as, or"
-    " close a tab with unsaved work."
+    "Studio keeps the previous version of a file each time it is saved, saved under another "
+    "name, or closed with unsaved work."
 )
 SAVE_FIRST = lazy(
-    "Save it. From then on Studio keeps what the file said before each time that you save again."
+    "Save the behaviour to a file. From then on Studio keeps the previous version each time you save."
 )
 
 
@@ -46,8 +46,8 @@ def difference_words(found: Difference) -> str:
     changes = ", ".join(words.format(count=count) for count, words in counts if count)
     blocks = ngettext("{count} block", "{count} blocks", found.blocks).format(count=grouped(found.blocks))
     if changes:
-        return _("{blocks}; since then {changes}").format(blocks=blocks, changes=changes)
-    same = _("{blocks}, put in another order") if found.moved else _("{blocks}, the same as now")
+        return _("{blocks}, {changes} since").format(blocks=blocks, changes=changes)
+    same = _("{blocks}, reordered") if found.moved else _("{blocks}, unchanged since")
     return same.format(blocks=blocks)
 
 
@@ -124,7 +124,7 @@ class VersionHistorySheet(Overlay):
         lines: list[Line] = [self._line(each, moment) for each in own]
         if others:
             lines += [
-                Heading(_("Of other files called {name}").format(name=name)),
+                Heading(_("Versions of other files named {name}").format(name=name)),
                 *(self._line(each, moment) for each in others),
             ]
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
@@ -138,7 +138,7 @@ class VersionHistorySheet(Overlay):
 
     def _say_nothing(self, name: str, path: Path | None) -> None:
         if path is None:
-            self.empty.say(_("{name} has no file yet").format(name=name), _(SAVE_FIRST))
+            self.empty.say(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
             self.empty.set_actions([EmptyAction(_("Save"), self._save_it, "save", primary=True)])
         else:
             self.empty.say(_("No earlier versions yet"), _(WHAT_MAKES_ONE))

@@ -291,10 +291,10 @@ class Dock(QDockWidget):
         if own:
             menu.addSeparator()
         if self.description.several:
-            more = menu.addAction(self._theme.icon("plus"), _("One more beside it"))
+            more = menu.addAction(self._theme.icon("plus"), _("Open another panel to the side"))
             more.triggered.connect(lambda: self.another_wanted.emit(self.key))
         icon = self._theme.icon("picture-in-picture-2")
-        floating = menu.addAction(icon, _("Dock it") if self.isFloating() else _("Float"))
+        floating = menu.addAction(icon, _("Dock") if self.isFloating() else _("Float"))
         floating.triggered.connect(self._float)
         menu.addAction(self._theme.icon("x"), _("Close")).triggered.connect(self.close)
         return menu

@@ -120,7 +120,7 @@ class DockTitle(QWidget):
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = ElidedLabel("code", "textTertiary")
         self._tabs: list[TitleTab] = []
-        self.more = IconButton(theme, "ellipsis", _("More about {panel}").format(panel=panel.title()))
+        self.more = IconButton(theme, "ellipsis", _("Options of {panel}").format(panel=panel.title()))
         self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)

@@ -62,17 +62,17 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     try:
         told = deep_json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise LayoutFileError(_("it is damaged, or no layout of Studio")) from error
+        raise LayoutFileError(_("it is damaged or not a layout of Studio")) from error
     if not isinstance(told, dict) or told.get("format") != FORMAT:
-        raise LayoutFileError(_("it is no layout of Studio"))
+        raise LayoutFileError(_("it is not a layout of Studio"))
     version = told.get("version")
     if type(version) is not int or version < 1:
         raise LayoutFileError(_("it is damaged"))
     if version > VERSION:
-        raise LayoutFileError(_("a newer Studio has made it; update this one"))
+        raise LayoutFileError(_("it was made by a newer Studio; update this one"))
     base, saved = told.get("base"), told.get("arrangement")
     if not isinstance(base, str) or base not in {layout.name for layout in LAYOUTS}:
-        raise LayoutFileError(_("it arranges a layout that this Studio does not have"))
+        raise LayoutFileError(_("it is for a layout that this Studio doesn't have"))
     opened = saved.get("open") if isinstance(saved, dict) else None
     if not isinstance(saved, dict) or not isinstance(opened, list) or not isinstance(saved.get("docks"), str):
         raise LayoutFileError(_("it is damaged"))

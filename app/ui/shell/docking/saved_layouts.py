@@ -63,10 +63,10 @@ class SavedLayouts:
         if not name:
             return _("A layout needs a name.")
         if len(name) > LONGEST:
-            return _("That is too long; {count} letters fit.").format(count=LONGEST)
+            return _("The name is too long. Use at most {count} characters.").format(count=LONGEST)
         taken = {_(layout.title).lower() for layout in LAYOUTS} | {own.name.lower() for own in self.all()}
         is_taken = name.lower() in taken - {but.lower()}
-        return _("“{name}” is there already.").format(name=name) if is_taken else ""
+        return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
     # -- a workbench ------------------------------------------------------------------------------
 
@@ -84,7 +84,7 @@ class SavedLayouts:
             self._complain(f"{type(error).__name__}: {error}")
         if not well:
             bench.arrange()
-            words = _("The layout “{name}” could not be put back; it is as at first.")
+            words = _("Can't restore the layout “{name}”; using its default.")
             self._complain(words.format(name=own or _(layout_named(base).title)))
 
     def keep(self, bench: Workbench, base: str) -> None:

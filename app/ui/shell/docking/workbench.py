@@ -226,7 +226,7 @@ class Workbench(QMainWindow):
         free = (number for number in range(1, MOST_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
         if not number:
-            said = _("There are {count} already, and no more fit")
+            said = _("{count} are already open, the maximum")
             self._context.toast(said.format(count=MOST_OF_A_KIND))
             return None
         if number == 1:

@@ -134,7 +134,7 @@ class StepsArt(Art):
         strong.setWeight(strong.Weight.DemiBold)
         start, say = pgettext("block", "when started"), pgettext("robot", "say")
         words = (
-            _("Put “{block}” below “{start}”").format(block=say, start=start),
+            _("Place “{block}” below “{start}”").format(block=say, start=start),
             _("Press Run and listen"),
             _("Make it turn"),
         )

@@ -189,7 +189,7 @@ class DevelopersLine(QWidget):
         theme.changed.connect(lambda: icon.setPixmap(theme.icon("terminal", "textSecondary").pixmap(14, 14)))
         row.addWidget(icon)
         question = ElidedLabel("body", "textSecondary")
-        question.setText(_("Do you write programs?"))
+        question.setText(_("Are you a developer?"))
         row.addWidget(question)
         row.addWidget(link)
         row.addWidget(label(_("or type"), "body", role="textSecondary"))

@@ -57,7 +57,7 @@ class OpenRow(PaintedButton):
         super().__init__(theme, radius="panel")
         self.work = work
         self._state = state_words(work)
-        self.say(work.name, _("Go on with {name}, {state}").format(name=work.name, state=self._state))
+        self.say(work.name, _("Continue with {name}, {state}").format(name=work.name, state=self._state))
         self.setToolTip(plain.tip(work.path or self._state))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
@@ -75,7 +75,7 @@ class OpenRow(PaintedButton):
         paint.box(painter, tile, theme.radius("control"), theme.block_colour("robot"))
         icon = tile.adjusted(7, 7, -7, -7)
         paint_icon(painter, icon, theme.icon_name("behaviour"), theme.block_text("robot"))
-        link, words = theme.font("button"), _("Go on")
+        link, words = theme.font("button"), _("Resume")
         side = theme.scaled(14)
         wide = paint.width_of(link, words) + 6 + side
         room = QRectF(LEFT, rect.top(), rect.width() - LEFT - wide - 26, rect.height())
@@ -106,10 +106,10 @@ class OpenRow(PaintedButton):
 def state_words(work: OpenWork) -> str:
     """Whether it runs, and whether it is saved; an example that nobody changed needs no saving."""
     if work.runs:
-        return _("runs now")
+        return _("running")
     if work.unsaved:
         return _("not saved yet")
-    return _("saved") if work.path else _("not changed yet")
+    return _("saved") if work.path else _("no changes yet")
 
 
 class OpenWorkList(QWidget):

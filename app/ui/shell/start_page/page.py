@@ -58,7 +58,7 @@ LEARN = (
     lazy("Six steps to a robot that speaks and turns. Each is checked as you go."),
 )
 OFFER = (
-    lazy("First steps: five minutes"),
+    lazy("First steps (five minutes)"),
     lazy("New here? Six steps to a robot that speaks and turns. Each is checked as you go."),
 )
 
@@ -132,8 +132,8 @@ class StartPage(QWidget):
         self.new_card = BigCard(
             theme,
             EmptyPageArt(theme),
-            _("Make a new behaviour"),
-            _("Start with an empty page and the blocks of your robot."),
+            _("Create a behaviour"),
+            _("Start with an empty page and your robot's blocks."),
             [self._new],
         )
         self._learn = Button(theme, _("First steps"), size="large")
@@ -170,7 +170,7 @@ class StartPage(QWidget):
         self._question = label(_("What would you like to do?"), "display", wrap=True)
         column.addWidget(self._question)
         column.addSpacing(7)
-        lead = _("Build what a robot says and does, by putting blocks together. No programming needed.")
+        lead = _("Put blocks together to build what a robot says and does. No programming needed.")
         column.addWidget(label(lead, "lead", role="textSecondary", wrap=True))
         column.addSpacing(24)
         column.addWidget(self.open_work)

@@ -128,9 +128,9 @@ class NumberEdit(QLineEdit):
             self._judge(str(error))
             return
         if self._minimum is not None and value < self._minimum:
-            self._judge(_("The least is {value}.").format(value=self._limit(self._minimum)))
+            self._judge(_("The minimum is {value}.").format(value=self._limit(self._minimum)))
         elif self._maximum is not None and value > self._maximum:
-            self._judge(_("The most is {value}.").format(value=self._limit(self._maximum)))
+            self._judge(_("The maximum is {value}.").format(value=self._limit(self._maximum)))
         else:
             self._judge("")
             self.number.emit(value)

@@ -136,7 +136,7 @@ class EntryDelegate(QStyledItemDelegate):
         if entry.id == self.waiting:
             font = theme.font("body")
             font.setWeight(QFont.Weight.Medium)
-            words = _("Press the new key")
+            words = _("Press the new shortcut")
             width = paint.width_of(font, words)
             area = QRectF(right - width, rect.top(), width, rect.height())
             paint.words(painter, area, words, font, theme.colour(quiet))

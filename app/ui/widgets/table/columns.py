@@ -88,7 +88,7 @@ class ColumnChoice:
             action.setChecked(self.wanted(column))
             action.toggled.connect(lambda on, name=column.name: choose(name, on))
         menu.addSeparator()
-        again = menu.addAction(_("As at first"))
+        again = menu.addAction(_("Default columns"))
         again.setEnabled(self.changed)
         again.triggered.connect(lambda _on=False: begin_anew())
 

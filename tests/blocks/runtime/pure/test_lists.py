@@ -41,8 +41,8 @@ def test_items_are_counted_from_1_and_named_in_words() -> None:
 @pytest.mark.parametrize(
     ("act", "sentence"),
     [
-        (lambda: lists.item([1, 2, 3], 5), "The list has 3 items; there is no item 5."),
-        (lambda: lists.item([1], 0), "The list has 1 item; there is no item 0."),
+        (lambda: lists.item([1, 2, 3], 5), "The list has only 3 items; it has no item 5."),
+        (lambda: lists.item([1], 0), "The list has only 1 item; it has no item 0."),
         (lambda: lists.item([], "first"), "The list is empty."),
         (lambda: lists.remove_item([], "random"), "The list is empty."),
         (lambda: lists.item([1, 2], 1.5), "“item number” needs a whole number, not 1.5."),
@@ -52,13 +52,13 @@ def test_items_are_counted_from_1_and_named_in_words() -> None:
             lambda: lists.add_item(0, 1),
             "This needs a list, not a number. Set the variable to an empty list first.",
         ),
-        (lambda: lists.item(None, 1), "This list is not known yet."),
+        (lambda: lists.item(None, 1), "This list has no value yet."),
         (lambda: lists.add_item((1, 2), 3), "This list can't be changed."),
-        (lambda: lists.add_item([0] * lists.MOST_ITEMS, 1), "The list is full: it has room for 10000 items."),
-        (lambda: lists.split_text("a" * 20_000, ""), "The list is full: it has room for 10000 items."),
+        (lambda: lists.add_item([0] * lists.MOST_ITEMS, 1), "The list is full: it can have at most 10000 items."),
+        (lambda: lists.split_text("a" * 20_000, ""), "The list is full: it can have at most 10000 items."),
         (
             lambda: lists.join_items(["a" * LONGEST_TEXT], "b"),
-            "This text is too long: more than 1000000 characters.",
+            "This text is too long. Use at most 1000000 characters.",
         ),
     ],
 )  # fmt: skip
@@ -163,7 +163,7 @@ def test_an_error_in_a_list_names_its_block() -> None:
     run = play(workspace(started(write(gone))))
     assert run.runtime.error is not None
     assert run.runtime.error.block == "it"
-    assert run.runtime.error.sentence == "The list has 3 items; there is no item 5."
+    assert run.runtime.error.sentence == "The list has only 3 items; it has no item 5."
 
 
 def test_a_gap_that_is_not_there_is_not_missed() -> None:
@@ -176,7 +176,7 @@ def test_a_gap_that_is_not_there_is_not_missed() -> None:
 
 def test_an_empty_gap_of_a_new_list_is_said() -> None:
     run = play(workspace(started(write(list_of() | {"extraState": {"items": 2}}))))
-    assert run.program.problems[0].sentence == "list of needs a value. Put one into the gap."
+    assert run.program.problems[0].sentence == "list of needs a value. Drag one into its slot."
 
 
 def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
@@ -194,7 +194,7 @@ def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
         ("sum_of", ([1, 2.5, -3],), 0.5),
         ("sum_of", ([2**64 - 1, 1],), 2**64),
         ("sum_of", (["a"],), "“sum” needs a number, not a text."),
-        ("sum_of", ([math.nan],), "“sum” needs a number that is not endless."),
+        ("sum_of", ([math.nan],), "“sum” needs a finite number."),
         ("sum_of", ([[1]],), "“sum” needs a number, not a list."),
         ("sum_of", (0,), "This needs a list, not a number. Set the variable to an empty list first."),
         ("average_of", ([1, 2],), 1.5),
@@ -210,7 +210,7 @@ def test_a_list_that_was_put_in_is_a_copy_however_deep() -> None:
         ("sorted_up", ([],), []),
         ("turned_round", (["a", "👍"],), ["👍", "a"]),
         ("copy_of", ([[1], 2],), [[1], 2]),
-        ("copy_of", (None,), "This list is not known yet."),
+        ("copy_of", (None,), "This list has no value yet."),
         ("part_of_list", ([1, 2, 3], 2, 99), [2, 3]),
         ("part_of_list", ([1, 2, 3], -1, 2), [1, 2]),
         ("part_of_list", ([1, 2, 3], 3, 1), []),

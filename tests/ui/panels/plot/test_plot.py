@@ -115,7 +115,7 @@ def test_a_field_from_elsewhere_is_plotted_and_its_topic_looked_at(panel, window
     send(panel, "/odom", sine(0, 60))
     look(panel)
     assert cell(panel, "/odom.speed", "last") == value_words(float(np.sin(59.95)))
-    assert panel.points.text() == "1\u2009200 points, all drawn"
+    assert panel.points.text() == "1 200 points, all shown"
     columns = drawn(panel, panel.theme.series(0))
     assert len(columns) > 0.9 * panel.canvas.area.width()
     panel.remove("/odom.speed")
@@ -177,7 +177,7 @@ def test_what_can_not_be_plotted_says_what_was_meant(panel) -> None:
     show(panel, "/odom.sped")
     send(panel, "/odom", sine(0, 3))
     look(panel)
-    assert panel.advice.text() == "There is no /odom.sped. Did you mean /odom.speed?"
+    assert panel.advice.text() == "/odom.sped does not exist. Did you mean /odom.speed?"
     panel.remove("/odom.sped")
     show(panel, "/odom.speed")
     send(panel, "/odom", sine(3, 4))
@@ -228,8 +228,8 @@ def test_what_is_missing_is_told_below(panel) -> None:
     panel.session.series.add({"/odom": Batch([bad])})
     send(panel, "/odom", [(30, {"speed": 1})])
     look(panel)
-    assert "1 message can't be read" in panel.about.text()
-    assert "600 points gone: the clock was set back" in panel.about.text()
+    assert "1 message can't be decoded" in panel.about.text()
+    assert "600 points discarded: the clock was set back" in panel.about.text()
 
 
 # -- time --------------------------------------------------------------------------------------------------
@@ -242,8 +242,8 @@ def test_it_follows_what_comes_and_pauses_while_the_data_go_on(panel) -> None:
     assert panel.canvas.end_s == pytest.approx(69.95)
     assert panel.canvas.end_s - panel.canvas.begin_s == 60
     QTest.keyClick(panel.canvas, Qt.Key.Key_Space)
-    assert panel.paused.text == "paused, the data goes on"
-    assert panel.freeze.text() == "Go on"
+    assert panel.paused.text == "paused; data is still recorded"
+    assert panel.freeze.text() == "Resume"
     send(panel, "/odom", sine(70, 90))
     look(panel)
     assert panel.canvas.end_s == pytest.approx(69.95)
@@ -350,7 +350,7 @@ def test_a_and_b_by_the_mouse_and_the_keys(panel) -> None:
     assert cell(panel, "/odom.speed", "max") == value_words(float(inside.max()))
     assert cell(panel, "/odom.speed", "mean") == value_words(float(inside.mean()))
     assert cell(panel, "/odom.mode", "difference") == "6 changes"
-    assert panel.about.text() == "Min, max and mean are between A and B"
+    assert panel.about.text() == "Min, max and mean between A and B"
     QTest.keyClick(panel.canvas, Qt.Key.Key_M)
     assert panel.canvas.cursors == {}
 
@@ -626,5 +626,5 @@ def test_what_can_not_be_written_is_told(qtbot, panel, window, tmp_path: Path) -
 def test_a_name_is_copied(panel, window) -> None:
     show(panel, "/odom.speed")
     menu = panel.table.menu_of(panel.shown[0])
-    next(action for action in menu.actions() if action.text() == "Copy its name").trigger()
+    next(action for action in menu.actions() if action.text() == "Copy name").trigger()
     assert QGuiApplication.clipboard().text() == "/odom.speed"

@@ -47,7 +47,7 @@ class AngleDial(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setProperty("focusRadius", SIDE // 2)
-        self.setToolTip(plain.tip(_("Drag to turn; a double click sets it back")))
+        self.setToolTip(plain.tip(_("Drag to turn; double-click to reset")))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     @property

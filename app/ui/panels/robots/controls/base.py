@@ -78,7 +78,7 @@ def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
     field.setAccessibleName(parameter.title)
     field.setMinimumHeight(ROW_HEIGHT - 2)
     if not parameter.required and parameter.default is None:
-        field.setPlaceholderText(_("May stay empty"))
+        field.setPlaceholderText(_("Optional"))
     return field
 
 

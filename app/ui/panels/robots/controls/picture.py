@@ -71,7 +71,7 @@ class Thumbnail(QWidget):
         self._theme = theme
         self._image: QImage | None = None
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(_("The chosen picture"))
+        self.setAccessibleName(_("Selected image"))
 
     @property
     def image(self) -> QImage | None:
@@ -125,11 +125,11 @@ class PictureChoice(QWidget):
         self.setAcceptDrops(True)
         self.thumbnail = Thumbnail(theme)
         self.field = line_field(theme, parameter)
-        self.field.setPlaceholderText(_("A file, a camera, or an address"))
+        self.field.setPlaceholderText(_("A file, a camera or an address"))
         self.choose = Button(theme, _("File"), "folder-open", size="form")
         self.choose.setAccessibleName(_("Choose a file for {value}").format(value=parameter.title))
         self.camera = Button(theme, _("Camera"), "camera", size="form")
-        self.camera.setAccessibleName(_("Take {value} from a camera").format(value=parameter.title))
+        self.camera.setAccessibleName(_("Use a camera image for {value}").format(value=parameter.title))
         self._wrong = label("", "small", role="error", wrap=True)
         self._wrong.hide()
         self._lay_out()
@@ -172,7 +172,7 @@ class PictureChoice(QWidget):
         if text.startswith("data:"):
             self._image = _image_in(text)
             self.thumbnail.show_image(self._image)
-            self.field.setText(_("the picture of that time") if self._image is not None else "")
+            self.field.setText(_("image of that time") if self._image is not None else "")
         else:
             self._typed(text)
             self.field.setText(text)
@@ -228,7 +228,7 @@ class PictureChoice(QWidget):
                 lambda _on=False, topic=topic: self.use_topic(topic)
             )
         if not topics:
-            menu.addAction(_("No camera sends pictures now")).setEnabled(False)
+            menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         drop_below(menu, self.camera)
 

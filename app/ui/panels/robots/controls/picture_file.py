@@ -27,14 +27,14 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
     """A picture file, turned as its camera says, or the sentence that says why it can't be used."""
     try:
         if not path.is_file() and path.exists():
-            return None, _("“{file}” is no file.").format(file=path.name)
+            return None, _("“{file}” is not a file.").format(file=path.name)
         with path.open("rb") as file:
             data = file.read(MOST_FILE_BYTES + 1)
     except OSError as error:
         reason = (error.strerror or _("unknown")).lower()
         return None, _("“{file}” can't be read: {reason}.").format(file=path.name, reason=reason)
     if len(data) > MOST_FILE_BYTES:
-        said = _("“{file}” is too large; use one below {size} MB.")
+        said = _("“{file}” is too large. Choose a file below {size} MB.")
         return None, said.format(file=path.name, size=MOST_FILE_BYTES // 1_000_000)
     try:
         return image_of(data), ""
@@ -53,7 +53,7 @@ def image_of(data: bytes) -> QImage:
     reader.setDecideFormatFromContent(False)
     image = reader.read()
     if image.isNull():
-        raise DecodeError("image", len(data), _("they are no picture that can be read"))
+        raise DecodeError("image", len(data), _("they are not a readable image"))
     return upright(image, file)
 
 

@@ -85,7 +85,7 @@ def _hint(parameter: Parameter) -> str:
     if parameter.places:
         return ", ".join(each.kind for each in parameter.places)
     is_number = parameter.each is not None and parameter.each.kind in ("number", "integer", "angle")
-    return _("Numbers with commas between them") if is_number else _("Words with commas between them")
+    return _("Numbers separated by commas") if is_number else _("Words separated by commas")
 
 
 def _words(given: object) -> str:
