@@ -92,7 +92,7 @@ def test_whatever_comes_on_the_topic_is_one_line_or_an_alert_elsewhere() -> None
         record(level="critical", text="x" * (TEXT_LIMIT + 1), node="a", name="a"),
     ])  # fmt: skip
     words, long = console.records
-    assert (words.text, words.origin, words.stamp_s) == ("only words", "somebody", 5.0)
+    assert (words.text, words.origin, words.stamp_s) == ("only words", "someone", 5.0)
     assert (long.level, long.logger) == ("critical", "")
     assert long.text.endswith(f"… ({TEXT_LIMIT + 1} characters)")
 

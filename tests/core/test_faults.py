@@ -194,7 +194,7 @@ def test_an_event_that_raises_takes_no_other_with_it(
     assert stopped == [done] * 29
     assert session.master.kind == "connected"
     (alert,) = [alert for alert in session.alerts.active if alert.id == "studio"]
-    assert alert.detail.startswith("Studio can't take over RunnerEvent: ValueError")
+    assert alert.detail.startswith("Studio can't handle RunnerEvent: ValueError")
     assert alert.action == "help.log"
     once = RepeatFilter()
     assert sum(once.filter(record) is not None for record in caplog.records) == 2  # the first, and the tenth
@@ -313,7 +313,7 @@ def test_the_source_outlives_what_its_jobs_and_sinks_raise(master: Master) -> No
     try:
         done = threading.Event()
         source.submit("do the impossible", raising)
-        source.submit("perform it", lambda _node: done.set())
+        source.submit("do it", lambda _node: done.set())
         assert done.wait(20)
         assert [e.sentence for e in events if isinstance(e, JobFailed)] == [
             "ValueError: invalid literal for int() with base 10: 'x'"

@@ -112,7 +112,7 @@ def test_a_recording_sends_what_was_chosen_and_a_robot_moves_only_after_asking(
         assert sorted(names) == sorted(heard)
         fingers.press("Return", "Down", "Return")
         studio.click("Arm and send")
-        studio.says(f"{WHEELS} tells robots what to do.")
+        studio.says(f"{WHEELS} commands robots.")
         studio.click("Cancel")
         until(lambda: not studio.all("Arm sending"), "the question is answered")
         studio.click("Play")

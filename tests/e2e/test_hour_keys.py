@@ -248,7 +248,7 @@ def mistakes(studio: Studio, film: Film, fingers: Fingers) -> None:
         until(lambda: studio.page(WHY) == "“walk” needs a number here", "it says why")
     with film.step("It lies loose: Problems leads to it, Delete takes it away"):
         fingers.do("problems", "Problems")
-        has_problem(studio, "nothing uses")
+        has_problem(studio, "isn't used")
         fingers.until_on("Tab", kind="ProblemRow")
         fingers.press("Return")
         fingers.page_says("empty list")

@@ -19,7 +19,7 @@ _BEFORE_S = 0.5
 _SILENT_S = 8.0
 """The system gives up a silent connection after 15 s."""
 RATE = 500
-"Messages per second."
+"""Messages a second."""
 _LARGE = 20_000
 """Bytes of a message that is large."""
 Measured = dict[str, float]

@@ -167,7 +167,7 @@ def test_an_alert_that_counts_on_is_no_news(qtbot, window, commands: Commands, s
     window.show()
     commands.run("layout.behaviour")
     for count in (1, 2, 12):
-        alerts.put("message:/bad", "warn", f"{count} messages can't be read.")
+        alerts.put("message:/bad", "warn", f"{count} messages can't be decoded.")
         window.tick()
     assert said == ["1 messages can't be decoded."]
     alerts.resolve("message:/bad")

@@ -135,7 +135,7 @@ class HealthPanel(OneRobotPanel):
             row.show_fact(fact)
         wrong = [fact for fact in facts if fact.to_look_at]
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
-        said = ngettext("{count} warning", "{count} warning", len(wrong)).format(count=len(wrong))
+        said = ngettext("{count} warning", "{count} warnings", len(wrong)).format(count=len(wrong))
         self.chip.set(said if wrong else "", worst)
         self.step.setText(_("Restart it") if link.virtual else _("Find the cause"))
         self._below.setVisible(not link.connected or link.mute)

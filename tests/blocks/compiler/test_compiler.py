@@ -242,7 +242,7 @@ def test_a_loose_value_is_told_to_go_into_a_gap():
     for value in (number(1), boolean(True), block("values_join", A=text("a"), B=text("b"))):
         ((severity, sentence),) = sentences(workspace(started(), value))
         assert severity == "info"
-        assert sentence.endswith("is a value that nothing uses. Put it into a gap of another block.")
+        assert sentence.endswith("isn't used. Drag it into an empty slot of another block.")
 
 
 def test_the_message_outside_of_its_script():
@@ -309,7 +309,7 @@ def test_a_long_script_and_a_deep_one():
         deep = block("values_not", A=deep)
     (problem,) = compile_behaviour(workspace(started(write(deep))), []).problems
     assert problem.severity == "error"
-    assert "too many blocks inside each other" in problem.sentence
+    assert "is nested too deeply" in problem.sentence
 
     allowed: dict[str, object] = number(1)
     for _ in range(35):

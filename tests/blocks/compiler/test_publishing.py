@@ -69,7 +69,7 @@ def test_a_computed_topic_is_refused_when_the_program_runs(master: Master) -> No
             network.guard.know(guarded([PEPPER, rover.described]))
             with pytest.raises(BehaviourError, match="Publishing on /Rover/command would move Rover"):
                 network.publish("/Rover/command", {"id": "1", "op": "invoke", "action": "turn", "input": {}})
-            with pytest.raises(BehaviourError, match="would move Rover, and nobody was asked"):
+            with pytest.raises(BehaviourError, match="would move Rover, which has not been allowed"):
                 network.publish(rize.COMMANDS, {})
             network.close()
         assert rover.heard("invoke") == []

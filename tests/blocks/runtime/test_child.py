@@ -233,7 +233,7 @@ def test_output_is_bounded(running, master):
     running.until("ended")
     lines = [str(said["text"]) for said in running.said if said["is"] == "print"]
     assert len(lines) < 3000
-    assert any("were left out: too many at once" in line for line in lines)
+    assert any("were dropped: too many at once" in line for line in lines)
     assert max(map(len, lines)) <= child.LONGEST_LINE
 
 
@@ -249,7 +249,7 @@ def test_a_start_that_is_none_is_refused_in_words(running, order):
     running.stdin.write("no json\n")
     running.order(do="pause")
     running.order(**order)
-    assert "can't be read" in str(running.until("error")["sentence"])
+    assert "can't be loaded" in str(running.until("error")["sentence"])
     assert running.until("ended")["ok"] is False
     assert running.end() == 1
 
@@ -258,7 +258,7 @@ def test_without_a_master_it_says_so(running):
     running.start(
         workspace(started(block("messages_publish", VALUE=text("x"), TOPIC="/x"))), master="127.0.0.1:1"
     )
-    assert "The program can't begin" in str(running.until("error")["sentence"])
+    assert "The program can't start" in str(running.until("error")["sentence"])
     assert running.end() == 1
 
 

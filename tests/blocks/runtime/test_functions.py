@@ -197,7 +197,9 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_said() -> Non
     )
     sentences = [problem.sentence for problem in program.problems]
     assert "“who” only works inside its own function. It is kept but skipped." in sentences
-    assert sum(sentence.endswith("can't stand there. It is kept but skipped.") for sentence in sentences) == 2
+    assert (
+        sum(sentence.endswith("can't be used here. It is kept but skipped.") for sentence in sentences) == 2
+    )
     assert "write('after')" in program.source
 
 

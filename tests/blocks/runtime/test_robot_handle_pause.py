@@ -94,10 +94,10 @@ def test_a_person_reads_that_the_rest_will_be_left_out_and_that_it_was() -> None
     until(lambda: bool(link.calls))
     assert run.runtime.saying.warns(("w",)) == ""
     run.runtime.scheduler.pause()
-    said = "Pepper does not tell how much of “walk” is left"
-    until(lambda: run.runtime.saying.warns(("w",)) == f"{said}; Go on leaves it out")
+    said = "Pepper doesn't report how much of “walk” is left"
+    until(lambda: run.runtime.saying.warns(("w",)) == f"{said}; Resume skips it")
     run.runtime.scheduler.go_on()
-    assert run.end().lines == [f"{said}, so it was left out", "after"]
+    assert run.end().lines == [f"{said}, so it was skipped", "after"]
     assert run.runtime.saying.warns(("w",)) == ""
     assert len(link.calls) == 1
 

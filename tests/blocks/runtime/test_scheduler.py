@@ -254,7 +254,7 @@ def test_nobody_looks_at_conditions_while_paused(stage):
 
 
 def test_who_is_no_script_is_told(stage):
-    with pytest.raises(RuntimeError, match="only a script"):
+    with pytest.raises(RuntimeError, match="only works in a script"):
         stage.scheduler.step("x")
 
 

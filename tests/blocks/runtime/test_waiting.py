@@ -32,7 +32,7 @@ def test_what_waits_says_for_what_and_then_what_it_does(monkeypatch) -> None:
     run = begin(link)
     until(lambda: bool(link.calls))
     said = lambda: run.runtime.saying.says(("x",))  # noqa: E731
-    until(lambda: said() == "Pepper waits for “look”")
+    until(lambda: said() == "Pepper is waiting for “look”")
     begun = time.monotonic()
     until(lambda: time.monotonic() > begun + 0.7)  # longer than its limit, which has not begun
     assert not run.runtime.finished.is_set()

@@ -26,9 +26,9 @@ class Program:
     """A program's side of the contract: it looks for robots, then has the network of those."""
 
     told: ClassVar = {
-        "another topic": r".*/Evil/description says that it is Pepper.*",
+        "another topic": r".*/Evil/description announces Pepper.*",
         "two programs": "2 programs announce themselves as Pepper: “Pepper”.*“evil”.*",
-        "foreign topic": ("Evil claims /Pepper/LEAF, which belongs to Pepper; Evil is left out\\."),
+        "foreign topic": ("Evil claims /Pepper/LEAF, which belongs to Pepper; Evil is ignored\\."),
     }
 
     def __init__(self, node: nep.Node) -> None:

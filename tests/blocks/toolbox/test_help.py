@@ -43,5 +43,5 @@ def test_gaps_are_named_in_words() -> None:
     told = help_of(CATALOGUE.blocks["lists_get"])
     assert told["title"] == "(where) (number) of (list)"
     assert told["gaps"][1] == [  # type: ignore[index]
-        "number", "a number; 1 unless you change it; used to access an item by its number",
+        "number", "a number; 1 by default; used to access an item by its number",
     ]  # fmt: skip

@@ -35,7 +35,7 @@ def test_messages_and_calls_go_to_the_network_and_stop_ends_them(session: Sessio
         assert acting.call("sum", '{"a": 2, "b": 3}', 20.0) == ""
         tick_until(session, lambda: acting.calls.waiting is None)
         assert acting.calls.records[-1].answer == {"sum": 5}
-        assert call_words(acting.calls.records[-1]).startswith("confirmed in ")
+        assert call_words(acting.calls.records[-1]).startswith("replied in ")
         assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
         sent, called = list(acting.sent.records)[1:]
         assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, heard by 1")
@@ -119,7 +119,7 @@ def test_how_it_ended_in_words() -> None:
     for result, words in (
         (SendResult(order, "sent", heard=2), "received by 2"),
         (SendResult(order, "sent"), "no subscribers"),
-        (SendResult(order, "began"), "began"),
+        (SendResult(order, "started"), "started"),
         (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late message skipped"),
         (SendResult(order, "failed", "not sent: there was no master"), "not sent: there was no master"),
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),

@@ -83,7 +83,7 @@ def test_no_answer_in_time_and_giving_up(bench) -> None:
     bench.call(timeout_s=0.2)
     assert bench.end().sentence == "no reply within 0.2 s"
     bench.call()
-    with pytest.raises(NepError, match="Wait for the answer of /sum first"):
+    with pytest.raises(NepError, match="Wait for the reply of /sum first"):
         bench.call()
     bench.now += 3
     assert bench.calls.waited_s == 3

@@ -103,7 +103,7 @@ def test_behaviour_in_another_unicode_encoding_opens(tmp_path: Path, encoding: s
 
 
 @pytest.mark.parametrize(("version", "reason"), [
-    (2, "newer NEP Studio (version 2) and is left as it is; update this one"),
+    (2, "newer NEP Studio (version 2) and is unchanged; update this one"),
     (99, "newer NEP Studio"), (0, "does not say its version"), (-1, "does not say its version"),
     (True, "does not say its version"), ("1", "does not say its version"), (None, "does not say its version"),
 ])  # fmt: skip

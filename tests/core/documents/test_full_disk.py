@@ -90,7 +90,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 
 def test_nothing_is_lost_on_a_full_disk_and_all_of_it_is_said(told: dict[str, object]) -> None:
     full = told["full"]
-    assert told["edit"] == f"unsaved work can't be kept ({full}); save the file now"
+    assert told["edit"] == f"can't back up unsaved work ({full}); save the file now"
     assert told["save"] == (
         f"DocumentError: Mine.nepb can't be written ({full}); make room there or save it in another place"
     )

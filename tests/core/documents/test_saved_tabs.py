@@ -102,7 +102,7 @@ def test_settings_that_take_nothing_are_told_in_a_sentence(start, tmp_path: Path
     (tmp_path / "settings.json").mkdir()
     first.tabs.keep(ended_well=True)
     assert len(first.complaints) == 1
-    assert first.complaints[0].startswith("settings can't be kept in ")
+    assert first.complaints[0].startswith("can't save settings in ")
 
 
 def test_after_a_crash_all_tabs_stand_in_their_order_and_the_one_that_was_worked_on_shows(start) -> None:

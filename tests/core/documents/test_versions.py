@@ -58,7 +58,7 @@ def test_what_can_not_be_kept_is_said(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
     folder.write_bytes(b"in the way")
-    with pytest.raises(DocumentError, match="was not saved: what it said before can't be kept"):
+    with pytest.raises(DocumentError, match="was not saved: its previous version can't be kept"):
         keep_earlier(path, folder)
 
 
@@ -69,7 +69,7 @@ def test_a_copy_that_is_gone_leaves_the_file(tmp_path: Path, folder: Path) -> No
     assert kept is not None
     kept.copy.unlink()
     path.write_bytes(b"two")
-    with pytest.raises(DocumentError, match="can't be put back"):
+    with pytest.raises(DocumentError, match="can't restore "):
         kept.put_back()
     assert path.read_bytes() == b"two"
 

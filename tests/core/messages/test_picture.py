@@ -159,9 +159,7 @@ def test_a_small_view_of_depth_is_as_bright_as_a_large_one() -> None:
 
 
 def test_a_picture_of_floats_is_no_png_and_says_so() -> None:
-    with pytest.raises(
-        EncodeError, match="cannot encode a 'picture of float32' as 'png'; it has whole numbers"
-    ):
+    with pytest.raises(EncodeError, match="cannot encode a 'image of float32' as 'png'; only integers"):
         png_of(raw(np.zeros((4, 6), np.float32), "32FC1"))
 
 

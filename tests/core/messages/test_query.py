@@ -76,7 +76,7 @@ def test_bytes_are_one_value_and_keys_that_are_numbers_are_written() -> None:
         ("$[?match(@.name, '(a+)+$')]", "the query is not valid from match(@.name, '(a+)+"),
         ("$[?search(@.name, 'a')]", "the query is not valid from search("),
         ("$[99999999999999999999999]", "the query is not valid from 9999"),
-        ("$." + "x" * LONGEST, f"a query has {LONGEST} letters at most"),
+        ("$." + "x" * LONGEST, f"a query can have at most {LONGEST} characters"),
         ("$[?" + "(" * 400, "the query "),
         ("$\x00", "the query "),
         ("$[?@.x > 1e9999]", "a number in the query is too large"),
@@ -112,7 +112,7 @@ def test_a_query_that_multiplies_itself_ends_with_what_it_found(text) -> None:
 def test_comparing_long_lists_counts_what_is_compared() -> None:
     lists = {"a": list(range(4000)), "b": list(range(4000))}
     answer = JsonQuery("$[?$.a == $.b]").answer(lists, most_steps=3000)
-    assert answer.cut.startswith("It looks at more than 3000 values")
+    assert answer.cut.startswith("Search stopped after 3000 values")
 
 
 def test_so_many_are_shown_and_a_deep_message_says_so() -> None:

@@ -27,7 +27,7 @@ def test_a_single_topic_is_named_with_its_publishers() -> None:
 
 
 def test_a_node_without_new_topics_and_one_that_left() -> None:
-    assert arrivals(graph(one=["/a"]), graph(two=["/a"])) == ["two is here", "one left"]
+    assert arrivals(graph(one=["/a"]), graph(two=["/a"])) == ["two joined", "one left"]
 
 
 def test_nothing_new_is_no_line() -> None:
@@ -49,7 +49,7 @@ def test_what_nep_itself_publishes_and_who_logs_for_the_master_are_not_told() ->
     assert arrivals(graph(one=[]), graph(one=["/nep/log"])) == []
     assert arrivals(graph(), graph(master=["/nep/log"])) == []
     assert arrivals(graph(master=["/nep/log"]), graph()) == []
-    assert arrivals(graph(), graph(one=["/nep/log"])) == ["one is here"]
+    assert arrivals(graph(), graph(one=["/nep/log"])) == ["one joined"]
 
 
 def test_many_at_once_are_one_line_with_their_number() -> None:

@@ -59,7 +59,7 @@ def test_behind_such_a_firewall_studio_says_what_keeps_it_from_its_master(tmp_pa
     assert "Traceback" not in done.stderr
     alert, lines = done.stdout.splitlines()
     said = "Nothing answers at 10.9.9.2:7780, so no master is found."
-    assert alert.startswith(f"companion:master The master does not answer. {said} {FIREWALL}")
+    assert alert.startswith(f"companion:master The master does not respond. {said} {FIREWALL}")
     assert alert.endswith("help.doctor")
     assert lines == "1 line"
 

@@ -103,7 +103,7 @@ def test_a_refusal_is_an_alert_with_the_way_out_until_it_works(world, make):
 def test_a_choice_that_can_not_be_kept_is_done_and_said(world, make, tmp_path):
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
-    for hosts, words in ((["192.168.1.20"], "They can't connect any more"), ([], "Other computers may")):
+    for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
         reach.listen_at(hosts)
         world.answer(reach)
         assert world.asked[-1][0] == tuple(hosts)

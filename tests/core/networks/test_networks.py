@@ -221,7 +221,7 @@ def test_every_kind_is_a_back_end_that_says_what_to_install(monkeypatch: pytest.
     for kind in KINDS:
         assert kind_named(kind.name) is kind
         assert kind.checked(kind.example) == kind.checked("")
-        assert kind.not_known == f"not known on {kind.words}"
+        assert kind.not_known == f"unknown on {kind.words}"
     assert kind_named("") is kind_named("zeromq") is None
     monkeypatch.setitem(sys.modules, "zenoh", None)
     with pytest.raises(BackendUnavailableError, match=r"pip install .*nep-studio\[zenoh\]"):

@@ -141,7 +141,7 @@ def test_without_a_master_nothing_waits_to_be_set_much_later(session: Session, s
     shown._has_master = lambda: False
     shown.set("speed", "1")
     assert shown.setting == ""
-    assert "no master answers" in shown.refusal
+    assert "no master responds" in shown.refusal
 
 
 def test_another_node_and_none_leave_nothing_behind(session: Session, shown: NodeParameters) -> None:
@@ -221,7 +221,7 @@ def test_what_is_shown_means_the_same_when_it_is_set(value: object, kind: str) -
         ("1", "bool", "true or false"), ("yes", "bool", "true or false"), ("1.5", "int", "a whole number"),
         ("9" * 5000, "int", "a whole number"), ("{}", "list", "a list as JSON"),
         ("[", "list", "a list as JSON"),
-        ("[1]", "dict", "a map as JSON"), ("", "dict", "a map as JSON"),
+        ("[1]", "dict", "an object as JSON"), ("", "dict", "an object as JSON"),
     ],
 )  # fmt: skip
 def test_what_is_no_value_of_its_type_is_refused_with_the_next_step(text: str, kind: str, said: str) -> None:

@@ -152,7 +152,7 @@ def test_a_recorder_that_dies_is_told_and_another_one_takes_its_place(made):
     made.end("killed")
     assert made.client.state.phase == ""
     assert made.alerts.active[0].detail == "killed"
-    assert "what came until a second before is kept" in made.told()["recorder:ended"][1]
+    assert "Everything up to a second before that is saved" in made.told()["recorder:ended"][1]
     assert made.client.record(Path("b.mcap"))
     made.client.on_event(RecorderSaid(1, {"event": "ended", "status": status()}))  # of the first one
     assert (len(made.lines), made.client.state.phase) == (2, "starting")

@@ -162,7 +162,7 @@ def test_an_alarm_keeps_the_last_seconds_and_is_told_when_they_are_there(made):
     assert "/camera" in order["note"]
     assert told == []
     made.say("kept", path=order["path"])
-    assert told == [(True, "kept alarm-2026-11-26-22-01-05.mcap")]
+    assert told == [(True, "saved alarm-2026-11-26-22-01-05.mcap")]
     assert kept_file(told[0][1]) == "alarm-2026-11-26-22-01-05.mcap"
     assert made.made == [("alarm-2026-11-26-22-01-05.mcap", "kept")]
 

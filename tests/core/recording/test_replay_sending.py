@@ -321,7 +321,7 @@ def test_what_moves_robots_is_asked_for_again_also_under_another_name(session: S
     assert [sent.route.recorded for sent in sending.outbox.going] == ["/a"]
     question = acting.question
     assert question is not None
-    assert question.sentence.startswith("/harmless tells robots what to do.")
+    assert question.sentence.startswith("/harmless commands robots.")
     acting.answer(let=False)
     session.tick()
     question = acting.question

@@ -154,7 +154,7 @@ def test_a_crash_of_the_version_before_an_update_is_said_to_be_of_that(reports: 
     offer(alerts, reports)
     assert alerts.active[0].detail == (
         f"That was NEP Studio 0.0.9; this is {__version__}. "
-        "A report helps those who make Studio to mend it. Nothing is sent by itself."
+        "A report helps us fix the problem. Nothing is sent automatically."
     )
 
 

@@ -76,7 +76,7 @@ class Studio:
     """Studio's side of the contract: a session, and what a person sees of it."""
 
     told: ClassVar = {
-        "another topic": r".*/Evil/description says that it is Pepper.*",
+        "another topic": r".*/Evil/description announces Pepper.*",
         "two programs": "2 programs announce themselves as Pepper\\..*“Pepper” on .*“evil” on .*",
         "foreign topic": ".*Evil claims /Pepper/LEAF, which belongs to Pepper.*",
     }
@@ -201,7 +201,7 @@ def test_a_robot_that_is_started_anew_is_taken_over_from(session: Session, maste
         claimed(session, "/Pepper/description")
         first.close()
         tick_until(session, lambda: link.connected and link.identity != before)
-        assert any("Pepper was started anew" in record.text for record in session.console.records)
+        assert any("Pepper was restarted" in record.text for record in session.console.records)
         stop_is_proven(session)
         assert len(second.heard("stop")) == 1
     finally:
@@ -386,17 +386,17 @@ def test_a_description_that_cant_be_used_is_told_and_what_was_said_before_counts
 ) -> None:
     the_link(session)
     wrong = described("Rover")
-    wrong["actions"] = {"perform it": {}}
+    wrong["actions"] = {"do it": {}}
     announcement = announce(evil, "/Rover/description", wrong)
     said = claimed(session, "/Rover/description")
     assert "The description of 'Rover' can't be used: actions" in said
-    assert "It comes from “evil” on" in said
-    assert "before" not in said
+    assert "“evil” on" in said
+    assert "previous" not in said
     announcement.publish(described("Rover"))
     tick_until(session, lambda: not session.alerts.has("claim:/Rover/description"))
     the_link(session, "Rover")
     announcement.publish(wrong)
-    assert "What it said before still counts." in claimed(session, "/Rover/description")
+    assert "The previous description is used." in claimed(session, "/Rover/description")
     assert session.fleet.link("Rover").connected
 
 

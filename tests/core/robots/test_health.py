@@ -57,7 +57,7 @@ def test_what_was_not_tried_is_said(case: Case) -> None:
     alert = case.alert()
     assert alert is not None
     assert alert.count == 101
-    assert "400 more came too fast to be tried" in alert.detail
+    assert "400 more came too fast to be decoded" in alert.detail
 
 
 def test_good_messages_for_a_second_cure_it_and_the_next_count_begins_anew(case: Case) -> None:

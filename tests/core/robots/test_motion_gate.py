@@ -130,7 +130,7 @@ def test_shelf_asks_and_ends_what_is_repeated_when_a_real_robot_comes(session: S
             SendOrder("a", "Go", TOPIC, "json", lambda: {"op": "invoke"})
         )  # as if it had waited for the network
         tick_until(session, lambda: acting.last["a"].kind == "failed")
-        assert "which nobody has allowed" in acting.last["a"].sentence
+        assert "which is not allowed" in acting.last["a"].sentence
         assert len(told) == before + 1
 
 

@@ -34,7 +34,7 @@ def test_the_question_names_what_moves_and_says_that_stop_is_f12(rover) -> None:
     assert question is not None
     assert question.title == "Allow Rover to move?"
     assert question.sentence.startswith("“move” and “turn” move Rover.")
-    assert "Stop is F12" in question.sentence
+    assert "Press F12 to stop" in question.sentence
 
 
 def test_actions_without_risk_need_no_answer(rover) -> None:

@@ -153,7 +153,7 @@ def test_run_prints_what_the_robot_said(master: Master, arm: Driver, tmp_path: P
     path.write_text(json.dumps(content))
     assert run_file(path, out=out, allow_moving=True) == FAILED
     assert "Arm may still move" in out.getvalue()
-    assert "the brake is not responding. Switch it off by hand." in out.getvalue()
+    assert "the brake does not answer. Switch it off by hand." in out.getvalue()
     assert "did not answer." not in out.getvalue()
 
 
@@ -244,7 +244,7 @@ def test_an_action_that_goes_on_is_shown_until_the_robot_says_that_it_has_ended(
 ) -> None:
     link = the_link(session, "Pepper")
     say_ = pepper._say
-    said = "Pepper may still move: turn is still running"
+    said = "Pepper may still move: turn has not ended"
     pepper._say = lambda command, state, error="": say_(command, "failed", said)  # type: ignore[method-assign]
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().title == said)

@@ -268,5 +268,5 @@ def test_the_words_of_a_refusal_are_the_robots_own_and_harmless(stopper, pepper)
     words = "Pepper may still move: the brake\x1b[2J\n does not answer." + "!" * 1000
     pepper._say = lambda command, state, error="": say_(command, "failed", words)
     (stopped,) = stopper.stop_all(timeout_s=LONG_S).robots
-    assert stopped.wrong.startswith("Pepper may still move: the brake [2J is not responding.!")
+    assert stopped.wrong.startswith("Pepper may still move: the brake [2J does not answer.!")
     assert len(stopped.wrong) <= 200

@@ -85,7 +85,7 @@ def test_a_robot_that_says_nothing_to_a_command_fails_it_in_three_seconds(bench)
     bench.pass_time(0.2)
     assert (made.state, made.error) == ("failed", "Turtle is not responding. Check that it is switched on.")
     assert bench.sent[-1]["op"] == "cancel"  # should it wake up
-    assert (bench.link.state, bench.link.chip) == ("silent", "virtual, does not answer")
+    assert (bench.link.state, bench.link.chip) == ("silent", "virtual, not responding")
     bench.tries.answer(bench.link, {"op": "alive", "id": ""})
     assert bench.link.state == "ready"
 
@@ -100,7 +100,7 @@ def test_a_robot_that_falls_silent_in_the_middle_fails_it_in_two_seconds(bench) 
     bench.pass_time(2.1)
     assert made.state == "failed"
     assert made.error is not None
-    assert "has stopped answering" in made.error
+    assert "stopped responding" in made.error
     assert bench.sent[-1] == {"id": made.id, "op": "cancel", "from": "studio", "action": "move"}
 
 

@@ -141,7 +141,7 @@ def test_a_robot_that_comes_while_a_program_runs_is_not_moved_by_what_that_publi
     with Driver(REAL, "Turtle", node):
         tick_until(session, lambda: session.runs.block_errors, FOUND_S)
         said = session.runs.block_errors["p"]
-        assert said.startswith("Publishing on /Turtle/command would move Turtle, and nobody was asked")
+        assert said.startswith("Publishing on /Turtle/command would move Turtle, which has not been allowed")
         tick_until(session, lambda: session.runs.view().state != "stopping")
 
 

@@ -237,7 +237,7 @@ def test_a_second_program_of_a_robots_name_is_told_and_changes_nothing(master, p
         announcement.publish(described | {"rb:topics": {"command": "/Evil/command"}})
         code, out = run(saved(workspace(started(say("Hi")))))
     assert code == OK, out
-    assert "warning: 2 programs say that they are Pepper" in out
+    assert "warning: 2 programs announce themselves as Pepper" in out
     assert [command["action"] for command in pepper.heard("invoke")] == ["say"]
 
 

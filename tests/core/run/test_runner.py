@@ -285,7 +285,7 @@ def test_what_is_no_event_is_left_out(runner, heard):
 
 
 def test_a_program_that_cannot_be_started(runner):
-    with pytest.raises(RunnerError, match="can't be started"):
+    with pytest.raises(RunnerError, match="can't start the program"):
         runner(("/there/is/no/such/program",)).start(program(), [], None)
 
 
@@ -293,7 +293,7 @@ def test_a_runner_runs_once(runner, heard, master):
     made = runner()
     made.stop()
     made.start(program(), [], master.address)
-    with pytest.raises(RunnerError, match="make another"):
+    with pytest.raises(RunnerError, match="create a new one"):
         made.start(program(), [], master.address)
     heard.until("ended")
 

@@ -101,7 +101,7 @@ def test_a_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) 
     assert shares[0] < 0.5  # reading the flood leaves the window more than half of a processor
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)
-    assert told.endswith(" MB that no block wrote were left out")
+    assert told.endswith(" MB of unexpected output were discarded")
     assert 1 < float(told.split()[0]) < 40 * (seconds + 1)  # MB: at 20 a second it waits for its turn
 
 
@@ -119,7 +119,7 @@ def test_a_flood_of_lines_is_thinned_out_and_counted(started, heard) -> None:
     heard.until("ended")
     seconds = time.monotonic() - began
     assert printed(heard).count("x") <= EVENTS_PER_S * (seconds + 1)
-    left_out = [text for text in printed(heard) if text.endswith("lines were left out: too many at once")]
+    left_out = [text for text in printed(heard) if text.endswith("lines were dropped: too many at once")]
     assert left_out
     assert len(left_out) <= seconds + 2  # one in a second, and one at the end
 

@@ -34,7 +34,7 @@ def test_running_tells_its_time_and_what_happens() -> None:
     run = RunState("running", "Greeting", says="Pepper says “Touch my head.”", started_s=100.0)
     view = view_of(run, ["Pepper"], 114.9)
     assert (view.title, view.detail) == ("Running, 14 s", "Pepper says “Touch my head.”")
-    assert view.compact == "Greeting runs, 14 s"
+    assert view.compact == "Greeting is running, 14 s"
     assert (view.can_run, view.can_pause, view.can_step) == (False, True, True)
     early = view_of(replace(run, begun=False, says=""), ["Pepper"], 100.1)
     assert (early.title, early.detail, early.compact) == ("Starting", "", "Greeting is starting")
@@ -123,7 +123,7 @@ def test_many_that_did_not_answer_do_not_fill_the_window() -> None:
 def test_the_button_beside_the_sentence_leaves_it_room() -> None:
     long = RobotStop("The old blue robot in the entrance hall", False, None)
     view = view_of(after(PEPPER, long), [], 0)
-    assert (view.title, view.confirm) == (f"{long.name} did not answer", "It isn't moving")
+    assert (view.title, view.confirm) == (f"{long.name} did not respond", "It isn't moving")
     assert view_of(after(long, SILENT), [], 0).confirm == "They aren't moving"
 
 

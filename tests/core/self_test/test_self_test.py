@@ -101,7 +101,7 @@ def test_a_report_that_cannot_be_written_any_more_is_a_failure(tmp_path: Path) -
     folder.rmdir()
     folder.write_text("a file is there now", "utf-8")
     assert not report.end()
-    assert report.why.startswith("can't write The report (")
+    assert report.why.startswith("The report can't be written (")
 
 
 def test_it_has_a_home_and_a_master_of_its_own(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_a_folder_that_cannot_be_written_is_a_sentence_and_no_window(
     before = dict(os.environ)
     assert main(["--selftest", str(tmp_path / "file" / "below")]) == 2
     said = capsys.readouterr().err
-    assert said.startswith(f"nep-studio: the folder '{tmp_path / 'file' / 'below'}' can't be written (")
+    assert said.startswith(f"nep-studio: can't write to the folder '{tmp_path / 'file' / 'below'}' (")
     assert said.endswith("; choose another one\n")
     assert os.environ == before
     with pytest.raises(UnwritableFolderError):

@@ -134,7 +134,8 @@ def test_a_backpack_of_a_newer_studio_is_left_as_it_is(tmp_path: Path) -> None:
     backpack.look()
     assert backpack.items == ()
     assert backpack.take_trouble() == (
-        "the backpack in “backpack.json” belongs to a newer NEP Studio and is unchanged; blocks you add here are saved separately"
+        "the backpack in “backpack.json” belongs to a newer NEP Studio and is unchanged; "
+        "blocks you add here are saved separately"
     )
     backpack.put([{"type": "control_wait"}])
     assert (tmp_path / "backpack.json").read_bytes() == before

@@ -74,5 +74,5 @@ def test_a_newer_file_is_left_as_it_is(path: Path) -> None:
     path.write_bytes(b"9")
     found = read(path)
     assert (found.value, found.is_newer) == (None, True)
-    assert found.problem.startswith("File: left as it is, and what you change is not kept: it is of")
+    assert found.problem.startswith("Your changes are not being saved: it is of")
     assert (path.read_bytes(), beside(path).exists()) == (b"9", False)

@@ -92,7 +92,7 @@ def test_recent_files_are_newest_first_without_doubles_or_missing_ones(tmp_path:
 
 def test_a_folder_that_cant_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
-    with pytest.raises(SettingsError, match="settings can't be kept"):
+    with pytest.raises(SettingsError, match="can't save settings"):
         Settings(tmp_path / "file").set("theme", "dark")
 
 

@@ -59,7 +59,7 @@ def test_the_example_is_right() -> None:
 @pytest.mark.parametrize(
     ("alarm", "said"),
     [
-        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "'bellow' does not exist; did you mean 'below'"),
+        ({"when": {"topic": "/t", "is": "bellow", "than": 1}}, "there is no 'bellow'; did you mean 'below'"),
         ({"when": {"topic": "/t"}}, "it does not say what"),
         ({"when": {"is": "silent"}}, "no topic is named"),
         ({"when": {"node": "n", "is": "silent"}}, "is about a topic"),

@@ -257,7 +257,7 @@ def test_a_service_that_is_denied_is_told_at_the_call(make: Make) -> None:
     assert guest.new_client("open").call(1, timeout_s=LONG_S) == 1
     secret = guest.new_client("secret")
     assert secret.is_connected
-    with pytest.raises(nep.NepError, match="is there and did not respond; .* forbids 'nep/v1/serve/secret/"):
+    with pytest.raises(nep.NepError, match=r"is there and did not answer; .* forbids 'nep/v1/serve/secret/"):
         secret.call(2, timeout_s=LONG_S)
     assert robot.new_client("secret").call(3, timeout_s=LONG_S) == 3
     assert seen == [1, 3]

@@ -80,7 +80,7 @@ def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
     found = {each["id"]: each for each in json.loads(done.stdout.splitlines()[0])}
     assert found["loopback"]["severity"] == "error"
     assert found["loopback"]["command"] == "ip link set lo up"
-    assert "no master responds at '127.0.0.1:7780'" in done.stderr
+    assert "no master answers at '127.0.0.1:7780'" in done.stderr
     assert "list 1" in done.stderr
     assert "programs of this computer cannot reach it: network is unreachable; 'nep doctor'" in done.stderr
     assert "Traceback" not in done.stderr

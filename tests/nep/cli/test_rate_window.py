@@ -210,7 +210,7 @@ def test_clocks_that_nobody_compared_are_named_once(capsys):
     report = _Told((3600.0, None)).report
     for _ in range(5):
         report._show("t")
-    assert capsys.readouterr().err.count("clocks of two computers, uncorrected") == 1
+    assert capsys.readouterr().err.count("clocks of two computers, not corrected") == 1
 
 
 def _latched(stamp_ns, clock=OWN_CLOCK, publisher=1):

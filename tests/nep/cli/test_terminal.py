@@ -54,7 +54,7 @@ def test_who_writes_never_waits_and_what_was_left_out_is_told(stuck: Stuck) -> N
         terminal.flush()
     terminal.close(0.0)  # nor does closing
     stuck.may_go_on.set()
-    eventually(lambda: "excluded" in stuck.getvalue())
+    eventually(lambda: "left out" in stuck.getvalue())
     lines = stuck.getvalue().splitlines()
     assert lines[:3] == ["first", "line 0", "line 1"]
     kept = len(lines) - 2

@@ -67,7 +67,7 @@ def test_a_healthy_computer_has_no_warning():
         "A master runs at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
     )
     assert found()["ports"].sentence == (
-        "The master holds ports 7000 and 50000, where programs of original NEP ask."
+        "The master holds ports 7000 and 50000, where programs of the original NEP ask."
     )
 
 
@@ -286,7 +286,7 @@ def test_originals_are_named_and_those_that_cannot_be_served_are_errors():
         view=view(node("rize", "A"), node("camera", "B"), node("bad", "0.5.4.7"), node("g", "gateway"))
     )
     assert made["originals"].sentence == (
-        "2 programs of original NEP: rize (up to 0.5.4.5), camera (0.5.4.8)."
+        "2 programs of the original NEP: rize (up to 0.5.4.5), camera (0.5.4.8)."
     )
     assert made["original:bad"].severity == "error"
     assert "0.5.4.7" in made["original:bad"].sentence

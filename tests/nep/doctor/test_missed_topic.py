@@ -106,7 +106,7 @@ def test_who_is_not_there_at_all():
         (
             "refused",
             "Nobody listens at 10.0.0.7:41000 (lab) any more, where “camera_driver” published.",
-            "Restart it",
+            "Start it again",
         ),
         ("unknown", "There is no way to 10.0.0.7:41000 (lab), where “camera_driver” publishes.", "network"),
     ],
@@ -127,7 +127,7 @@ def test_versions_that_do_not_fit():
 
 def test_what_comes_and_can_or_cannot_be_read():
     assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
-    bad = found(received=1, unreadable="it is not JSON", **publisher(last_s=NOW))["topic:unreadable"]
+    bad = found(received=1, unreadable="it is no JSON", **publisher(last_s=NOW))["topic:unreadable"]
     assert bad.sentence == "Messages of /robot/camera come, but can't be read: it is no JSON."
     blocked = found(**publisher(last_s=NOW))["topic:blocked"]
     assert blocked.sentence.startswith("/robot/camera is sent by camera_driver (lab), but nothing came here")

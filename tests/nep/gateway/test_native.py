@@ -126,7 +126,7 @@ def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_aga
     assert not scene.native.subscribe("not a topic", "json")
     scene.native.publish("not a topic", "json", b"1")
     (alert,) = scene.alerts
-    assert "“not a topic” stays among programs of original NEP" in alert.sentence
+    assert "“not a topic” stays among programs of the original NEP" in alert.sentence
     assert alert.hint
 
 

@@ -101,7 +101,7 @@ def test_a_time_limit_begins_when_it_runs_not_while_it_waits(turtle) -> None:
     ears.final("3")
     clock.advance(1.1)  # so it is answered for
     assert ears.final("1")["error"] == (
-        "Turtle may still move: ignore has not ended (ignore took longer than 5 s)"
+        "Turtle may still move: ignore is still running (ignore took longer than 5 s)"
     )
     assert ears.states("2") == ["accepted"]
     body.go_on.set()

@@ -375,7 +375,7 @@ def test_it_stops_when_the_program_that_moves_it_falls_silent(bench) -> None:
     bench.clock.advance((bench.robot.safe_stop.watchdog_s or 0) + 0.05)
     ended = bench.ears.final(wanted)
     assert ended["state"] == "canceled"
-    assert "no sign of life" in str(ended["error"])
+    assert "has been silent" in str(ended["error"])
 
 
 def test_it_tells_that_it_lives_while_it_does_something(bench) -> None:
@@ -425,7 +425,7 @@ def test_messages_that_are_no_commands_change_nothing(bench, message) -> None:
     wanted = bench.new_id()
     bench.ears.command(id=wanted, op="dance")
     answer = bench.ears.final(wanted, "dance")
-    assert "a command is invoke, cancel, stop or alive" in str(answer["error"])
+    assert "use invoke, cancel, stop or alive" in str(answer["error"])
     assert [a["id"] for a in bench.ears.heard["answer"][before:]] == [wanted]
 
 

@@ -50,7 +50,7 @@ def test_bad_input_never_reaches_the_function(turtle):
     ears.invoke("2", "mov")
     assert ears.final("2")["error"] == "Turtle can't “mov”; did you mean “move”?"
     ears.command(id="3", op="dance")
-    assert ears.final("3", "dance")["error"].startswith("unknown name “dance”")
+    assert ears.final("3", "dance")["error"].startswith("unknown operation “dance”")
     ears.command(id="4", op="invoke", action="say", input="text")
     assert ears.final("4")["error"] == "say: the input must be an object with named values"
     assert body.done == []
@@ -154,7 +154,7 @@ def test_a_flood_of_waiting_actions_is_refused(turtle):
     _, ears, _ = turtle
     for number in range(60):
         ears.invoke(str(number), "say", text="x")
-    assert "other actions are waiting" in str(ears.final("59")["error"])
+    assert "other actions are already waiting" in str(ears.final("59")["error"])
 
 
 # ---- stop -----------------------------------------------------------------------------------------

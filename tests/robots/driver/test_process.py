@@ -109,7 +109,7 @@ def test_it_says_what_it_is_that_it_waits_and_when_the_master_is_there():
         assert process.stdout is not None
         assert process.stdout.readline() == "Table: a robot, model turntable; its topics are /Table/...\n"
         assert process.stdout.readline() == (
-            f"Table: no master answers at {address}; waiting for one, start Studio or `nep master`\n"
+            f"Table: no master at {address}; waiting for one. Start Studio or `nep master`\n"
         )
         with nep.Master(address):
             said = process.stdout.readline()

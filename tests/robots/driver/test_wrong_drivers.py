@@ -59,20 +59,20 @@ def test_the_good_one_is_good(tmp_path):
         ("Range(-1, 1)] = 0.5", "Range(-1, 1)] = 'x'",
          "table.py, line 8: turn: the default of 'far' must be a number, not 'x'"),
         ("Range(-1, 1)", 'Range(-1, 1, unit="meters")',
-         "table.py, line 8: turn: there is no unit 'meters'; write 'm'"),
+         "table.py, line 8: turn: unknown unit 'meters'; write 'm'"),
         ("far: Annotated[float, Range(-1, 1)] = 0.5", "far: 'Missing' = 0.5",
          "table.py, line 8: turn: name 'Missing' is not defined"),
         ("self, call: Call, far", "self, far",
-         "table.py, line 8: turn: after 'self' an action takes its call; write def NAME(self, call"),
+         "table.py, line 8: turn: the parameter after 'self' must be the call; write def NAME(self, call"),
         ("def turn(self, call: Call, far: Annotated[float, Range(-1, 1)] = 0.5)",
          "def turn(self, call: Call, *far: float)",
-         "table.py, line 8: turn: 'far' can't take a variable number of values; name each one, or use a list"),
+         "table.py, line 8: turn: 'far' can't take a variable number of values; name each one"),
         ('"""Turn."""', "yield",
-         "table.py, line 8: turn: it has a yield, so a call would run nothing; tell what happens with"),
+         "table.py, line 8: turn: actions can't be generators (yield); report progress with"),
         ('-> None:\n        """Turn."""', "-> complex: return 1j",
          "table.py, line 8: turn: a robot's value can't be complex; use float"),
         ('{"side": str}', '{"side": complex}', "table.py, line 5: a robot's value can't be complex"),
-        ('unit="deg"', 'unit="°"', "table.py, line 4: there is no unit '°'; write 'deg'"),
+        ('unit="deg"', 'unit="°"', "table.py, line 4: unknown unit '°'; write 'deg'"),
         ("turn %far", "turn %wide",
          USED + "table.py, line 9: actions.turn.rb:block.text.en uses %wide, which is not defined"),
         ("    @safe_stop()", f"{AGAIN}    @safe_stop()",
@@ -104,5 +104,5 @@ def test_it_ends_the_program_with_the_sentence_and_no_traceback(tmp_path):
         text=True,
         check=False,
     )
-    said = "table.py, line 8: turn: there is no unit 'sec'; write 's'\n"
+    said = "table.py, line 8: turn: unknown unit 'sec'; write 's'\n"
     assert (ended.returncode, ended.stdout, ended.stderr) == (1, "", said)

@@ -109,7 +109,9 @@ def test_a_warning_has_its_sentence_and_no_outline(view, person):
 def test_an_error_never_comes_without_its_sentence(view, person):
     them = person(state=PICTURE)
     them.ask(
-        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') && seen.push(document.body.textContent.includes('Pepper is not responding.'))).observe(document.body, {subtree: true, childList: true}); })()"
+        "(() => { window.seen = []; new MutationObserver(() => document.querySelector('.nepState-error') &&"
+        " seen.push(document.body.textContent.includes('Pepper is not responding.')))"
+        ".observe(document.body, {subtree: true, childList: true}); })()"
     )
     view.set_errors({"say_touch": "Pepper is not responding."})
     them.wait_for("seen.length > 0")

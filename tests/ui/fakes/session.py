@@ -258,7 +258,7 @@ class Session(session_module.Session):
             session.console.add(level, origin, text)
         session.alerts.put(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
-            "1 204 messages can't be read.", button="Look at the raw bytes", action="inspect:/faces",
+            "1 204 messages can't be decoded.", button="Show the bytes", action="inspect:/faces",
         )  # fmt: skip
         return session
 

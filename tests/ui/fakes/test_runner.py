@@ -372,7 +372,7 @@ def test_what_is_told_of_a_program_and_its_state(run: Run) -> None:
         runner.step()
         come("paused")
         assert runner.state == "paused"
-    with pytest.raises(RunnerError, match="make another"):
+    with pytest.raises(RunnerError, match="create a new one"):
         runner.start(program, [], run.session.address)
     runner.go_on()
     assert runner.state == "running"

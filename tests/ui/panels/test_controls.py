@@ -40,7 +40,7 @@ def theme(qapp) -> Theme:
 
 
 def form_of(qtbot, theme: Theme, *parameters: Parameter, pictures: object = None) -> ActionForm:
-    action = Action("do", "perform it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
+    action = Action("do", "do it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
     made = ActionForm(theme, action, pictures=pictures)  # type: ignore[arg-type]
     qtbot.addWidget(made)
     made.resize(560, 300)
@@ -360,7 +360,7 @@ def test_the_button_asks_for_a_picture_and_begins_where_the_last_one_was(theme, 
 
 
 def test_a_folder_and_a_pipe_are_not_opened(tmp_path) -> None:
-    assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is no file."
+    assert read_picture(tmp_path)[1] == f"“{tmp_path.name}” is not a file."
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.png")
         assert read_picture(tmp_path / "pipe.png")[1] == "“pipe.png” is not a file."

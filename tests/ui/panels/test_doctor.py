@@ -108,8 +108,8 @@ def test_panels_that_wait_are_listed_with_the_topic_that_was_meant(qtbot, panel,
     assert why.accessibleName() == "Why do I see nothing?"
     press(why)
     assert window.asked_why == [(far, "/zzzz/qqqqqqqqqq")]
-    assert [each for each in told if f"waits for {published}: nothing has come." in each]
-    (use,) = [told[each] for each in told if f"waits for {published}s. Nobody sends it." in each]
+    assert [each for each in told if f"is waiting for {published}; no message has arrived." in each]
+    (use,) = [told[each] for each in told if f"is waiting for {published}s, which has no publisher." in each]
     assert use.accessibleName() == f"Use {published}"
     press(use)
     assert near.subtitle() == published

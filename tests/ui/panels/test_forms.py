@@ -23,7 +23,7 @@ MANY = tuple(Option(number, f"number {number}") for number in range(6))
 
 
 def action(*parameters: Parameter) -> Action:
-    return Action("do", "perform it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
+    return Action("do", "do it", "bot", "Movement", parameters, "%robot do", None, "/c", "/a")
 
 
 @pytest.fixture

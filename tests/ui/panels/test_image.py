@@ -448,7 +448,7 @@ def test_a_frozen_picture_stays_and_says_so(qtbot, qapp) -> None:
     panel = made(qtbot, window)
     panel.freeze.click()
     panel.refresh()
-    assert panel.view.words.startswith("Frozen, ")
+    assert panel.view.words.startswith("Frozen ")
     panel.show_topic("/robot/depth")
     assert not panel.freeze.isChecked()
 

@@ -114,8 +114,8 @@ def test_topics_of_ros_stand_beside_the_native_ones_and_say_what_is_not_known(
     assert (theirs["topic"], theirs["network"], theirs["type"]) == ("/blackboard", "ROS 1", "String")
     assert (theirs["rate"], theirs["bandwidth"], theirs["loss"]) == ("", "", "unknown on ROS 1")
     told = tips(panel, "ros /blackboard")
-    assert "nobody tells it" in told["rate"]
-    assert "not counted" in told["loss"]
+    assert "doesn't report it" in told["rate"]
+    assert "doesn't count" in told["loss"]
     assert "on ROS 1 nobody tells rates or losses" in panel.foot.text()
     panel.filter.setText("ros 1 camera")
     assert [panel.model.key_of(row) for row in panel.model._rows.shown] == ["ros /camera"]
@@ -140,7 +140,7 @@ def test_what_one_looks_at_there_is_counted_here(qtbot, window: Window, look: Lo
     theirs = cells(panel, "ros /blackboard")
     assert 25 < float(str(theirs["rate"])) < 35
     assert (str(theirs["bandwidth"]).partition(" ")[2], theirs["loss"]) == ("B/s", "")
-    assert "Counted here while you look" in tips(panel, "ros /blackboard")["rate"]
+    assert "Measured here while it is open" in tips(panel, "ros /blackboard")["rate"]
     watch.close()
 
 
@@ -184,7 +184,7 @@ def test_nodes_of_ros_say_where_they_are_and_what_nobody_tells(qtbot, window: Wi
         "not reported",
         "2",
     )
-    assert "nobody tells there" in tips(panel, "ros /arm  ")["cpu"]
+    assert "doesn't report" in tips(panel, "ros /arm  ")["cpu"]
     panel.table.opened.emit("ros /arm  ")
     topic = next(row for row in panel.model._rows.shown if row.topic == "/camera")
     assert topic.way == "publishes"

@@ -161,7 +161,7 @@ def test_what_an_original_cannot_do_is_said_for_the_chosen_one(panel, window) ->
     panel.table.choose(NodeRow(window.session.nodes.get("2")).key)
     assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, here since ")
     assert "up to 0.5.4.5" in panel.foot.text()
-    assert "no numbers and no times" in panel.foot.text()
+    assert "no sequence numbers or time stamps" in panel.foot.text()
     panel.table.choose(NodeRow(window.session.nodes.get("1")).key)
     assert "no numbers" not in panel.foot.text()
     assert "on lab-pc" in panel.foot.text()
@@ -255,7 +255,7 @@ def test_a_bridge_is_called_one_and_says_where_its_counts_are(panel, window) -> 
     assert [line[:2] for line in shown(panel) if line[0] == bridge.name] == [["bridge-lab-to-ros", "bridge"]]
     assert generation_cell(NodeRow(window.session.nodes.get("7"))).icon == "arrow-left-right"
     panel.table.choose(NodeRow(window.session.nodes.get("7")).key)
-    assert "A bridge: it joins topics of this network with those of another." in panel.foot.text()
+    assert "A bridge that forwards topics between this network and others." in panel.foot.text()
     assert BRIDGES_TOPIC in panel.foot.text()
     assert [each.is_bridge for each in window.session.nodes] == [False, False, False, True]
     panel.filter.setText("bridge")

@@ -314,7 +314,7 @@ def test_an_empty_folder_and_one_that_is_away_say_what_to_do(qtbot, panel, windo
         panel.refresh()
         return any(words in each.text() for each in panel.empty.findChildren(QLabel))
 
-    qtbot.waitUntil(lambda: says("is not there"))
+    qtbot.waitUntil(lambda: says("doesn't exist"))
     (tmp_path / "stick").mkdir()
     qtbot.waitUntil(lambda: says("No recordings yet"))
     panel.empty.findChildren(Button)[-1].click()  # nothing to record: the connection doctor knows why

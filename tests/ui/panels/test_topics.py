@@ -247,8 +247,8 @@ def test_what_did_not_reach_the_panels_is_said_with_its_numbers(panel, window) -
     topic = window.session.topics["/odom"]
     assert rate.tip(topic) == "Messages per second, as reported by the publishers"
     topic.received, topic.dropped, topic.missed = 1200, 970, 3800
-    assert rate.tip(topic) == "230 of 5 000 messages shown"
-    assert loss.tip(topic) == "0 messages lost. 230 of 5 000 messages shown"
+    assert rate.tip(topic) == "230 of 5\u2009000 messages shown"
+    assert loss.tip(topic) == "0 messages lost. 230 of 5\u2009000 messages shown"
 
 
 def test_an_empty_panel_leads_to_the_connection_doctor(qtbot, panel, window) -> None:

@@ -105,7 +105,7 @@ def test_an_always_that_can_not_be_kept_is_told_and_it_moves_all_the_same(window
     window.ask("move")
     window.question.always.setChecked(True)
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
-    assert "settings can't be kept" in window.complaints[0]
+    assert "can't save settings" in window.complaints[0]
     assert window.done == ["moved"]
 
 

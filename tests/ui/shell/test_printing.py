@@ -88,7 +88,7 @@ def test_what_cannot_be_written_or_is_empty_is_said(qtbot, tmp_path: Path) -> No
     (tmp_path / "file").write_text("")
     case = Case(qtbot, b"%PDF", [])
     case.printing.save(tmp_path / "file" / "a.pdf")
-    assert case.said[0].startswith("The PDF can't be saved")
+    assert case.said[0].startswith("Can't save the PDF")
     case.editor.data = b""
     case.printing.save(tmp_path / "b.pdf")
     assert case.said[1] == "This page has no blocks"

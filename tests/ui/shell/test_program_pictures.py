@@ -59,7 +59,7 @@ def test_a_place_where_nothing_can_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     made(Editor(b"<svg/>"), said).save(tmp_path / "file" / "a.svg", "svg", True)
     (sentence,) = said
-    assert sentence.startswith("The picture can't be saved")
+    assert sentence.startswith("Can't save the image")
 
 
 def test_without_blocks_nothing_is_written(tmp_path: Path) -> None:

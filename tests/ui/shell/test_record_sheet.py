@@ -210,7 +210,7 @@ def test_it_ends_after_what_is_chosen_and_says_how_large_it_will_be(window, reco
     sheet.show_state()
     assert sheet.at_end.note.text() == "at 30:00"
     recorder.say("ended", status=status(duration_s=1800.0), limit="time")
-    assert "for as long as you chose" in window.toast.text
+    assert "at the time limit" in window.toast.text
     sheet.ends_min.clear()
     sheet.ends_min.editingFinished.emit()
     assert recorder.session.recordings.choice.ends_min is None
@@ -260,7 +260,7 @@ def test_a_recording_that_has_gone_is_said_and_what_shows_stays(window, recorder
     opened: list[Path] = []
     monkeypatch.setattr(recorder.session, "open_recording", opened.append)
     window.commands.run(f"recording.open:{path}")
-    assert "not there any more" in window.toast.accessibleName()
+    assert "no longer exists" in window.toast.accessibleName()
     assert opened == []
     path.touch()
     window.commands.run(f"recording.open:{path}")

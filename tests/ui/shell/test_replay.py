@@ -139,7 +139,7 @@ def test_a_picture_of_a_paused_recording_is_not_silent_and_as_old_as_it_was_then
     assert stream.silent_s > 50.0
     window.tick()
     assert stream.silent_s == 0.0
-    assert "Last picture" not in image.view.words
+    assert "Last image" not in image.view.words
 
 
 def test_robots_and_alarms_go_by_the_live_network_meanwhile(qtbot, window, session, path):

@@ -168,7 +168,7 @@ def test_bookmarks_are_renamed_and_deleted_with_undo_but_notes_stay(shown, windo
     shown.wait(lambda: shown.replay.player.position_ns == at(80))
     QTest.keyClick(shown.canvas, Qt.Key.Key_F2)
     assert shown.canvas.field is None
-    assert "No bookmark is at the playhead" in window.toast.text
+    assert "No bookmark at the playhead" in window.toast.text
     QTest.keyClick(shown.canvas, Qt.Key.Key_B)
     QTest.keyClick(shown.canvas, Qt.Key.Key_F2)
     shown.type_name("Aiko comes in")
@@ -194,4 +194,4 @@ def test_bookmarks_are_renamed_and_deleted_with_undo_but_notes_stay(shown, windo
     shown.panel.rename_bookmark(note)
     assert shown.canvas.field is None
     assert note in shown.replay.bookmarks
-    assert "stands in the file" in window.toast.text
+    assert "are part of the file" in window.toast.text

@@ -136,7 +136,7 @@ def test_a_panel_that_makes_sense_once_offers_no_more(bench) -> None:
 def test_there_is_a_bound(bench, window) -> None:
     opened = [bench.open_another("image") for _ in range(MOST_OF_A_KIND)]
     assert len([dock for dock in opened if dock is not None]) == MOST_OF_A_KIND - 1
-    assert window.toast.text == f"There are {MOST_OF_A_KIND} already, and no more fit"
+    assert window.toast.text == f"{MOST_OF_A_KIND} are already open, the maximum"
 
 
 def test_they_come_back_with_their_topics_at_the_next_start(qtbot, bench, window) -> None:

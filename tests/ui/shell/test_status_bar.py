@@ -100,7 +100,7 @@ def test_what_came_faster_than_the_window_shows_is_told(session: fakes.Session) 
     session.traffic.shown_30s = session.traffic.sent_30s = 900
     assert facts(session).shown()[1] == ""
     session.traffic.sent_30s = 4900
-    assert facts(session).shown()[1] == "900 of 4 900 shown in 30 s"
+    assert facts(session).shown()[1] == "900 of 4\u2009900 shown in 30 s"
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def test_a_used_name_is_said_while_it_is_typed(shown: MainWindow, commands: Comm
     commands.run("variable.new")
     sheet = sheet_of(shown)
     typed(sheet, name)
-    assert sheet.wrong.text() == f"There is a variable “{name}” already. Choose another name."
+    assert sheet.wrong.text() == f"A variable named “{name}” already exists. Choose another name."
     assert not sheet.button.isEnabled()
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert sheet.isVisible()

@@ -20,8 +20,8 @@ X11 = {"DISPLAY": ":0"}
         (X11, "linux", 1000, ""),
         ({"WAYLAND_DISPLAY": "wayland-0"}, "linux", 1000, ""),
         ({"QT_QPA_PLATFORM": "offscreen"}, "linux", 1000, ""),
-        ({}, "linux", 1000, "there is no screen here"),
-        ({"DISPLAY": ""}, "linux", 1000, "there is no screen here"),
+        ({}, "linux", 1000, "no screen found"),
+        ({"DISPLAY": ""}, "linux", 1000, "no screen found"),
         (X11, "linux", 0, "as root"),
         ({**X11, "QTWEBENGINE_DISABLE_SANDBOX": "1"}, "linux", 0, ""),
         ({}, "darwin", 0, ""),
@@ -42,7 +42,7 @@ def test_without_a_screen_it_ends_with_a_sentence(tmp_path: Path) -> None:
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stdout == ""
-    assert done.stderr.startswith("nep-studio: there is no screen here")
+    assert done.stderr.startswith("nep-studio: no screen found")
     assert "reinstall" not in done.stderr
 
 
@@ -55,7 +55,7 @@ def test_as_root_with_the_browsers_sandbox_it_ends_with_a_sentence(tmp_path: Pat
     command = [sys.executable, "-m", "app"]
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 2
-    assert "refuses to run as root with its sandbox; start Studio as another user" in done.stderr
+    assert "can't run as root with its sandbox. Start Studio as another user" in done.stderr
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")

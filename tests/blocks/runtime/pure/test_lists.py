@@ -54,7 +54,10 @@ def test_items_are_counted_from_1_and_named_in_words() -> None:
         ),
         (lambda: lists.item(None, 1), "This list has no value yet."),
         (lambda: lists.add_item((1, 2), 3), "This list can't be changed."),
-        (lambda: lists.add_item([0] * lists.MOST_ITEMS, 1), "The list is full: it can have at most 10000 items."),
+        (
+            lambda: lists.add_item([0] * lists.MOST_ITEMS, 1),
+            "The list is full: it can have at most 10000 items.",
+        ),
         (lambda: lists.split_text("a" * 20_000, ""), "The list is full: it can have at most 10000 items."),
         (
             lambda: lists.join_items(["a" * LONGEST_TEXT], "b"),

@@ -115,7 +115,7 @@ def test_a_field_from_elsewhere_is_plotted_and_its_topic_looked_at(panel, window
     send(panel, "/odom", sine(0, 60))
     look(panel)
     assert cell(panel, "/odom.speed", "last") == value_words(float(np.sin(59.95)))
-    assert panel.points.text() == "1 200 points, all shown"
+    assert panel.points.text() == "1\u2009200 points, all shown"
     columns = drawn(panel, panel.theme.series(0))
     assert len(columns) > 0.9 * panel.canvas.area.width()
     panel.remove("/odom.speed")
