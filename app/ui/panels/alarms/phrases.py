@@ -35,7 +35,7 @@ _TEMPLATES: Mapping[str, str] = {
     "comes": lazy("When {subject} {kind}"),
 }
 KIND_WORDS: Mapping[str, str] = {
-    "silent": plazy("alarm", "not responding"),
+    "silent": plazy("alarm", "silent"),
     "rate_below": plazy("alarm rate", "fewer than"),
     "rate_above": plazy("alarm rate", "more than"),
     "loses": plazy("alarm", "loses more than"),
