@@ -17,7 +17,7 @@ from nep.cli.screen import console, say
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _, ngettext
 from nep.masters.master import is_running
-from nep.programs.web.access import Access, checked_origin, new_token
+from nep.programs.web.access import Access, checked_origin, new_token, query_of
 from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
 from nep.recordings.formats.channels import LiveChannels
 from nep.system.addresses import ANY, checked_host, master_address, own_addresses
@@ -170,11 +170,14 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
     """Print the URLs, the access rules, and a missing master."""
     out = console(out=terminal)
     token = server.settings.access.token
-    query = f"/?token={token}" if token and token_file is None else ""
+    query = query_of(token) if token and token_file is None else ""
     out.print(_("[bold green]●[/] web pages connect to [bold]{url}[/]").format(url=server.url + query))
     for host in _network_hosts(server.settings.listen):
         url = f"ws://{host}:{server.port}{query}"
         out.print(_("[bold yellow]●[/] other computers connect to [bold]{url}[/]").format(url=url))
+    hosts = [*_network_hosts(server.settings.listen), "127.0.0.1"]
+    page_url = f"http://{hosts[0]}:{server.port}{query or '/'}"
+    out.print(_("  test page: {url}").format(url=page_url), style="dim")
     if token_file is not None:
         words = _("  append /?token=TOKEN to the URL, with the token in {file}")
         out.print(words.format(file=token_file), style="dim")

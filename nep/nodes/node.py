@@ -79,10 +79,10 @@ class Node(ServiceNode):
     (docs/backends.md). `master`: the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`:
     how long `new_pub` and `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for
     ever. `generation`: what it is in the graph, another word for gateways to other systems. `language`: the
-    language of its program in the graph, for nodes that stand for others, such as the web pages of `nep web`.
-    `strict`: its publishers raise `EncodeError` for whatever cannot be sent, see `Publisher.publish`. Raises
-    `UnknownBackendError`, `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is
-    forked it is closed, with all that was made on it; a new node works there.
+    language of its program in the graph; "web" for the web pages of `nep web`. `strict`: its publishers raise
+    `EncodeError` for whatever cannot be sent, see `Publisher.publish`. Raises `UnknownBackendError`,
+    `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is forked it is closed,
+    with all that was made on it; a new node works there.
     """
 
     def __init__(

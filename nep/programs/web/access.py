@@ -14,14 +14,14 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from ipaddress import ip_address
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
 from nep.errors import NepError
 from nep.i18n import _
 from nep.programs.web.operations import Auth
 from nep.text import quotable
 
-__all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token"]
+__all__ = ["Access", "AuthCheck", "checked_origin", "is_own_host", "new_token", "query_of"]
 
 _CLOCK_TOLERANCE_S = 5
 """As rosauth has it: so much may the clocks of the two sides differ."""
@@ -32,6 +32,11 @@ _DEFAULT_PORTS = {"http": 80, "https": 443}
 def new_token() -> str:
     """Return a random token that can stand in a URL."""
     return secrets.token_urlsafe(24)
+
+
+def query_of(token: str) -> str:
+    """Return path and query of a URL with the token: "/?token=..."; "/" without one."""
+    return f"/?token={quote(token, safe='')}" if token else "/"
 
 
 def is_own_host(host: str) -> bool:

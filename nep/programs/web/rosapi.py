@@ -79,6 +79,18 @@ class RosApi:
         """All topics with their types."""
         return {"topics": list(self._types), "types": list(self._types.values())}
 
+    def topic_rates(self, _args: Mapping[str, object]) -> Mapping[str, object]:
+        """All topics with types, messages per second and bytes per second; NEP's addition to rosapi.
+
+        A rate is None where it is not known yet.
+        """
+        known = [self._view.topics[each] for each in self._types]
+        return {
+            **self.topics({}),
+            "rates": [each.rate_hz for each in known],
+            "bandwidths": [each.bandwidth_Bps for each in known],
+        }
+
     def topics_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """The topics of a type."""
         wanted = bare_type(_text(args, "type"))
@@ -277,6 +289,7 @@ def _has(members: tuple[object, ...], node_ids: set[str]) -> bool:
 _Service = Callable[[RosApi, Mapping[str, object]], Mapping[str, object]]
 _SERVICES: Mapping[str, tuple[str, _Service]] = {
     "topics": ("Topics", RosApi.topics),
+    "topic_rates": ("TopicRates", RosApi.topic_rates),
     "topics_for_type": ("TopicsForType", RosApi.topics_for_type),
     "topic_type": ("TopicType", RosApi.topic_type),
     "topics_and_raw_types": ("TopicsAndRawTypes", RosApi.topics_and_raw_types),

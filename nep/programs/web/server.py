@@ -22,11 +22,12 @@ from nep.errors import AddressInUseError, NepError, TooManyFilesError
 from nep.i18n import _
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
-from nep.programs.web.access import Access, AuthCheck, is_own_host
+from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
 from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
 from nep.programs.web.foxglove_page import SUBPROTOCOLS, ChannelFormat, FoxglovePage
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
+from nep.programs.web.served_pages import PageRequest, answer
 from nep.system.addresses import ANY
 from nep.system.descriptors import is_lack, limit, opened
 from nep.system.log_rarely import is_logged
@@ -127,6 +128,11 @@ class WebServer:
     def url(self) -> str:
         """Where pages of this computer connect, without the token."""
         return f"ws://{_LOOPBACK}:{self.port}"
+
+    @property
+    def test_page_url(self) -> str:
+        """Where a browser of this computer opens the test page, with the token if one is required."""
+        return f"http://{_LOOPBACK}:{self.port}{query_of(self.settings.access.token)}"
 
     @property
     def page_names(self) -> tuple[str, ...]:
@@ -316,7 +322,9 @@ class WebServer:
     # ---- who connects
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a handshake that is refused; None lets it go on."""
+        """Answer a handshake that is refused, and other HTTP requests; None lets a handshake go on."""
+        if not _is_handshake(request):
+            return self._page_response(connection, request)
         access = self.settings.access
         origins = request.headers.get_all("Origin")
         origin = origins[0] if origins else None
@@ -335,6 +343,29 @@ class WebServer:
             connection, refusal.kind, refusal.sentence, (origin or "") if refusal.kind == "origin" else ""
         )
         return connection.respond(refusal.status, refusal.sentence + "\n")
+
+    def _page_response(self, connection: ServerConnection, request: Request) -> Response:
+        """Answer a request for one of the server's own pages."""
+        from websockets.datastructures import Headers  # noqa: PLC0415 - only this command needs it
+        from websockets.http11 import Response  # noqa: PLC0415 - only this command needs it
+
+        authorizations = request.headers.get_all("Authorization")
+        method = getattr(request, "method", "GET")  # websockets before 17 refuses other methods itself
+        asked = PageRequest(
+            method,
+            request.path,
+            tuple(request.headers.get_all("Host")),
+            _own_origin(connection),
+            authorizations[0] if len(authorizations) == 1 else None,
+        )
+        found = answer(asked, self.settings.access)
+        if found.is_token_refused:
+            self._turn_away(connection, "token", _("a page was opened without the token or with a wrong one"))
+        headers = Headers(found.headers)
+        headers["Connection"] = "close"
+        headers["Content-Length"] = str(len(found.body))
+        body = b"" if method == "HEAD" else found.body
+        return Response(found.status.value, found.status.phrase, headers, body)
 
     def _token_refusal(
         self, connection: ServerConnection, request: Request, access: Access
@@ -467,6 +498,10 @@ def node_name(origin: str | None, address: str) -> str:
     host = urlsplit(origin).netloc if origin else ""
     port = address.rpartition(":")[2]
     return escaped(f"web_{host}_{port}" if host else f"web_{address}")[:150]
+
+
+def _is_handshake(request: Request) -> bool:
+    return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
 
 
 def _own_origin(connection: ServerConnection) -> str:

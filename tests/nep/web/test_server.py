@@ -110,6 +110,8 @@ def test_rosapi_lists_topics_nodes_and_services(node: nep.Node, page: Peer) -> N
         return answer["values"]
 
     assert asked("topics") == {"topics": ["/twist"], "types": ["geometry_msgs/Twist"]}
+    rates = asked("topic_rates")
+    assert (rates["topics"], len(rates["rates"]), len(rates["bandwidths"])) == (["/twist"], 1, 1)
     assert asked("topics_for_type", type="geometry_msgs/msg/Twist") == {"topics": ["/twist"]}
     assert asked("topic_type", topic="/twist") == {"type": "geometry_msgs/Twist"}
     assert "MSG: geometry_msgs/Vector3" in asked("topics_and_raw_types")["typedefs_full_text"][0]

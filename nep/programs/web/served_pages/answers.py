@@ -1,0 +1,192 @@
+"""Answers to HTTP requests that are no WebSocket handshakes. Pure, apart from reading the pages' files.
+
+Pages have no external files, and a Content-Security-Policy with the hashes of their scripts and styles. They
+are served only for a Host from which a page could also connect, because a name of another site can lead to
+this computer (DNS rebinding).
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from http import HTTPStatus
+from pathlib import Path
+from typing import NamedTuple
+
+from nep.errors import NepError
+from nep.i18n import _, language
+from nep.programs.web.access import Access, checked_origin, query_of
+
+__all__ = ["PageRequest", "PageResponse", "answer", "starter_page"]
+
+_METHODS = frozenset({"GET", "HEAD"})
+_HOLE = re.compile(r"\{\{(\w+)\}\}")
+_INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
+_HTML = "text/html; charset=utf-8"
+_TEXT = "text/plain; charset=utf-8"
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+class PageRequest(NamedTuple):
+    """An HTTP request.
+
+    `hosts` are its Host headers. `own` is the origin of the server's pages at the address of the connection.
+    """
+
+    method: str
+    path: str
+    hosts: tuple[str, ...]
+    own: str
+    authorization: str | None = None
+
+
+class PageResponse(NamedTuple):
+    """An HTTP response. `is_token_refused`: the token was missing or wrong."""
+
+    status: HTTPStatus
+    headers: Mapping[str, str]
+    body: bytes
+    is_token_refused: bool = False
+
+
+def answer(request: PageRequest, access: Access) -> PageResponse:
+    """Return the response to a request, whatever it contains."""
+    path = request.path.partition("?")[0]
+    if request.method not in _METHODS:
+        return _plain(HTTPStatus.METHOD_NOT_ALLOWED, _("only GET is supported"), {"Allow": "GET, HEAD"})
+    if path not in {"/", "/starter.html"}:
+        return _plain(HTTPStatus.NOT_FOUND, _("there is no such page; open {url}").format(url="/"))
+    origin = _origin(request, access)
+    if origin is None:
+        said = _("this server answers at its address only; open {url}")
+        return _plain(HTTPStatus.FORBIDDEN, said.format(url=f"{request.own}/"))
+    if access.token and not access.is_given(request.path, request.authorization):
+        return _page(
+            HTTPStatus.UNAUTHORIZED,
+            _filled("refused.html", _refused_words()),
+            "default-src 'none'",
+        )._replace(is_token_refused=True)
+    host = origin.partition("://")[2]
+    url = f"{'wss' if origin.startswith('https') else 'ws'}://{host}"
+    if path == "/starter.html":
+        page = starter_page(url + query_of(access.token))
+        return _page(HTTPStatus.OK, page, f"default-src 'none'; connect-src {url}")
+    policy = f"default-src 'none'; img-src data:; connect-src {url}"
+    return _page(HTTPStatus.OK, _filled("test.html", _test_page_words()), policy)
+
+
+def starter_page(url: str) -> str:
+    """Return the HTML of a page to start from: it connects to `url` and shows a topic.
+
+    Args:
+        url: WebSocket URL of the server, with the token if it requires one.
+    """
+    return _source("starter.html").replace("{{address}}", _script_json(url))
+
+
+def _origin(request: PageRequest, access: Access) -> str | None:
+    """The origin that the page will have in the browser; None where it could not connect."""
+    if len(request.hosts) != 1:
+        return None
+    for scheme in ("http", "https"):
+        try:
+            origin = checked_origin(f"{scheme}://{request.hosts[0]}")
+        except NepError:
+            return None
+        if not access.origin_refusal(origin, request.own):
+            return origin
+    return None
+
+
+# ---- responses
+
+
+def _plain(status: HTTPStatus, sentence: str, headers: Mapping[str, str] | None = None) -> PageResponse:
+    kind = {"Content-Type": _TEXT, "Content-Security-Policy": "default-src 'none'"}
+    return PageResponse(status, {**_HEADERS, **kind, **(headers or {})}, f"{sentence}\n".encode())
+
+
+def _page(status: HTTPStatus, text: str, policy: str) -> PageResponse:
+    hashes: dict[str, str] = {}
+    for element, content in _INLINE.findall(text):
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        hashes[element] = hashes.get(element, "") + f" 'sha256-{digest}'"
+    inline = "".join(f"; {element}-src{each}" for element, each in hashes.items())
+    policy += f"{inline}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    return PageResponse(
+        status, {**_HEADERS, "Content-Type": _HTML, "Content-Security-Policy": policy}, text.encode()
+    )
+
+
+@lru_cache
+def _source(name: str) -> str:
+    return Path(__file__).with_name(name).read_text("utf-8")
+
+
+def _filled(name: str, words: Mapping[str, str]) -> str:
+    """A page with its words; "data" is JSON of those that the script uses, the others are text."""
+
+    def value(hole: re.Match[str]) -> str:
+        if hole[1] == "data":
+            return _script_json(words)
+        return html.escape(words[hole[1]])
+
+    return _HOLE.sub(value, _source(name))
+
+
+def _script_json(value: object) -> str:
+    """JSON that can stand in a script element."""
+    return json.dumps(value).replace("<", "\\u003c")
+
+
+# ---- words
+
+
+def _refused_words() -> dict[str, str]:
+    return {
+        "language": language(),
+        "title": _("Token required"),
+        "sentence": _(
+            "This page needs the token of the server. Open the address that 'nep web' printed or Studio "
+            "shows, or scan its code."
+        ),
+    }
+
+
+def _test_page_words() -> dict[str, str]:
+    return {
+        "language": language(),
+        "title": _("Test page"),
+        "topics": _("Topics"),
+        "no_topics": _("No topics yet. They appear here when a program publishes."),
+        "publish_text": _("Publish a text"),
+        "topic": _("Topic"),
+        "text": _("Text"),
+        "hello": _("hello"),
+        "publish": _("Publish"),
+        "connect": _("Connect"),
+        "starter": _("Starter page for a page of your own"),
+        "connecting": _("Connecting…"),
+        "connected": _("Connected to {address}"),
+        "disconnected": _("Disconnected by the server."),
+        "lost": _("Not connected. Trying again in {seconds} s."),
+        "rate": _("{rate}/s, {bandwidth} kB/s"),
+        "no_message": _("No message yet"),
+        "newest": _("{count} received, the newest at {time}"),
+        "picture": _("Newest picture of {topic}"),
+        "needs_json": _("The type of this topic is {type}. Write the message as JSON."),
+        "sent": _("Sent at {time}"),
+        "not_sent": _("Not sent: the page is not connected."),
+    }
