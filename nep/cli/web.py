@@ -71,7 +71,7 @@ FoxgloveOption = Annotated[
     bool,
     typer.Option(
         "--foxglove",
-        help=_("Serve live topics to Foxglove and Lichtblick by Foxglove's WebSocket protocol, too."),
+        help=_("Serve Foxglove and Lichtblick by Foxglove's WebSocket protocol, too."),
     ),
 ]
 

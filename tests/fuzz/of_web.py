@@ -10,6 +10,7 @@ from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.programs.web import operations as op
 from nep.programs.web.access import Access, AuthCheck
+from nep.programs.web.foxglove import protocol as foxglove
 from nep.programs.web.fragments import FragmentBuffer
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
 from nep.programs.web.outgoing import EncodingOptions, publish_frames
@@ -88,6 +89,23 @@ def origins_of_pages(data: bytes) -> None:
         assert not control_in(name)
     if not refusal:
         check_node_name(node_name(text, "127.0.0.1:5"))
+
+
+@TARGETS.add(
+    NepError,
+    seeds=lambda: [
+        b'{"op":"subscribe"}',
+        b"\x01\x00\x00\x00\x00{}",
+        b"\x02" + bytes(8) + b"\x04\x00\x00\x00json{}",
+    ],
+    words=(b"\x01", b"\x02", b"json", b"\xff\xff\xff\xff"),
+)
+def messages_of_foxglove(data: bytes) -> None:
+    found = foxglove.parse(data)
+    if isinstance(found, foxglove.ServiceRequest):
+        assert len(found.encoding) + len(found.data) <= len(data)
+    elif isinstance(found, foxglove.ClientMessage):
+        assert data.endswith(found.data)
 
 
 @TARGETS.add(

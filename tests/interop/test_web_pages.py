@@ -1,4 +1,4 @@
-"""Unmodified roslib and roslibpy with `nep web`, as in their own examples."""
+"""Unmodified roslib, roslibpy and Foxglove's own client library with `nep web`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import nep
+from nep.geometry import Twist, Vector3
 from nep.masters.master import Master
 from nep.programs.web import WebServer, WebSettings
+from nep.recordings.formats.channels import LiveChannels
 from nep.sensor import LaserScan
 from tests.interop.conftest import SCRIPTS, Peers, Program
 from tests.nep.programs import eventually
@@ -26,7 +28,8 @@ def node(master: Master) -> Iterator[nep.Node]:
 
 @pytest.fixture
 def server(master: Master) -> Iterator[WebServer]:
-    with WebServer(WebSettings(port=0, master=master.address)) as running:
+    settings = WebSettings(port=0, master=master.address, foxglove=LiveChannels())
+    with WebServer(settings) as running:
         yield running
 
 
@@ -112,3 +115,32 @@ def test_roslib_receives_the_close_of_the_server(clients: Peers, master: Master,
         eventually(lambda: "/chatter" in node.graph().topics)
     assert page.process.wait(30) == 0  # by a close frame, not a broken connection
     eventually(lambda: not node.graph().topics)
+
+
+def test_foxglove_client_reads_publishes_and_calls_services(
+    clients: Peers, server: WebServer, node: nep.Node
+) -> None:
+    heard = node.new_sub("/cmd", Twist)
+    node.new_server("/add_two_ints", lambda given: {"sum": given["a"] + given["b"]}, threads=1)
+    node.new_pub("/odom", latched=True).publish({"text": "日本"})
+    node.new_pub("/picture", "image", latched=True).publish(np.zeros((4, 4, 3), np.uint8))
+    page = clients.run_javascript("roslib", "foxglove_peer.mjs", [server.url]).wait_ready()
+    assert page.hears({"topics": ["/odom", "/picture"]})
+    assert page.hears({"services": ["/add_two_ints"]})
+    page.tell(["listen", "/odom"])
+    assert page.hears({"topic": "/odom", "isNow": True, "value": {"text": "日本"}})
+    page.tell(["listen", "/picture"])
+    page.wait(lambda: "/picture" in str(page.got[-1]) and page.got[-1]["value"] > 50, "a picture")
+    page.tell(["talk", "/cmd", "geometry_msgs/Twist", {"linear": {"x": 2.0}}])
+    assert heard.listen(timeout_s=30) == (True, Twist(linear=Vector3(x=2.0)))
+    page.tell(["call", "/add_two_ints", 7, {"a": 1, "b": 2}])
+    assert page.hears({"callId": 7, "encoding": "json", "value": {"sum": 3}})
+    page.tell(["call", "/add_two_ints", 8, {}])
+    page.wait(lambda: any("KeyError" in str(each) for each in page.got), "the error of a service")
+    page.tell(["graph"])
+    page.wait(lambda: any("published" in each for each in page.got), "the graph")
+    assert [each.client for each in server.pages] == ["Foxglove"]
+    server.close()
+    assert page.process.wait(30) == 0
+    page.wait(lambda: {"closed": 1001} in page.got, "the close code")
+    assert not [each for each in page.got if "error" in each]

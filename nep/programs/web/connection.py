@@ -136,6 +136,10 @@ class PageConnection:
         _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
         self.start_closing("the page does not read its answers")
 
+    def _announce(self) -> None:
+        """In the page's thread: a node is in the graph once it has something, if only its log."""
+        self._node.log.info("the page connected from %s", self._connection.remote_address)
+
     async def _close_node(self) -> None:
         self._thread.submit(self._node.close, _NODE_CLOSE_S)
         await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
@@ -146,25 +150,26 @@ class PageConnection:
         """Send queued messages, as fast as the page reads them."""
         try:
             while True:
-                next_up = await self._queue.take()
-                if isinstance(next_up, Queued):
-                    await self._send_message(next_up)
-                else:
-                    await self._connection.send(next_up.data, text=next_up.is_text)
-                    self._counts.sent += 1
+                await self._send(await self._queue.take())
         except ws_exceptions.ConnectionClosed:
             return
         except Exception:
             _logger.exception("the page '%s' is closed because of an error", self.name)
             await self._close_connection(_INTERNAL_ERROR, "internal error")
 
-    async def _send_message(self, queued: Queued) -> None:
-        frames = await self._frames_of_message(queued)
+    async def _send(self, item: Frame | Queued) -> None:
+        if isinstance(item, Frame):
+            await self._connection.send(item.data, text=item.is_text)
+            self._counts.sent += 1
+            return
+        feed = item.feed
+        frames = await self._frames_of_message(item)
+        del item  # while a slow page blocks: its message may lie in shared memory
         for frame in frames:
             await self._connection.send(frame.data, text=frame.is_text)
         if frames:
             self._counts.sent += 1
-            queued.feed.sent.count(sum(len(frame.data) for frame in frames))
+            feed.sent.count(sum(len(frame.data) for frame in frames))
 
     async def _frames_of_message(self, queued: Queued) -> list[Frame]:
         feed = queued.feed

@@ -127,8 +127,21 @@ class PageContext:
         thread: Executor,
         guard: MotionGuard,
         counts: WebCounts,
+        *,
         on_robot_refused: Callable[[str, str], object] = lambda _robot, _reason: None,
+        send_status: Callable[[Level, str], object] | None = None,
     ) -> None:
+        """Create it.
+
+        Args:
+            node: Node of the page.
+            queue: Messages that wait for the page.
+            thread: Thread for what waits for the network.
+            guard: Decides what the page may publish.
+            counts: Counts of the server.
+            on_robot_refused: Called with a robot that the page may not move, and the reason.
+            send_status: Sends a status in a protocol other than rosbridge.
+        """
         self.node = node
         self.queue = queue
         self.guard = guard
@@ -136,6 +149,7 @@ class PageContext:
         self.level: Level = "error"
         self._thread = thread
         self._on_robot_refused = on_robot_refused
+        self._send_status = send_status
         self._refused_at: dict[str, float] = {}
         self._refused_lock = threading.Lock()
 
@@ -166,6 +180,9 @@ class PageContext:
     def tell(self, level: Level, sentence: str, id_: OperationId = None) -> None:
         """Send a status, unless the page wants none of this level."""
         if LEVELS.index(level) < LEVELS.index(self.level):
+            return
+        if self._send_status is not None:
+            self._send_status(level, sentence)
             return
         status: dict[str, object] = {"op": "status", "level": level, "msg": sentence}
         if id_ is not None:

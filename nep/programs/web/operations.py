@@ -50,7 +50,9 @@ __all__ = [
     "Unadvertise",
     "UnadvertiseService",
     "Unsubscribe",
+    "operation_of",
     "parse",
+    "parse_json",
     "shown",
 ]
 
@@ -234,6 +236,19 @@ Operation = (
 
 def parse(data: bytes) -> Operation:
     """Return the operation in one message of a page. Raises `OperationError`."""
+    fields = parse_json(data)
+    if not isinstance(fields, dict):
+        raise OperationError(_("an operation is a JSON object with an 'op'"))
+    return operation_of(fields, len(data))
+
+
+def operation_of(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
+    """Return the operation with these fields. Raises `OperationError`."""
+    return _operation(_Fields(fields, size_bytes))
+
+
+def parse_json(data: bytes) -> object:
+    """Return a JSON value of a page, within the limits of an operation. Raises `OperationError`."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
             _("an operation has {count} bytes; {most} are allowed").format(
@@ -247,14 +262,11 @@ def parse(data: bytes) -> Operation:
             _("an operation has more than {most} values; send less at once").format(most=MAX_VALUES)
         )
     try:
-        fields = orjson.loads(data)
+        return orjson.loads(data)
     except orjson.JSONDecodeError as error:
         raise OperationError(
             _("an operation is no JSON text: {reason}").format(reason=quotable(str(error)))
         ) from None
-    if not isinstance(fields, dict):
-        raise OperationError(_("an operation is a JSON object with an 'op'"))
-    return _operation(_Fields(fields, len(data)))
 
 
 def shown(text: str) -> str:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 else:
     cbor2 = lazy_module("cbor2")
 
-__all__ = ["EncodingOptions", "Frame", "operation_frames", "publish_frames"]
+__all__ = ["EncodingOptions", "Frame", "json_bytes", "operation_frames", "publish_frames"]
 
 _NS = 1_000_000_000
 _TYPED_ARRAYS = {
@@ -70,7 +70,7 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
         return [Frame(_cbor({"op": "publish", "topic": topic, "msg": msg}), is_text=False)]
     body = _json_payload(message) if message.codec == "json" else None
     if body is None:
-        text = _json({"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)})
+        text = json_bytes({"op": "publish", "topic": topic, "msg": to_ros(message, as_pixels=form.as_pixels)})
     else:
         text = b'{"op":"publish","topic":%b,"msg":%b}' % (orjson.dumps(topic), body)
     return _text_frames(text, form)
@@ -80,19 +80,19 @@ def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> 
     """Return another operation, such as a service's answer. Raises `EncodeError`."""
     if form.compression in {"cbor", "cbor-raw"}:
         return [Frame(_cbor(operation), is_text=False)]
-    return _text_frames(_json(operation), form)
+    return _text_frames(json_bytes(operation), form)
 
 
 def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
     if form.compression == "png":
-        text = _json({"op": "png", "data": text_as_png(text)})
+        text = json_bytes({"op": "png", "data": text_as_png(text)})
     if form.fragment_size is None or len(text) <= form.fragment_size:
         return [Frame(text, is_text=True)]
     pieces = cut(text.decode(), form.fragment_size)
     id_ = f"fragment:{next(_fragment_numbers)}"
     return [
         Frame(
-            _json({"op": "fragment", "id": id_, "data": piece, "num": number, "total": len(pieces)}),
+            json_bytes({"op": "fragment", "id": id_, "data": piece, "num": number, "total": len(pieces)}),
             is_text=True,
         )
         for number, piece in enumerate(pieces)
@@ -111,7 +111,8 @@ def _json_payload(message: Message) -> bytes | None:
     return data
 
 
-def _json(value: object) -> bytes:
+def json_bytes(value: object) -> bytes:
+    """Return a value as JSON, with bytes in base64. Raises `EncodeError`."""
     try:
         return orjson.dumps(value, _as_text, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
     except (TypeError, RecursionError) as error:

@@ -52,7 +52,9 @@ class Page(PageConnection):
         on_robot_refused: Callable[[str, str], object],
     ) -> None:
         super().__init__(connection, name, new_node, counts)
-        self._context = PageContext(self._node, self._queue, self._thread, guard, counts, on_robot_refused)
+        self._context = PageContext(
+            self._node, self._queue, self._thread, guard, counts, on_robot_refused=on_robot_refused
+        )
         self._topics = PageTopics(self._context)
         self._services = PageServices(self._context)
         self._fragments = FragmentBuffer()
@@ -93,10 +95,6 @@ class Page(PageConnection):
             self._topics.cancel()
             self._services.cancel()
             await self._close_node()
-
-    def _announce(self) -> None:
-        """In the page's thread: a node is in the graph once it has something, if only its log."""
-        self._node.log.info("the page connected from %s", self._connection.remote_address)
 
     async def _frames_of(self, queued: Queued) -> list[Frame]:
         topic = queued.feed.topic

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 
@@ -28,6 +29,10 @@ from nep.text import bounded_str, quotable
 __all__ = ["PageServices"]
 
 
+Respond = Callable[[CallService, object, bool], None]
+"""Sends the values of an answer, or the reason of a failure; raises `NepError` if they can't be encoded."""
+
+
 class ServiceFailedError(NepError):
     """The page answered that a call failed, or does not answer any more."""
 
@@ -35,8 +40,10 @@ class ServiceFailedError(NepError):
 class PageServices:
     """See the module. Its methods raise `NepError` for what can't be done."""
 
-    def __init__(self, context: PageContext) -> None:
+    def __init__(self, context: PageContext, respond: Respond | None = None) -> None:
+        """Create it. `respond` sends the answer of a call in a protocol other than rosbridge."""
         self._context = context
+        self._send_response = respond or self._respond
         self._loop = asyncio.get_running_loop()
         self._clients: dict[str, Client] = {}
         self._calls: set[asyncio.Task[None]] = set()
@@ -63,9 +70,9 @@ class PageServices:
         except Exception as error:  # noqa: BLE001 - what a server answers must not end the page
             values, is_success = str(error) or type(error).__name__, False
         try:
-            self._respond(operation, values, is_success=is_success)
+            self._send_response(operation, values, is_success)
         except NepError as error:
-            self._respond(operation, str(error), is_success=False)
+            self._send_response(operation, str(error), False)
 
     async def _answer(self, operation: CallService) -> object:
         if is_rosapi(operation.service):
@@ -79,7 +86,7 @@ class PageServices:
             await self._context.in_thread(self._clients.pop(next(iter(self._clients))).close)
         return await client.acall(operation.args, operation.timeout_s)
 
-    def _respond(self, operation: CallService, values: object, *, is_success: bool) -> None:
+    def _respond(self, operation: CallService, values: object, is_success: bool) -> None:
         response = {
             "op": "service_response",
             "service": operation.service,

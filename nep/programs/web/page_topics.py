@@ -24,10 +24,10 @@ from nep.programs.web.operations import (
 from nep.programs.web.payloads import from_ros, is_compatible, nep_type_of, ros_type_of
 from nep.programs.web.rates import RateMeter
 from nep.programs.web.ros_definitions import bare_type, definition_of
-from nep.programs.web.send_queue import Feed
+from nep.programs.web.send_queue import Feed, SendQueue
 from nep.text import quotable
 
-__all__ = ["PageTopics", "subscribed_topic"]
+__all__ = ["PageTopics", "read_messages", "subscribed_topic"]
 
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
@@ -66,6 +66,10 @@ class PageTopics:
         return (*map(subscribed_topic, feeds), *map(_published_topic, self._publications.copy().items()))
 
     # ---- publishing
+
+    def is_advertised(self, topic: str) -> bool:
+        """Return whether the page publishes a topic."""
+        return topic in self._publications
 
     async def advertise(self, operation: Advertise) -> None:
         """Publish a topic from now on."""
@@ -184,7 +188,7 @@ class PageTopics:
         subscriber = await self._context.in_thread(self._open_subscriber, operation)
         feed = Feed(operation.topic)
         feed.subscribe(operation, as_pixels=as_pixels)
-        reader = asyncio.create_task(self._read(subscriber, feed))
+        reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
         self._subscriptions[operation.topic] = _Subscription(subscriber, feed, reader)
 
     def _open_subscriber(self, operation: Subscribe) -> Subscriber:
@@ -194,10 +198,6 @@ class PageTopics:
             raise _another_type(operation.topic, operation.ros_type, known, operation.id)
         msg_type = known or (nep_type_of(operation.ros_type) if operation.ros_type else "json")
         return self._context.node.new_sub(operation.topic, msg_type, wildcards=False)
-
-    async def _read(self, subscriber: Subscriber, feed: Feed) -> None:
-        async for message in subscriber:
-            self._context.queue.add(feed, message)
 
     async def unsubscribe(self, operation: Unsubscribe) -> None:
         """End one subscription, or all of a topic."""
@@ -221,6 +221,13 @@ class PageTopics:
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
+
+
+async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) -> None:
+    """Append the messages of a subscriber to a page's queue, until it is cancelled."""
+    async for message in subscriber:
+        queue.add(feed, message)
+        del message  # it may lie in shared memory, which is released with the last reference
 
 
 def subscribed_topic(feed: Feed) -> PageTopic:

@@ -24,7 +24,7 @@ from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
 from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
-from nep.programs.web.foxglove_page import SUBPROTOCOLS, ChannelFormat, FoxglovePage
+from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
 from nep.programs.web.served_pages import PageRequest, answer
@@ -75,7 +75,7 @@ class WebSettings:
     master: str | None = None
     transport: str = "zeromq"
     foxglove: ChannelFormat | None = None
-    """Encodes topics for clients of Foxglove's WebSocket protocol, which only read; None: serve none."""
+    """Encodes topics for clients of Foxglove's WebSocket protocol; None: serve none."""
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -434,9 +434,17 @@ class WebServer:
     def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
         name = node_name(_origin_of(connection), _address_of(connection))
         channels = self.settings.foxglove
-        if channels is not None and connection.subprotocol in SUBPROTOCOLS:
-            return FoxglovePage(connection, name, self._new_node, channels, self.counts)
         report = partial(self._report_robot, connection)
+        if channels is not None and connection.subprotocol in SUBPROTOCOLS:
+            return FoxglovePage(
+                connection,
+                name,
+                self._new_node,
+                self.counts,
+                channels=channels,
+                guard=guard,
+                on_robot_refused=report,
+            )
         return Page(connection, name, self._new_node, guard, self.counts, report)
 
     def _may_stay(self, connection: ServerConnection, known: Access) -> bool:

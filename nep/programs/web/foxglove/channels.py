@@ -1,0 +1,209 @@
+"""Channels of a Foxglove connection: topics of the graph, and those that the client subscribes to."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.messages.codecs import codec_for
+from nep.messages.message import Message
+from nep.nodes.loop_wait import give_way
+from nep.nodes.subscriber import Subscriber
+from nep.programs.web.context import PageContext, PageTopic
+from nep.programs.web.foxglove.protocol import MAX_ID, message_frame
+from nep.programs.web.limits import MAX_TOPICS
+from nep.programs.web.operations import Subscribe
+from nep.programs.web.outgoing import Frame, json_bytes
+from nep.programs.web.page_topics import read_messages, subscribed_topic
+from nep.programs.web.payloads import ros_type_of
+from nep.programs.web.send_queue import Feed, Queued
+
+__all__ = ["ChannelFormat", "Channels"]
+
+_ADVERTISED_TOGETHER = 100
+"""Channels in one message: each has its schema."""
+_QUEUED_IMAGES = 4
+"""Images that wait for a slow client: of older ones it would show the past."""
+
+
+class ChannelSchema(Protocol):
+    """A channel and its schema, as `nep.recordings.formats.channels` has them."""
+
+    @property
+    def topic(self) -> str: ...
+    @property
+    def message_encoding(self) -> str: ...
+    @property
+    def schema_name(self) -> str: ...
+    @property
+    def schema_encoding(self) -> str: ...
+    @property
+    def schema_data(self) -> bytes: ...
+
+
+class ChannelFormat(Protocol):
+    """Encodes messages for channels: `nep.recordings.formats.channels.LiveChannels`."""
+
+    def expected(self, topic: str, msg_type: str) -> ChannelSchema:
+        """Return the most likely channel of a topic that has had no message yet."""
+
+    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
+        """Return the channel of a message, and its bytes in that channel."""
+
+
+@dataclass
+class _Channel:
+    id: int
+    msg_type: str
+    definition: ChannelSchema
+
+
+@dataclass
+class _Subscription:
+    id: int
+    channel: _Channel
+    subscriber: Subscriber
+    feed: Feed
+    reader: asyncio.Task[None]
+
+
+class Channels:
+    """See the module. Its methods raise `NepError` for what can't be done.
+
+    `tell` sends a JSON message with these fields.
+    """
+
+    def __init__(
+        self, context: PageContext, channels: ChannelFormat, tell: Callable[[Mapping[str, object]], None]
+    ) -> None:
+        self._context = context
+        self._format = channels
+        self._tell = tell
+        self._channels: dict[str, _Channel] = {}
+        self._subscriptions: dict[int, _Subscription] = {}
+        self._last_id = 0
+
+    @property
+    def subscribed(self) -> tuple[PageTopic, ...]:
+        """Topics that the client subscribes to. Thread-safe."""
+        return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
+
+    def ros_type(self, topic: str, schema_name: str) -> str:
+        """Return the ROS type of a topic that the client knows under this schema; "" for another schema."""
+        known = self._channels.get(topic)
+        is_known = known is not None and known.definition.schema_name == schema_name
+        return ros_type_of(known.msg_type) if known is not None and is_known else ""
+
+    # ---- topics
+
+    async def update(self, found: Mapping[str, str]) -> None:
+        """Advertise new topics and withdraw others; `found` has the type of each topic."""
+        for topic, channel in list(self._channels.items()):
+            if found.get(topic) != channel.msg_type:
+                del self._channels[topic]
+                await self._withdraw(channel)
+        new = [(topic, msg_type) for topic, msg_type in found.items() if topic not in self._channels]
+        for begin in range(0, len(new), _ADVERTISED_TOGETHER):
+            self._advertise(
+                (topic, msg_type, self._format.expected(topic, _readable_type(msg_type)))
+                for topic, msg_type in new[begin : begin + _ADVERTISED_TOGETHER]
+            )
+            await give_way()
+
+    def _advertise(self, topics: Iterable[tuple[str, str, ChannelSchema]]) -> None:
+        channels = []
+        for topic, msg_type, definition in topics:
+            self._last_id += 1
+            self._channels[topic] = _Channel(self._last_id, msg_type, definition)
+            data = definition.schema_data
+            is_binary = definition.schema_encoding == "protobuf"
+            channels.append(
+                {
+                    "id": self._last_id,
+                    "topic": topic,
+                    "encoding": definition.message_encoding,
+                    "schemaName": definition.schema_name,
+                    "schemaEncoding": definition.schema_encoding,
+                    "schema": base64.b64encode(data).decode() if is_binary else data.decode(),
+                }
+            )
+        self._tell({"op": "advertise", "channels": channels})
+
+    async def _withdraw(self, channel: _Channel) -> None:
+        self._tell({"op": "unadvertise", "channelIds": [channel.id]})
+        for each in [each for each in self._subscriptions.values() if each.channel is channel]:
+            await self.unsubscribe(each.id)
+
+    # ---- subscriptions
+
+    async def subscribe(self, id_: object, channel_id: object) -> None:
+        """Send the client the messages of a channel from now on."""
+        channel = next((each for each in self._channels.values() if each.id == channel_id), None)
+        if type(id_) is not int or not 0 <= id_ <= MAX_ID or id_ in self._subscriptions or channel is None:
+            raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
+        if any(each.channel is channel for each in self._subscriptions.values()):
+            raise NepError(_("a channel has one subscription at a time"))
+        if len(self._subscriptions) >= MAX_TOPICS:
+            raise NepError(
+                _("this page subscribes to {count} topics, and may have no more").format(count=MAX_TOPICS)
+            )
+        topic, msg_type = channel.definition.topic, channel.msg_type
+        subscriber = await self._context.in_thread(
+            self._context.node.new_sub, topic, msg_type, wildcards=False
+        )
+        feed = Feed(topic)
+        queue_length = _QUEUED_IMAGES if codec_for(msg_type).name == "image" else 0
+        feed.subscribe(Subscribe(id_, topic, queue_length=queue_length), as_pixels=False)
+        reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
+        self._subscriptions[id_] = _Subscription(id_, channel, subscriber, feed, reader)
+
+    async def unsubscribe(self, id_: int) -> None:
+        """End a subscription; one that doesn't exist is ignored, because channels go by themselves."""
+        known = self._subscriptions.pop(id_, None)
+        if known is None:
+            return
+        known.reader.cancel()
+        self._context.queue.remove(known.feed)
+        await self._context.in_thread(known.subscriber.close)
+
+    async def frames_of(self, queued: Queued) -> list[Frame]:
+        """Return a message as the client gets it. Raises `NepError` for one that can't be read."""
+        message = queued.message
+        known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
+        if known is None:
+            return []
+        log_ns = time.time_ns()
+        definition, data = self._format.encoded(_readable(message), log_ns)
+        if _shape(definition) != _shape(known.channel.definition):  # raw pixels, for example
+            await self._withdraw(known.channel)
+            self._advertise([(message.topic, known.channel.msg_type, definition)])
+            return []
+        return [message_frame(known.id, log_ns, data)]
+
+    def cancel(self) -> None:
+        """Read no more: the client is gone. Its node closes what is open."""
+        for each in self._subscriptions.values():
+            each.reader.cancel()
+            each.feed.clear()
+
+
+def _readable_type(msg_type: str) -> str:
+    """The type of a topic's channel: Foxglove and Lichtblick can't read msgpack."""
+    return "json" if codec_for(msg_type).name == "msgpack" else msg_type
+
+
+def _readable(message: Message) -> Message:
+    if message.codec != "msgpack":
+        return message
+    data = json_bytes(message.payload)
+    return Message(message.topic, data, "json", "json", seq=message.seq, stamp_ns=message.stamp_ns)
+
+
+def _shape(definition: ChannelSchema) -> tuple[str, str]:
+    return definition.message_encoding, definition.schema_name

@@ -1,0 +1,114 @@
+"""GraphUpdates: services, and who publishes, subscribes and serves, told to a client as changes. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from nep.programs.web.foxglove.protocol import ENCODING
+from nep.programs.web.payloads import ros_type_of
+from nep.programs.web.rosapi import is_shown
+from nep.protocol.graph_view import GraphView
+
+__all__ = ["GraphUpdates"]
+
+_MAX_SERVICES = 1_000
+_SCHEMA = {"encoding": ENCODING, "schemaEncoding": "jsonschema", "schema": '{"type":"object"}'}
+_Names = Mapping[str, tuple[str, ...]]
+
+
+class _Connections(NamedTuple):
+    """Names of nodes by topic and by service."""
+
+    published: _Names
+    subscribed: _Names
+    services: _Names
+
+
+_NONE = _Connections({}, {}, {})
+
+
+class GraphUpdates:
+    """What a client knows of the graph. `update` returns the messages with which it knows all of it."""
+
+    def __init__(self) -> None:
+        self._service_ids: dict[tuple[str, str], int] = {}
+        """Ids of services by their names and types."""
+        self._last_id = 0
+        self._are_connections_wanted = False
+        self._connections = _NONE
+
+    def want_connections(self, *, is_wanted: bool) -> None:
+        """Begin to send who publishes, subscribes and serves, from the start; or end that."""
+        self._are_connections_wanted = is_wanted
+        self._connections = _NONE
+
+    def service(self, id_: int) -> str:
+        """Return the name of a service; "" if there is none with this id."""
+        return next((name for (name, _type), known in self._service_ids.items() if known == id_), "")
+
+    def update(self, view: GraphView) -> list[dict[str, object]]:
+        """Return the messages that tell a client what has changed."""
+        messages = self._update_services(view)
+        if not self._are_connections_wanted:
+            return messages
+        known, self._connections = self._connections, _connections(view)
+        return [*messages, *_changes(known, self._connections)]
+
+    def _update_services(self, view: GraphView) -> list[dict[str, object]]:
+        served = (each for each in view.services.values() if each.servers and is_shown(each.name))
+        found = [(each.name, ros_type_of(each.msg_type)) for each in served][:_MAX_SERVICES]
+        messages: list[dict[str, object]] = []
+        gone = self._service_ids.keys() - set(found)
+        if gone:
+            ids = [self._service_ids.pop(each) for each in gone]
+            messages.append({"op": "unadvertiseServices", "serviceIds": ids})
+        new = [each for each in found if each not in self._service_ids]
+        if new:
+            services = [self._new_service(*each) for each in new]
+            messages.append({"op": "advertiseServices", "services": services})
+        return messages
+
+    def _new_service(self, name: str, type_: str) -> dict[str, object]:
+        self._last_id += 1
+        self._service_ids[name, type_] = self._last_id
+        return {
+            "id": self._last_id,
+            "name": name,
+            "type": type_,
+            "request": {**_SCHEMA, "schemaName": f"{type_}_Request"},
+            "response": {**_SCHEMA, "schemaName": f"{type_}_Response"},
+        }
+
+
+def _connections(view: GraphView) -> _Connections:
+    def names(ids: Iterable[str]) -> tuple[str, ...]:
+        known = (view.nodes.get(each) for each in ids)
+        return tuple(sorted({each.name for each in known if each is not None}))
+
+    topics = [each for each in view.topics.values() if is_shown(each.name)]
+    services = [each for each in view.services.values() if is_shown(each.name) and each.servers]
+    return _Connections(
+        {each.name: names(one.node_id for one in each.publishers) for each in topics},
+        {each.name: names(one.node_id for one in each.subscribers) for each in topics},
+        {each.name: names(one.node_id for one in each.servers) for each in services},
+    )
+
+
+def _changes(known: _Connections, now: _Connections) -> list[dict[str, object]]:
+    if known == now:
+        return []
+    return [
+        {
+            "op": "connectionGraphUpdate",
+            "publishedTopics": _changed(known.published, now.published, "publisherIds"),
+            "subscribedTopics": _changed(known.subscribed, now.subscribed, "subscriberIds"),
+            "advertisedServices": _changed(known.services, now.services, "providerIds"),
+            "removedTopics": sorted(known.published.keys() - now.published.keys()),
+            "removedServices": sorted(known.services.keys() - now.services.keys()),
+        }
+    ]
+
+
+def _changed(known: _Names, now: _Names, field: str) -> list[dict[str, object]]:
+    return [{"name": name, field: list(ids)} for name, ids in now.items() if known.get(name) != ids]

@@ -1,0 +1,293 @@
+"""FoxglovePage: a connection of Foxglove or Lichtblick, by Foxglove's WebSocket protocol.
+
+The server of the package foxglove-sdk accepts every Origin and has no token (0.30.3), so any web page in the
+user's browser could read all topics. Here Foxglove's clients pass the same checks as rosbridge's, and the
+same code publishes for them, calls services and guards robots. Channels have the encodings and schemas of
+recordings (`nep.recordings.formats.channels`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.nodes.loop_wait import give_way
+from nep.nodes.node import Node
+from nep.programs.robots.guard import MotionGuard
+from nep.programs.web import operations as op
+from nep.programs.web.connection import PageConnection
+from nep.programs.web.context import PageContext, PageTopic, WebCounts
+from nep.programs.web.foxglove import protocol as wire
+from nep.programs.web.foxglove.channels import ChannelFormat, Channels
+from nep.programs.web.foxglove.graph import GraphUpdates
+from nep.programs.web.limits import MAX_TOPICS
+from nep.programs.web.outgoing import Frame, json_bytes
+from nep.programs.web.page_services import PageServices
+from nep.programs.web.page_topics import PageTopics
+from nep.programs.web.ros_definitions import JSON_TYPE
+from nep.programs.web.rosapi import is_shown
+from nep.programs.web.send_queue import Queued
+from nep.system.lazy_import import lazy_module
+from nep.system.log_rarely import is_logged
+from nep.text import bounded_str, quotable
+
+if TYPE_CHECKING:
+    from websockets import exceptions as ws_exceptions
+    from websockets.asyncio.server import ServerConnection
+else:
+    ws_exceptions = lazy_module("websockets.exceptions")
+
+__all__ = ["ChannelFormat", "FoxglovePage"]
+
+_logger = logging.getLogger("nep.programs.web")
+_REFRESH_S = 1.0
+_GRAPH_TIMEOUT_S = 2.0
+_MAX_REASON_LENGTH = 1_000
+_STATUS_LEVELS = {"info": 0, "warning": 1, "error": 2, "none": 0}
+_ROS_TYPES = {
+    "": JSON_TYPE,
+    "nep.Text": "std_msgs/String",
+    "nep.Bytes": "std_msgs/UInt8MultiArray",
+    "foxglove.CompressedImage": "sensor_msgs/CompressedImage",
+    "foxglove.RawImage": "sensor_msgs/Image",
+}
+"""Types for schemas of Foxglove's that have the same fields."""
+
+
+class FoxglovePage(PageConnection):
+    """See the module. `name` is that of its node. Lives in the server's event loop."""
+
+    protocol = "foxglove"
+
+    def __init__(
+        self,
+        connection: ServerConnection,
+        name: str,
+        new_node: Callable[[str], Node],
+        counts: WebCounts,
+        *,
+        channels: ChannelFormat,
+        guard: MotionGuard,
+        on_robot_refused: Callable[[str, str], object],
+    ) -> None:
+        super().__init__(connection, name, new_node, counts)
+        context = PageContext(
+            self._node,
+            self._queue,
+            self._thread,
+            guard,
+            counts,
+            on_robot_refused=on_robot_refused,
+            send_status=self._send_status,
+        )
+        self._context = context
+        self._channels = Channels(context, channels, self._tell)
+        self._topics = PageTopics(context)
+        self._services = PageServices(context, self._respond)
+        self._advertised: dict[int, op.Advertise] = {}
+        """What the client publishes, by the ids of its channels."""
+        self._updates = GraphUpdates()
+        self._rejected = 0
+        self._is_gone = asyncio.Event()
+
+    @property
+    def _topic_list(self) -> tuple[PageTopic, ...]:
+        return (*self._channels.subscribed, *self._topics.topics)
+
+    async def run(self) -> None:
+        """Serve the client until it goes; then close its node."""
+        self._tell(
+            {
+                "op": "serverInfo",
+                "name": "NEP",
+                "capabilities": wire.CAPABILITIES,
+                "supportedEncodings": [wire.ENCODING],
+                "metadata": {},
+                "sessionId": str(time.time_ns()),
+            }
+        )
+        tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._watch_graph())]
+        try:
+            await self._context.in_thread(self._announce)
+            while True:
+                await self._handle(await self._receive())
+                await give_way()  # other pages have their turn
+        except ws_exceptions.ConnectionClosed:
+            return
+        finally:
+            self._is_gone.set()
+            for task in tasks:
+                task.cancel()
+            self._channels.cancel()
+            self._services.cancel()
+            await self._close_node()
+
+    def _tell(self, fields: Mapping[str, object]) -> None:
+        self._queue.put([wire.control_frame(fields)])
+
+    def _send_status(self, level: op.Level, sentence: str) -> None:
+        self._tell({"op": "status", "level": _STATUS_LEVELS[level], "message": sentence})
+
+    def _warn(self, sentence: str) -> None:
+        self._send_status("warning", sentence)
+
+    def _reject(self, error: NepError) -> None:
+        self._counts.rejected += 1
+        self._rejected += 1
+        if is_logged(self._rejected):
+            _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
+        self._send_status(error.level if isinstance(error, op.OperationError) else "error", str(error))
+
+    async def _frames_of(self, queued: Queued) -> list[Frame]:
+        return await self._channels.frames_of(queued)
+
+    # ---- the graph
+
+    async def _watch_graph(self) -> None:
+        """Advertise topics and services as they come to the graph and go."""
+        while not self._is_gone.is_set():
+            try:
+                view = await self._context.in_thread(self._node.graph, _GRAPH_TIMEOUT_S)
+                await self._channels.update(
+                    {
+                        topic: info.msg_type
+                        for topic, info in view.topics.items()
+                        if info.publishers and info.msg_type != "*" and is_shown(topic)
+                    }
+                )
+                for message in self._updates.update(view):
+                    self._tell(message)
+            except NepError as error:  # the master is away: nothing is known to have changed
+                _logger.debug("the page '%s' keeps its channels: %s", self.name, error)
+            except Exception:
+                _logger.exception("the channels of the page '%s' could not be updated", self.name)
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._is_gone.wait(), _REFRESH_S)
+
+    # ---- what the client asks
+
+    async def _handle(self, data: bytes) -> None:
+        """Process one message of the client. Never raises because of its contents."""
+        self._counts.operations += 1
+        try:
+            request = wire.parse(data)
+            if isinstance(request, wire.ClientMessage):
+                await self._publish(request)
+            elif isinstance(request, wire.ServiceRequest):
+                self._call(request)
+            else:
+                await self._carry_out(request)
+        except NepError as error:
+            self._reject(error)
+        except Exception:
+            _logger.exception("an operation of the page '%s' failed", self.name)
+            self._reject(NepError(_("an operation failed because of an error in the server")))
+
+    async def _carry_out(self, fields: Mapping[str, object]) -> None:
+        name = str(fields.get("op"))
+        if name in {"subscribeConnectionGraph", "unsubscribeConnectionGraph"}:
+            self._updates.want_connections(is_wanted=name == "subscribeConnectionGraph")
+            return
+        for operation, member, carry_out in (
+            ("subscribe", "subscriptions", self._subscribe),
+            ("unsubscribe", "subscriptionIds", self._unsubscribe),
+            ("advertise", "channels", self._advertise),
+            ("unadvertise", "channelIds", self._unadvertise),
+        ):
+            if name == operation:
+                for each in wire.items(fields.get(member)):
+                    await carry_out(each)
+                return
+        raise NepError(_("the operation '{op}' is not supported here").format(op=quotable(name)))
+
+    async def _subscribe(self, wish: object) -> None:
+        if not isinstance(wish, dict):
+            raise NepError(_("a subscription needs 'id' and 'channelId'"))
+        await self._channels.subscribe(wish.get("id"), wish.get("channelId"))
+
+    async def _unsubscribe(self, id_: object) -> None:
+        if isinstance(id_, int):
+            await self._channels.unsubscribe(id_)
+
+    # ---- publishing
+
+    async def _advertise(self, channel: object) -> None:
+        fields = channel if isinstance(channel, dict) else {}
+        id_, schema_name = fields.get("id"), fields.get("schemaName")
+        if type(id_) is not int or not 0 <= id_ <= wire.MAX_ID or id_ in self._advertised:
+            raise NepError(_("a channel needs an unused 'id'"))
+        if fields.get("encoding") != wire.ENCODING:
+            raise NepError(
+                _("messages with the encoding '{encoding}' can't be published; use 'json'").format(
+                    encoding=quotable(fields.get("encoding"))
+                )
+            )
+        if len(self._advertised) >= MAX_TOPICS:
+            raise NepError(
+                _("this page publishes {count} topics, and may have no more").format(count=MAX_TOPICS)
+            )
+        topic, schema = fields.get("topic"), schema_name if isinstance(schema_name, str) else ""
+        known = self._channels.ros_type(topic, schema) if isinstance(topic, str) else ""
+        ros_type = known or _ROS_TYPES.get(schema, schema)
+        operation = op.operation_of({"op": "advertise", "topic": topic, "type": ros_type, "id": id_})
+        if isinstance(operation, op.Advertise):
+            self._advertised[id_] = operation  # also if it is refused: the robot may be allowed later
+            await self._topics.advertise(operation)
+
+    async def _unadvertise(self, id_: object) -> None:
+        known = self._advertised.pop(id_, None) if isinstance(id_, int) else None
+        if known is None:
+            raise NepError(_("there is no channel with the id {id}").format(id=quotable(id_)))
+        if self._topics.is_advertised(known.topic):
+            await self._topics.unadvertise(op.Unadvertise(known.id, known.topic))
+
+    async def _publish(self, message: wire.ClientMessage) -> None:
+        known = self._advertised.get(message.channel_id)
+        if known is None:
+            raise NepError(_("there is no channel with the id {id}").format(id=message.channel_id))
+        msg = op.parse_json(message.data)
+        if not self._topics.is_advertised(known.topic):
+            await self._topics.advertise(known)
+        await self._topics.publish(op.Publish(known.id, known.topic, msg, len(message.data)))
+
+    # ---- services
+
+    def _call(self, request: wire.ServiceRequest) -> None:
+        ids = f"{request.service_id}:{request.call_id}"
+        operation = op.CallService(ids, self._updates.service(request.service_id), {})
+        try:
+            if not operation.service:
+                raise NepError(_("there is no service with the id {id}").format(id=request.service_id))
+            if request.encoding != wire.ENCODING:
+                raise NepError(
+                    _("requests with the encoding '{encoding}' can't be read; use 'json'").format(
+                        encoding=quotable(request.encoding)
+                    )
+                )
+            self._services.call(replace(operation, args=op.parse_json(request.data)))
+        except NepError as error:
+            self._counts.rejected += 1
+            self._respond(operation, str(error), False)
+
+    def _respond(self, operation: op.CallService, values: object, is_success: bool) -> None:
+        service_id, call_id = map(int, str(operation.id).split(":"))
+        if is_success:
+            self._queue.put([wire.response_frame(service_id, call_id, json_bytes(values))])
+            return
+        self._tell(
+            {
+                "op": "serviceCallFailure",
+                "serviceId": service_id,
+                "callId": call_id,
+                "message": bounded_str(values, _MAX_REASON_LENGTH),
+            }
+        )
+        # Lichtblick has no listener for failures: without the status nothing would be shown there.
+        self._send_status("warning", bounded_str(values, _MAX_REASON_LENGTH))

@@ -1,0 +1,100 @@
+"""Messages of Foxglove's WebSocket protocol: binary ones to values and back, and JSON ones to a page. Pure.
+
+A client's text messages begin with "{", its binary ones with the byte 1 or 2.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import NamedTuple
+
+import orjson
+
+from nep.errors import NepError
+from nep.i18n import _
+from nep.messages.nesting import json_is_too_deep
+from nep.programs.web.outgoing import Frame
+
+__all__ = [
+    "CAPABILITIES",
+    "ENCODING",
+    "MAX_ID",
+    "SUBPROTOCOLS",
+    "ClientMessage",
+    "ServiceRequest",
+    "control_frame",
+    "items",
+    "message_frame",
+    "parse",
+    "response_frame",
+]
+
+SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+CAPABILITIES = ("clientPublish", "services", "connectionGraph")
+ENCODING = "json"
+"""Of what clients publish, and of requests and responses of services."""
+MAX_ID = 2**32 - 1
+_MESSAGE, _SERVICE = 1, 2  # opcodes of clients
+_MESSAGE_DATA = struct.Struct("<BIQ")
+"""Opcode 1, subscription id, log time in nanoseconds."""
+_RESPONSE = struct.Struct("<BIII")
+"""Opcode 3, service id, call id, length of the encoding's name."""
+_CLIENT_MESSAGE = struct.Struct("<BI")
+_SERVICE_REQUEST = struct.Struct("<BIII")
+
+
+class ClientMessage(NamedTuple):
+    """A message that a client publishes."""
+
+    channel_id: int
+    data: bytes
+
+
+class ServiceRequest(NamedTuple):
+    """A call of a service."""
+
+    service_id: int
+    call_id: int
+    encoding: str
+    data: bytes
+
+
+def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
+    """Return one message of a client; a JSON message as its fields. Raises `NepError`."""
+    if data[:1] == b"\x01" and len(data) >= _CLIENT_MESSAGE.size:
+        return ClientMessage(_CLIENT_MESSAGE.unpack_from(data)[1], data[_CLIENT_MESSAGE.size :])
+    if data[:1] == b"\x02" and len(data) >= _SERVICE_REQUEST.size:
+        _opcode, service_id, call_id, length = _SERVICE_REQUEST.unpack_from(data)
+        begin = _SERVICE_REQUEST.size
+        encoding = data[begin : begin + length].decode("utf-8", "replace")
+        return ServiceRequest(service_id, call_id, encoding, data[begin + length :])
+    if not json_is_too_deep(data):
+        with suppress(json.JSONDecodeError):  # orjson's error is one, too
+            fields = orjson.loads(data)
+            if isinstance(fields, dict):
+                return fields
+    raise NepError(_("this is no message of Foxglove's WebSocket protocol"))
+
+
+def items(value: object) -> list[object]:
+    """Return a list; an empty one in place of anything else."""
+    return value if isinstance(value, list) else []
+
+
+def control_frame(fields: Mapping[str, object]) -> Frame:
+    """Return a JSON message to a client."""
+    return Frame(orjson.dumps(fields), is_text=True)
+
+
+def message_frame(subscription_id: int, log_ns: int, data: bytes) -> Frame:
+    """Return a message of a topic."""
+    return Frame(_MESSAGE_DATA.pack(1, subscription_id, log_ns) + data, is_text=False)
+
+
+def response_frame(service_id: int, call_id: int, data: bytes) -> Frame:
+    """Return the response of a service."""
+    head = _RESPONSE.pack(3, service_id, call_id, len(ENCODING)) + ENCODING.encode()
+    return Frame(head + data, is_text=False)
