@@ -31,7 +31,7 @@ _logger = logging.getLogger("nep.programs.web")
 _POLICY_VIOLATION = 1008
 _INTERNAL_ERROR = 1011
 _NODE_CLOSE_S = 2.0
-_CLOSE_TIMEOUT_S = 2.0
+_CLOSE_TIMEOUT_S = 1.0
 _ids = itertools.count(1)
 
 
@@ -119,7 +119,7 @@ class PageConnection:
         self._closing = asyncio.create_task(self._close_connection(_POLICY_VIOLATION, reason))
 
     async def _close_connection(self, code: int, reason: str) -> None:
-        # The library waits without a limit until a page that reads nothing takes the close frame (17.4).
+        # A page that reads nothing takes no close frame either.
         try:
             await asyncio.wait_for(self._connection.close(code, reason), _CLOSE_TIMEOUT_S)
         except asyncio.TimeoutError:
@@ -141,8 +141,9 @@ class PageConnection:
         self._node.log.info("the page connected from %s", self._connection.remote_address)
 
     async def _close_node(self) -> None:
-        self._thread.submit(self._node.close, _NODE_CLOSE_S)
-        await asyncio.shield(asyncio.to_thread(self._thread.shutdown))
+        closed = self._thread.submit(self._node.close, _NODE_CLOSE_S)
+        await asyncio.shield(asyncio.wrap_future(closed))
+        self._thread.shutdown()  # idle: it ends at once
 
     # ---- sending
 

@@ -15,8 +15,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from http import HTTPStatus
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import urlsplit
+from weakref import WeakSet
 
 from nep.errors import AddressInUseError, NepError, TooManyFilesError
 from nep.i18n import _
@@ -35,7 +36,7 @@ from nep.text import escaped
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-    from websockets.asyncio.server import ServerConnection
+    from websockets.asyncio.server import Server, ServerConnection
     from websockets.http11 import Request, Response
     from websockets.typing import Subprotocol
 
@@ -51,6 +52,8 @@ _REFRESH_S = 1.0
 _WAIT_FOR_MASTER_S = 2.0
 _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
+_END_TIMEOUT_S = 1.0
+"""How long pages have to answer a close frame when the server ends."""
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
@@ -115,6 +118,8 @@ class WebServer:
         self._lock = threading.Lock()
         """For changes of `settings` while pages connect."""
         self._guard: MotionGuard | None = None
+        self._connections: WeakSet[ServerConnection] = WeakSet()
+        """All connections, also those without a handshake."""
         self._locked = 0
         self._refusals: deque[Refusal] = deque(maxlen=_MAX_REFUSALS)
         self._auth = AuthCheck(settings.access.token)
@@ -256,31 +261,13 @@ class WebServer:
             self._started.set()
 
     async def _serve(self) -> None:
-        from websockets.asyncio.server import serve  # noqa: PLC0415 - only this command needs it
-
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
         with Node(
             _NODE_NAME, self.settings.transport, master=self.settings.master, wait_s=_WAIT_FOR_MASTER_S
         ) as node:
             with self._lock:
                 guard = self._guard = MotionGuard(node, self.settings.allow_moving)
-            try:
-                server = await serve(
-                    partial(self._page, guard),
-                    self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
-                    self.settings.port,
-                    process_request=self._refusal,
-                    select_subprotocol=self._subprotocol,
-                    compression=None,
-                    open_timeout=_OPEN_TIMEOUT_S,
-                    close_timeout=_CLOSE_TIMEOUT_S,
-                    max_size=MAX_MESSAGE_BYTES,
-                    max_queue=2,
-                    server_header=None,
-                    logger=_quiet_logger(),
-                )
-            except OSError as error:
-                raise self._bind_error(error) from error
+            server = await self._listen(guard)
             async with server:
                 self.port = next(iter(server.sockets)).getsockname()[1]
                 self._started.set()
@@ -288,7 +275,39 @@ class WebServer:
                 await self._stop.wait()
                 watch.cancel()
                 server.close()  # with 1001, going away
+                with suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(server.wait_closed(), _END_TIMEOUT_S)
+                for connection in tuple(self._connections):  # those that do not react
+                    if hasattr(connection, "transport"):  # connected
+                        connection.transport.abort()
             guard.close()
+
+    async def _listen(self, guard: MotionGuard) -> Server:
+        from websockets.asyncio.server import ServerConnection, serve  # noqa: PLC0415 - only needed here
+
+        def connection(*args: Any, **options: Any) -> ServerConnection:  # noqa: ANN401 - the library's own
+            created = ServerConnection(*args, **options)
+            self._connections.add(created)
+            return created
+
+        try:
+            return await serve(
+                partial(self._page, guard),
+                self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
+                self.settings.port,
+                process_request=self._refusal,
+                select_subprotocol=self._subprotocol,
+                compression=None,
+                open_timeout=_OPEN_TIMEOUT_S,
+                close_timeout=_CLOSE_TIMEOUT_S,
+                max_size=MAX_MESSAGE_BYTES,
+                max_queue=2,
+                server_header=None,
+                logger=_quiet_logger(),
+                create_connection=connection,  # type: ignore[arg-type] # a function that returns one, too
+            )
+        except OSError as error:
+            raise self._bind_error(error) from error
 
     def _bind_error(self, error: OSError) -> Exception:
         address = f"{', '.join(self.settings.hosts)}:{self.settings.port}"
@@ -476,7 +495,7 @@ def check_installed() -> None:
     """Raise `NepError` where the libraries of the extra ``web`` are not installed."""
     try:
         import cbor2  # noqa: F401, PLC0415 - whether it is there
-        import websockets  # noqa: F401, PLC0415 - whether it is there
+        import websockets.asyncio.server  # noqa: F401, PLC0415 - whether it is there, and new enough
     except ImportError as error:
         raise NepError(
             _("the web server is not installed; install it with: pip install 'nep-studio[web]'")
