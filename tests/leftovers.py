@@ -76,7 +76,7 @@ def _connections() -> list[Any]:
 
 
 def told(number: int, target: str) -> str:
-    """One descriptor in words: a socket with its address, a file with its path."""
+    """One descriptor in words: a socket with its address, a file with its path; "" if it is closed by now."""
     if not target.startswith("socket:"):
         return target
     try:
@@ -87,7 +87,7 @@ def told(number: int, target: str) -> str:
             listens = "listening " if copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) else ""
             return f"{listens}socket {address!r}"
     except OSError:
-        return target
+        return target if descriptors().get(number) == target else ""
 
 
 def _is_unnamed(family: str, address: object) -> bool:
@@ -137,7 +137,7 @@ def _opened(before: dict[int, str]) -> list[str]:
     opened = [
         told(number, target) for number, target in descriptors().items() if before.get(number) != target
     ]
-    left = sorted(each for each in opened if not KEPT.match(each))
+    left = sorted(each for each in opened if each and not KEPT.match(each))
     if _OF_POOLED in left:
         for _thread in range(_pooled_threads()):
             if _OF_POOLED in left:

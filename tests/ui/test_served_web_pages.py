@@ -82,9 +82,15 @@ def test_test_page_shows_topics_and_publishes(browser: Browser, server: WebServe
     browser.evaluate("document.querySelector('#form button').click()")
     assert heard.listen(timeout_s=30)[0]
     assert server.pages[0].title == browser.title()
+    browser.evaluate("window.isBeforeReload = true")
     browser.triggerAction(QWebEnginePage.WebAction.Reload)  # without the token in its address
-    browser.wait("document.querySelectorAll('#topics li').length >= 2")
+    browser.wait("!window.isBeforeReload && document.querySelectorAll('#topics li').length >= 2")
     assert browser.said == []
+    server.set_access(Access(token="another-token-of-letters"))
+    browser.wait("document.getElementById('state').dataset.state === 'off'")
+    browser.evaluate("document.getElementById('again').click()")
+    browser.wait("document.getElementById('state').textContent === WORDS.refused")
+    assert {each.kind for each in server.refusals} == {"token"}
 
 
 def test_starter_page_shows_messages_and_publishes(
@@ -96,4 +102,5 @@ def test_starter_page_shows_messages_and_publishes(
     browser.wait("document.getElementById('message')?.textContent === 'hello'")
     browser.evaluate("document.getElementById('button').click()")
     assert clicks.listen(timeout_s=30) == (True, {"pressed": True})
+    assert [each.title for each in server.pages] == [browser.title()]
     assert browser.said == []

@@ -186,7 +186,7 @@ class PageTopics:
                 operation.id,
             )
         subscriber = await self._context.in_thread(self._open_subscriber, operation)
-        feed = Feed(operation.topic)
+        feed = Feed(operation.topic, subscriber.msg_type)
         feed.subscribe(operation, as_pixels=as_pixels)
         reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
         self._subscriptions[operation.topic] = _Subscription(subscriber, feed, reader)

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
+from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES, MAX_QUEUED_BYTES, MAX_QUEUED_MESSAGES
 from nep.programs.web.operations import COMPRESSIONS, OperationId, Subscribe
@@ -21,6 +22,8 @@ from nep.programs.web.rates import RateMeter
 
 __all__ = ["Feed", "Queued", "SendQueue"]
 
+_MAX_QUEUED_IMAGES = 4
+"""Images of a topic that wait for a page which doesn't say how many: of older ones it would show the past."""
 _MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4
 """Latched messages of a topic that are kept for further subscriptions of a page."""
 
@@ -39,8 +42,10 @@ class Feed:
     and the smallest fragments.
     """
 
-    def __init__(self, topic: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, topic: str, msg_type: str = "", clock: Callable[[], float] = time.monotonic) -> None:
         self.topic = topic
+        is_image = bool(msg_type) and codec_for(msg_type).name == "image"
+        self._default_capacity = _MAX_QUEUED_IMAGES if is_image else MAX_QUEUED_MESSAGES
         self.sent = RateMeter(clock)
         self.form = EncodingOptions()
         self.dropped_count = 0
@@ -51,7 +56,7 @@ class Feed:
         self.size_bytes = 0
         self._wishes: dict[OperationId, Subscribe] = {}
         self._throttle_s = 0.0
-        self._capacity = MAX_QUEUED_MESSAGES
+        self._capacity = self._default_capacity
         self._messages: deque[Message] = deque()
         self._latched: dict[int | None, Message] = {}
         self._next_at = 0.0
@@ -90,7 +95,7 @@ class Feed:
         self.form = EncodingOptions(compression, min(sizes, default=None), as_pixels)
         self._throttle_s = min(each.throttle_s for each in wishes)
         longest = max(each.queue_length for each in wishes)
-        self._capacity = longest or (1 if self._throttle_s else MAX_QUEUED_MESSAGES)
+        self._capacity = longest or (1 if self._throttle_s else self._default_capacity)
 
     def add(self, message: Message) -> None:
         """Append a message; drop the oldest beyond the queue's length."""

@@ -8,7 +8,6 @@ import logging
 import socket
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -121,7 +120,8 @@ class WebServer:
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All connections, also those without a handshake."""
         self._locked = 0
-        self._refusals: deque[Refusal] = deque(maxlen=_MAX_REFUSALS)
+        self._refusals_lock = threading.Lock()
+        self._refusals: tuple[Refusal, ...] = ()
         self._auth = AuthCheck(settings.access.token)
         self._started = threading.Event()
         self._problem: Exception | None = None
@@ -152,8 +152,11 @@ class WebServer:
 
     @property
     def refusals(self) -> tuple[Refusal, ...]:
-        """The newest refused connections and messages, the last one last. Thread-safe."""
-        return tuple(self._refusals.copy())
+        """The newest refused connections and messages, the last one last. Thread-safe.
+
+        One that is repeated, such as by a page that tries again, is there once, with its last time.
+        """
+        return self._refusals
 
     def disconnect(self, page_id: int) -> None:
         """Close the connection of a page; it may connect again. Thread-safe, returns at once."""
@@ -415,7 +418,7 @@ class WebServer:
         self, connection: ServerConnection, kind: RefusalKind, said: str, origin: str = ""
     ) -> None:
         who = escaped((origin or _host_of(connection))[:200])
-        self._refusals.append(Refusal(time.time(), who, said, origin[:200], kind))
+        self._list_refusal(Refusal(time.time(), who, said, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             where = _address_of(connection)
@@ -423,7 +426,12 @@ class WebServer:
 
     def _report_robot(self, connection: ServerConnection, robot: str, said: str) -> None:
         who = escaped((_origin_of(connection) or _host_of(connection))[:200])
-        self._refusals.append(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+        self._list_refusal(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+
+    def _list_refusal(self, refusal: Refusal) -> None:
+        with self._refusals_lock:
+            others = (each for each in self._refusals if replace(each, time_s=refusal.time_s) != refusal)
+            self._refusals = (*others, refusal)[-_MAX_REFUSALS:]
 
     async def _page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]

@@ -85,7 +85,7 @@ def test_pages_run_only_their_own_scripts_and_load_nothing() -> None:
     found = answer(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
     policy = found.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy
-    assert "connect-src ws://localhost:9090;" in policy
+    assert "connect-src 'self' ws://localhost:9090;" in policy
     assert "unsafe" not in policy
     assert len(re.findall("sha256-", policy)) == 2
     assert found.headers["X-Content-Type-Options"] == "nosniff"

@@ -28,8 +28,6 @@ __all__ = ["ChannelFormat", "Channels"]
 
 _ADVERTISED_TOGETHER = 100
 """Channels in one message: each has its schema."""
-_QUEUED_IMAGES = 4
-"""Images that wait for a slow client: of older ones it would show the past."""
 
 
 class ChannelSchema(Protocol):
@@ -157,9 +155,8 @@ class Channels:
         subscriber = await self._context.in_thread(
             self._context.node.new_sub, topic, msg_type, wildcards=False
         )
-        feed = Feed(topic)
-        queue_length = _QUEUED_IMAGES if codec_for(msg_type).name == "image" else 0
-        feed.subscribe(Subscribe(id_, topic, queue_length=queue_length), as_pixels=False)
+        feed = Feed(topic, msg_type)
+        feed.subscribe(Subscribe(id_, topic), as_pixels=False)
         reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
         self._subscriptions[id_] = _Subscription(id_, channel, subscriber, feed, reader)
 

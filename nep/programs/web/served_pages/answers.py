@@ -76,14 +76,14 @@ def answer(request: PageRequest, access: Access) -> PageResponse:
         return _page(
             HTTPStatus.UNAUTHORIZED,
             _filled("refused.html", _refused_words()),
-            "default-src 'none'",
+            "default-src 'none'; img-src data:",
         )._replace(is_token_refused=True)
     host = origin.partition("://")[2]
     url = f"{'wss' if origin.startswith('https') else 'ws'}://{host}"
     if path == "/starter.html":
         page = starter_page(url + query_of(access.token))
         return _page(HTTPStatus.OK, page, f"default-src 'none'; connect-src {url}")
-    policy = f"default-src 'none'; img-src data:; connect-src {url}"
+    policy = f"default-src 'none'; img-src data:; connect-src 'self' {url}"
     return _page(HTTPStatus.OK, _filled("test.html", _test_page_words()), policy)
 
 
@@ -181,6 +181,7 @@ def _test_page_words() -> dict[str, str]:
         "connecting": _("Connecting…"),
         "connected": _("Connected to {address}"),
         "disconnected": _("Disconnected by the server."),
+        "refused": _("The server has another token. Open its new address, or scan its code again."),
         "lost": _("Not connected. Trying again in {seconds} s."),
         "rate": _("{rate}/s, {bandwidth} kB/s"),
         "no_message": _("No message yet"),
