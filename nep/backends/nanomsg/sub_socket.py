@@ -177,6 +177,9 @@ class NanomsgSubSocket(ReadOneByOne):
     def connect_again(self) -> None:
         """Nothing: nodes of this back end meet on one computer only."""
 
+    def reconnect(self, publisher: int) -> None:
+        """Do nothing: nanomsg connects again after every failure."""
+
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and forget it."""
         self.sources.pop(publisher)

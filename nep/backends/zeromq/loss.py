@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ FAREWELL_S = 3.0
 EARLY_S = 5.0
 GAP_MAX = 2**32
 """More messages than these nobody misses at once: an hour of a million a second."""
+MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
 UNLISTED_MAX = 1000
 """So many publishers are remembered that no master lists: whoever sends on a topic may call itself any."""
 _UNKNOWN = kind_of("", "", "")
@@ -51,6 +53,10 @@ class HeardPublisher:
     last: int | None = None
     is_heard: bool = False
     """Whether a message, an echo or a bye has been received."""
+    is_connected: bool = False
+    """The same, since the socket was connected to `endpoint`."""
+    reconnect_s: float = MIN_RECONNECT_S
+    reconnect_at: float = math.inf
     has_echoed: bool = False
     is_lapsed: bool = False
     ends_at: float | None = None
@@ -62,6 +68,15 @@ class HeardPublisher:
     last, because what follows it overtook them."""
     leapt_to: int = 0
     """The number of a message that was refused because too many would be missing before it; else 0."""
+
+    def connecting(self, endpoint: str) -> None:
+        """Forget the previous connection; the next one is about to be made, over the same socket."""
+        is_retry = endpoint == self.endpoint
+        self.reconnect_s = min(MAX_RECONNECT_S, 2 * self.reconnect_s) if is_retry else MIN_RECONNECT_S
+        self.reconnect_at = time.monotonic() + self.reconnect_s
+        self.is_connected = self.has_echoed = False
+        self.form = self.shared_form = 0  # so that the next message passes `HeardPublishers.arrived`
+        self.endpoint = ""
 
 
 class HeardPublishers:
@@ -135,7 +150,7 @@ class HeardPublishers:
         there counts anew: nobody knows then how many are missing.
         """
         source = self.get(publisher)
-        source.is_heard = True
+        source.is_heard = source.is_connected = True
         last = source.last
         if last is not None and seq - last > GAP_MAX:
             if not source.leapt_to or source.leapt_to != seq - 1:
@@ -179,7 +194,7 @@ class HeardPublishers:
         False when that cannot be, because more than `GAP_MAX` would be missing: nothing is counted then.
         """
         source = self.get(publisher)
-        source.is_heard = True
+        source.is_heard = source.is_connected = True
         if source.last is not None and seq - source.last > GAP_MAX:
             return False
         if source.last is not None and seq > source.last:
@@ -239,6 +254,14 @@ class HeardPublishers:
         silent = [each for each, source in all_ if source.is_lapsed and source.ends_at is None]
         over = [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
         return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
+
+    def silent(self, now: float) -> list[int]:
+        """Publishers of which nothing was received in time after the socket was connected to them."""
+        return [
+            each
+            for each, source in self.by_id.items()
+            if source.endpoint and not source.is_connected and now >= source.reconnect_at
+        ]
 
     def replaced_by(self, remote: RemotePublisher) -> list[int]:
         """Silent publishers whose program has been started again, as `remote`."""

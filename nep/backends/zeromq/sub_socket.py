@@ -273,8 +273,7 @@ class SubSocket:
     def _connect(self, source: HeardPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has another address now, or its master listens anew
             self._disconnect(source.endpoint)
-            source.has_echoed = False
-            source.endpoint = ""
+        source.connecting(endpoint)
         try:
             keep_alive(self._socket, endpoint)
             self._socket.connect(endpoint)
@@ -288,6 +287,11 @@ class SubSocket:
         for source in self.sources.by_id.values():
             if is_far(source.endpoint):
                 self._connect(source, source.endpoint)
+
+    def reconnect(self, publisher: int) -> None:
+        """Connect anew to a publisher that was connected to."""
+        source = self.sources.get(publisher)
+        self._connect(source, source.endpoint)
 
     def _refuse(self, source: HeardPublisher, endpoint: str, why: str) -> None:
         """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""

@@ -134,6 +134,9 @@ class NativeReadable(Readable, Protocol):
     def connect_again(self) -> None:
         """Connect anew to the publishers on other computers. What was not read of them is dropped."""
 
+    def reconnect(self, publisher: int) -> None:
+        """Connect anew to a publisher that was connected to."""
+
 
 R = TypeVar("R", bound=Readable)
 
@@ -576,6 +579,9 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 sources.settle(publisher)
                 self._readable.leave(publisher)
             if not self._readable.has_input:
+                # libzmq never connects again after a failed handshake, as with another program's PULL.
+                for publisher in sources.silent(now):
+                    self._readable.reconnect(publisher)
                 for publisher, seq in last_seqs:
                     sources.promised(publisher, seq)
             self._after_use()
