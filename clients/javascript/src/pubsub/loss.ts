@@ -6,12 +6,18 @@ const FAREWELL_MS = 3000; // so long after a publisher has unregistered its last
 const EARLY_MS = 5000;
 const MAX_GAP = 2n ** 32n;
 const MAX_UNLISTED = 1000;
+const MIN_RECONNECT_MS = 2000;
+const MAX_RECONNECT_MS = 30_000;
 
 /** One publisher. */
 export class Source {
   remote: ReachablePublisher | undefined;
   /** Where it is connected. */
   endpoint: string | undefined;
+  /** Whether something was received since it was connected to `endpoint`. */
+  isConnected = false;
+  private reconnectMs = MIN_RECONNECT_MS;
+  private reconnectAt = Infinity;
   /** Why it can't be connected to. */
   problem = "";
   /** Seq of its newest message, received or lost; undefined while unknown, 0 if all are still to come. */
@@ -30,6 +36,19 @@ export class Source {
   lateTo = 0n;
   /** Seq of a message that was refused because too many would be missing before it. */
   leaptTo = 0n;
+
+  /** It is about to be connected to `endpoint`. */
+  connecting(endpoint: string): void {
+    this.reconnectMs = this.endpoint === endpoint ? Math.min(MAX_RECONNECT_MS, 2 * this.reconnectMs) : MIN_RECONNECT_MS;
+    this.reconnectAt = performance.now() + this.reconnectMs;
+    this.isConnected = false;
+    this.hasEchoed = false;
+  }
+
+  /** Whether nothing was received for so long that the connection is to be made again. */
+  get isSilent(): boolean {
+    return this.endpoint !== undefined && !this.isConnected && performance.now() >= this.reconnectAt;
+  }
 }
 
 /** Counts received and lost messages from sequence numbers. */
@@ -84,7 +103,7 @@ export class Sources {
    */
   arrived(id: bigint, seq: bigint, isAlone: boolean): boolean {
     const source = this.get(id);
-    source.isHeard = true;
+    source.isHeard = source.isConnected = true;
     const { last } = source;
     if (last !== undefined && seq - last > MAX_GAP) return this.leapt(source, last, seq);
     if (last === undefined || seq > last) {
@@ -123,7 +142,7 @@ export class Sources {
   /** An echo or a bye: messages up to `seq` were sent before it. False when that can't be. */
   reached(id: bigint, seq: bigint): boolean {
     const source = this.get(id);
-    source.isHeard = true;
+    source.isHeard = source.isConnected = true;
     if (source.last !== undefined && seq - source.last > MAX_GAP) return false;
     if (source.last !== undefined && seq > source.last) this.lost += Number(seq - source.last);
     if (source.last === undefined || seq > source.last) source.last = seq;

@@ -58,14 +58,12 @@ export class TopicReader {
     for (const [id, other] of this.sources.byId) {
       if (other !== source && other.endpoint === endpoint) this.leave(id); // its port is another's now
     }
-    if (source.endpoint) {
-      this.socket.disconnect(source.endpoint);
-      source.hasEchoed = false;
-    }
     this.connectTo(source, endpoint);
   }
 
   private connectTo(source: Source, endpoint: string): void {
+    if (source.endpoint) this.socket.disconnect(source.endpoint);
+    source.connecting(endpoint);
     source.endpoint = undefined;
     source.problem = "";
     try {
@@ -104,6 +102,8 @@ export class TopicReader {
       this.leave(id);
     }
     if (this.socket.hasInput) return;
+    // libzmq never connects again after a failed handshake, as with a PULL socket of another program.
+    for (const source of this.sources.byId.values()) if (source.isSilent) this.connectTo(source, source.endpoint!);
     for (const [id, seq] of lastSeqs) this.sources.promised(id, seq);
   }
 

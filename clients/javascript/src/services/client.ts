@@ -27,6 +27,7 @@ import {
 const DEFAULT_TIMEOUT_S = 5;
 const IDLE_MS = 200; // then the connection is closed: it would keep the process alive
 const DRAIN_MS = 20; // answers that were received before the connection ended are read first
+const RETRY_MS = 100; // after a failed handshake, as with a PUB socket of another program
 
 /** How a service is called. */
 export interface ClientOptions {
@@ -64,6 +65,8 @@ interface Connection {
   readonly server: bigint;
   readonly socket: DealerSocket;
   readonly calls: Map<bigint, PendingCall>;
+  /** Whether its handshake has succeeded: calls may have been sent. */
+  isOpen: boolean;
   idle: NodeJS.Timeout | undefined;
 }
 
@@ -84,6 +87,8 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   late = 0;
   private readonly servers = new Map<bigint, ReachablePublisher>();
   private readonly connections = new Map<bigint, Connection>();
+  /** Servers whose handshake failed, until they are tried again. */
+  private readonly retries = new Map<bigint, NodeJS.Timeout>();
   private readonly waiting = new Set<PendingCall>();
   private lastNumber = 0n;
   private closed: Promise<void> | undefined;
@@ -154,7 +159,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
 
   private expire(pending: PendingCall): void {
     const name = `"${this.service}"`;
-    const error = pending.connection
+    const error = pending.connection?.isOpen
       ? new ServiceTimeoutError(
           `${name} did not answer within ${pending.timeoutS} s; it may still carry the call out.`,
         )
@@ -178,7 +183,9 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   // ---- connections
 
   private send(pending: PendingCall): void {
-    const server = [...this.servers.values()].find((each) => each.codec === SERVICE_TYPE && each.endpoint);
+    const server = [...this.servers.values()].find(
+      (each) => each.codec === SERVICE_TYPE && each.endpoint && !this.retries.has(each.id),
+    );
     if (!server || pending.connection) return;
     const connection = this.connections.get(server.id) ?? this.connectTo(server);
     clearTimeout(connection.idle);
@@ -195,9 +202,12 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
       server.endpoint!,
       (parts) => this.read(parts, connection),
       () => (calls.size > 0 ? "brief" : "none"),
-      () => void setTimeout(() => this.ended(connection), DRAIN_MS),
+      {
+        onOpen: () => (connection.isOpen = true),
+        onEnd: () => void setTimeout(() => this.ended(connection), DRAIN_MS),
+      },
     );
-    const connection: Connection = { server: server.id, socket, calls, idle: undefined };
+    const connection: Connection = { server: server.id, socket, calls, isOpen: false, idle: undefined };
     this.connections.set(server.id, connection);
     return connection;
   }
@@ -214,11 +224,31 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
   }
 
   private ended(connection: Connection): void {
+    if (!connection.isOpen) {
+      this.retryLater(connection);
+      return;
+    }
     const error = new ServerGoneError(
       `The server of "${this.service}" ended; it may or may not have carried the call out.`,
     );
     for (const each of [...connection.calls.values()]) this.fail(each, error);
     this.drop(connection);
+  }
+
+  /** Nothing was sent: other servers get the calls, and this one when it is connected again. */
+  private retryLater(connection: Connection): void {
+    const { server, calls } = connection;
+    if (this.connections.get(server) !== connection) return;
+    this.drop(connection);
+    const retry = (): void => {
+      this.retries.delete(server);
+      for (const each of this.waiting) this.send(each);
+    };
+    this.retries.set(server, setTimeout(retry, RETRY_MS));
+    for (const each of calls.values()) {
+      each.connection = undefined;
+      this.send(each);
+    }
   }
 
   private read(parts: Buffer[], connection: Connection): void {
@@ -302,6 +332,7 @@ export class Client<Request = unknown, Answer = unknown> implements SessionSubsc
     for (const each of [...this.waiting])
       this.fail(each, new ClosedError(`The client of "${this.service}" is closed.`));
     for (const each of [...this.connections.values()]) this.drop(each);
+    for (const each of this.retries.values()) clearTimeout(each);
     return Promise.resolve();
   }
 

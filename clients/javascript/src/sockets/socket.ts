@@ -162,15 +162,23 @@ class Sender<T> {
 
 const firstEntry = (queue: Buffer[][]): Buffer[] => queue.shift()!;
 
+/** Gets to know when a connection begins and ends. */
+export interface ConnectionWatcher {
+  onOpen(): void;
+  /** Also called when the handshake failed; then `onOpen` was not. */
+  onEnd(): void;
+}
+
 /** The node's connection to the master, or a client's to a server: a DEALER. */
 export class DealerSocket {
   private readonly socket = new Dealer({ linger: 0 });
   private readonly sender = new Sender<Buffer[]>(this.socket, firstEntry);
   private readonly reader: Reader;
 
-  constructor(endpoint: string, onParts: (parts: Buffer[]) => void, hold: () => Hold, onDisconnect?: () => void) {
-    if (onDisconnect) {
-      this.socket.events.on("disconnect", onDisconnect);
+  constructor(endpoint: string, onParts: (parts: Buffer[]) => void, hold: () => Hold, watcher?: ConnectionWatcher) {
+    if (watcher) {
+      this.socket.events.on("handshake", watcher.onOpen);
+      this.socket.events.on("disconnect", watcher.onEnd);
     }
     this.socket.connect(endpoint);
     this.reader = new Reader(this.socket, onParts, hold);
