@@ -56,7 +56,8 @@ var subscriber = node.new_callback("test", "json", callback);
 """
 SLOW_RULES = {
     "again", "bye-again", "closed-is-left", "lost-last-seq", "lost-late", "lost-unreachable",
-    "malformed-named", "next-s", "renew", "renewed-topics", "restart", "statistics", "unknown-answers",
+    "malformed-named", "next-s", "other-socket-at-publisher", "renew", "renewed-topics",
+    "restart", "statistics", "unknown-answers",
 }  # fmt: skip
 """Rules that wait for renewals; only `nep wire check` without --rule runs them."""
 ALL_TYPES = """\

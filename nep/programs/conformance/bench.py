@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from typing import Any
 
 import zmq
@@ -12,6 +13,7 @@ import zmq
 from nep.i18n import _
 from nep.masters.graph import Outgoing
 from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStreams
+from nep.programs.conformance.other_socket import OtherSocket
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
 from nep.programs.conformance.scripted_master import RecordedRequest, ScriptedMaster
 from nep.programs.conformance.verdict import broken
@@ -202,6 +204,16 @@ class Bench:
         socket: zmq.Socket[bytes] = self._context.socket(kind)
         socket.linger = 0
         return socket
+
+    def fail_handshake(self, kind: str, endpoint: str) -> None:
+        """Be another program's socket at an endpoint until the adapter has connected to it and left again.
+
+        Args:
+            kind: Type of socket that the adapter must reject, such as ``PUB``.
+            endpoint: Unused endpoint.
+        """
+        with closing(OtherSocket(endpoint, kind)) as other:
+            self.need(other.has_been_left, "connection", 10.0)
 
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True

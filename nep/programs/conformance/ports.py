@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+import errno
 import socket as sockets
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import zmq
 
-__all__ = ["bind_again", "closed_port"]
+__all__ = ["bind_again", "closed_port", "retry_bind"]
 
 _WAIT_S = 5.0
 
 
 def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
     """Bind, and retry while libzmq's thread is still closing the previous socket of the endpoint."""
+    retry_bind(lambda: socket.bind(endpoint))
+
+
+def retry_bind(bind: Callable[[], object]) -> None:
+    """Call ``bind``, and retry while libzmq's thread is still closing the previous socket of the endpoint."""
     deadline = time.monotonic() + _WAIT_S
     while True:
         try:
-            socket.bind(endpoint)
+            bind()
             return
-        except zmq.ZMQError as error:
-            if error.errno != zmq.EADDRINUSE or time.monotonic() >= deadline:
+        except (OSError, zmq.ZMQError) as error:
+            if error.errno not in {errno.EADDRINUSE, zmq.EADDRINUSE} or time.monotonic() >= deadline:
                 raise
         threading.Event().wait(0.005)
 

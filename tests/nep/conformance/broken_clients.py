@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import msgpack  # type: ignore[import-untyped]
@@ -362,7 +362,9 @@ class LeavesWhatLapsed(Client):
 @breaks("subscriber-closes")
 class SubscriberStaysListed(Client):
     def do_close_subscriber(self, sub: int) -> dict[str, Any]:
-        self.subs.pop(sub).socket.close()
+        closing = self.subs.pop(sub)
+        closing.handshakes.close()
+        closing.socket.close()
         return {}
 
 
@@ -412,6 +414,12 @@ class ForgetsSubscribers(Client):
                 for each in list(sub.sources):
                     self.leave_source(sub, each)
         super().adopt(what)
+
+
+@breaks("other-socket-at-master")
+class ConnectsToTheMasterOnce(Client):
+    def mend_master(self) -> None:
+        pass
 
 
 @breaks("renewed-topics")
@@ -516,6 +524,12 @@ class ConnectsOnce(Client):
         super().move(sub, source, endpoint)
 
 
+@breaks("other-socket-at-publisher")
+class LeavesConnectingToLibzmq(Client):
+    def mend(self, sub: Sub) -> None:
+        pass
+
+
 @breaks("endpoint-change")
 class KeepsTheFirstEndpoint(Client):
     def move(self, sub: Sub, source: Source, endpoint: str) -> None:
@@ -561,6 +575,12 @@ class EndsOnMalformedCalls(Client):
 class CallsForEver(Client):
     def timeout(self, timeout_s: float) -> float:
         return 1000.0
+
+
+@breaks("other-socket-at-server")
+class ConnectsToTheServerOnce(Client):
+    def mend_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
+        pass
 
 
 @breaks("service-error")

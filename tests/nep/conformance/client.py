@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from hashlib import sha256
 from typing import Any
 
@@ -20,8 +21,9 @@ import zmq
 
 from nep.errors import WireError
 from nep.messages.codecs import codec_for, codec_numbered
-from nep.protocol import topic_pattern, wire
+from nep.protocol import wire
 from nep.protocol.batch import read_parts
+from tests.nep.conformance.client_connections import Connections, Handshakes
 from tests.nep.conformance.client_services import Services
 from tests.nep.conformance.client_state import Pub, Source, Stream, Sub
 
@@ -30,7 +32,7 @@ BOUND_S = 0.5
 GAP_MAX = 2**32
 
 
-class Client(Services):
+class Client(Connections, Services):
     """See the module."""
 
     def __init__(self, master: str) -> None:
@@ -40,7 +42,9 @@ class Client(Services):
         self._context.linger = 0
         self.master: zmq.Socket[bytes] = self._context.socket(zmq.DEALER)
         self.master.setsockopt(zmq.RECONNECT_IVL, 20)
-        self.master.connect(f"tcp://{master}")
+        self.master_endpoint = f"tcp://{master}"
+        self.master_handshakes = Handshakes(self.master)
+        self.master.connect(self.master_endpoint)
         self.key = "00112233445566778899aabbccddeeff"
         self.node: dict[str, Any] = {}
         self.pubs: dict[int, Pub] = {}
@@ -80,6 +84,9 @@ class Client(Services):
             self.code = 1
         finally:
             self.reads.close()
+            self.master_handshakes.close()
+            for sub in self.subs.values():
+                sub.handshakes.close()
             self._context.destroy()
 
     def say(self, line: Mapping[str, Any]) -> None:
@@ -213,7 +220,7 @@ class Client(Services):
         record |= {"pattern": True} if pattern else {}
         for each in [] if pattern else self.filters(topic, hello):
             socket.subscribe(each)
-        sub = Sub(len(self.subs) + 1, record, socket, hello)
+        sub = Sub(len(self.subs) + 1, record, socket, hello, Handshakes(socket))
         self.subs[sub.number] = sub
         reply = self.ask("subscriber+", subscriber=record)
         self.connect(reply["what"].get("publishers", ()))
@@ -258,6 +265,7 @@ class Client(Services):
     def do_close_subscriber(self, sub: int) -> dict[str, Any]:
         closing = self.subs.pop(sub)
         self.tell("subscriber-", node_id=self.node["id"], id=closing.id)
+        closing.handshakes.close()
         closing.socket.close()
         return {}
 
@@ -277,7 +285,8 @@ class Client(Services):
 
     def tell(self, do: str, **what: Any) -> int:
         self.calls += 1
-        self.master.send(msgpack.packb({"do": do, "call": self.calls, "what": what}))
+        with suppress(zmq.Again):  # no connection
+            self.master.send(msgpack.packb({"do": do, "call": self.calls, "what": what}), zmq.DONTWAIT)
         return self.calls
 
     def ask(self, do: str, **what: Any) -> dict[str, Any]:
@@ -357,45 +366,6 @@ class Client(Services):
         self.connect([what["publisher"]])
         if what.get("is_new"):
             self.expect_all_of(what["publisher"]["publisher"]["id"])
-
-    def connect(self, remotes: Any) -> None:
-        for remote in remotes:
-            record = remote["publisher"]
-            for sub in self.subs.values():
-                if self.hears(sub, record["topic"]):
-                    source = sub.sources.setdefault(record["id"], Source(""))
-                    endpoint = next(iter(record.get("endpoints", ())), "")
-                    if not endpoint.startswith("tcp://") or " " in endpoint:
-                        self.unusable(sub, endpoint)
-                    elif source.endpoint != endpoint:
-                        self.move(sub, source, endpoint)
-
-    def expect_all_of(self, publisher: int) -> None:
-        for sub in self.subs.values():
-            source = sub.sources.get(publisher)
-            if source is not None and source.last is None:
-                source.last = 0
-
-    def hears(self, sub: Sub, topic: str) -> bool:
-        if not sub.record.get("pattern"):
-            return bool(sub.record["topic"] == topic)
-        if not topic_pattern.matches(sub.record["topic"], topic):
-            return False
-        if topic not in sub.topics:
-            sub.topics.append(topic)
-            for each in self.filters(topic, self.hello(sub.id, topic)):
-                sub.socket.subscribe(each)
-        return True
-
-    def unusable(self, sub: Sub, endpoint: str) -> None:
-        sub.problem = f"{endpoint} is not an endpoint"
-
-    def move(self, sub: Sub, source: Source, endpoint: str) -> None:
-        if source.endpoint:
-            sub.socket.disconnect(source.endpoint)
-            source.has_echoed = False
-        source.endpoint = endpoint
-        sub.socket.connect(endpoint)
 
     def unlisted(self, what: Mapping[str, Any]) -> None:
         for sub in self.subs.values():
@@ -575,6 +545,8 @@ class Client(Services):
         poller.poll(2)
         while self.master.poll(0):
             self.follow(self.master.recv())
+        if self.master_handshakes.have_failed():
+            self.mend_master()
         for server in self.servers:
             while server.poll(0):
                 self.serve(server)
@@ -589,6 +561,8 @@ class Client(Services):
                 self.read(sub, sub.socket.recv_multipart())
             except WireError as error:
                 self.refuse(sub, error)
+        if sub.handshakes.have_failed():
+            self.mend(sub)
         for each, source in list(sub.sources.items()):
             if source.ends_at is not None and now >= source.ends_at:
                 self.leave_source(sub, each)

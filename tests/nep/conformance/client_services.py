@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import zmq
 
 from nep.errors import WireError
 from nep.protocol import service_wire
-from tests.nep.conformance.client_state import Pub
+from tests.nep.conformance.client_state import Handshakes, Pub
 
 
 class Services:
@@ -67,16 +67,30 @@ class Services:
         record = {**self.new_id(), "topic": topic, "msg_type": "service"}
         (found,) = self.ask("subscriber+", subscriber=record)["what"]["publishers"]
         self.tell("subscriber-", node_id=self.node["id"], id=record["id"])
+        call = service_wire.NATIVE.call(1, 1, self.timeout(timeout_s), json.dumps(value).encode())
         with self._context.socket(zmq.DEALER) as socket:
-            socket.connect(found["publisher"]["endpoints"][0])
-            socket.send_multipart(
-                service_wire.NATIVE.call(1, 1, self.timeout(timeout_s), json.dumps(value).encode())
-            )
-            self.until(lambda: bool(socket.poll(0)), timeout_s)
+            handshakes = Handshakes(socket)
+            self.call_at(socket, found["publisher"]["endpoints"][0], call)
+
+            def is_answered() -> bool:
+                if handshakes.have_failed():
+                    self.mend_call(socket, found["publisher"]["endpoints"][0], call)
+                return bool(socket.poll(0))
+
+            self.until(is_answered, timeout_s)
+            handshakes.close()
             if not socket.poll(0):
                 return {"error": "no answer"}
             reply = service_wire.NATIVE.read_answer(socket.recv_multipart()).reply
         return self.result(reply)
+
+    def call_at(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
+        socket.connect(endpoint)
+        socket.send_multipart(call)
+
+    def mend_call(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:
+        socket.disconnect(endpoint)
+        self.call_at(socket, endpoint, call)
 
     def timeout(self, timeout_s: float) -> float:
         return timeout_s

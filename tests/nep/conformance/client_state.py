@@ -67,12 +67,32 @@ class Source:
     ends_at: float | None = None
 
 
+class Handshakes:
+    """Monitor of a socket: tells whether a connection has ended, which libzmq may not make again."""
+
+    def __init__(self, socket: zmq.Socket[bytes]) -> None:
+        self._socket = socket
+        self._monitor = socket.get_monitor_socket(zmq.EVENT_DISCONNECTED)
+
+    def have_failed(self) -> bool:
+        found = False
+        while self._monitor.poll(0):
+            self._monitor.recv_multipart()
+            found = True
+        return found
+
+    def close(self) -> None:
+        self._socket.disable_monitor()
+        self._monitor.close(0)
+
+
 @dataclass
 class Sub:
     number: int
     record: dict[str, Any]
     socket: zmq.Socket[bytes]
     hello: bytes
+    handshakes: Handshakes
     sources: dict[int, Source] = field(default_factory=dict)
     topics: list[str] = field(default_factory=list)
     """Matching topics of a subscriber with wildcards."""

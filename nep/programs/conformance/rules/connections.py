@@ -72,6 +72,23 @@ def _reconnect(bench: Bench) -> None:
 
 
 @rule(
+    "other-socket-at-publisher",
+    lazy("A subscriber connects to a publisher whose port a ZeroMQ socket of another program had before."),
+    "a-failed-handshake",
+)
+def _other_socket_at_publisher(bench: Bench) -> None:
+    topic = bench.new_topic()
+    sub = bench.new_sub(topic)
+    publisher = bench.publisher(topic, is_listed=False)
+    publisher.socket.close(0)
+    bench.list_publisher(publisher)
+    bench.fail_handshake("PULL", publisher.record.endpoints[0])
+    publisher.bind_again()
+    bench.need(lambda: bool(publisher.hellos), "hello", 10.0)
+    _expect_next(bench, publisher, sub)
+
+
+@rule(
     "endpoint-change",
     lazy("A subscriber reconnects when a publisher's endpoint changes; the publisher's seqs continue."),
     "other-computers",

@@ -140,6 +140,24 @@ def _restart(bench: Bench) -> None:
 
 
 @rule(
+    "other-socket-at-master",
+    lazy("A node joins a master that starts where a ZeroMQ socket of another program rejected it."),
+    "a-failed-handshake",
+)
+def _other_socket_at_master(bench: Bench) -> None:
+    topic = bench.new_topic()
+    bench.new_sub(topic)
+    id = bench.record("subscriber", topic)["id"]
+    bench.master.stop()
+    bench.fail_handshake("PUB", f"tcp://{bench.master.address}")
+    count = len(bench.master.received)
+    bench.master.start()
+    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
+    join = next(each for each in bench.master.received[count:] if each.do == "join")
+    expect("join.subscribers", id in _ids(join, "subscribers"), True)
+
+
+@rule(
     "renewed-topics",
     lazy("A subscriber also connects to publishers that only the reply to a renewal lists."),
     _SECTION,

@@ -14,6 +14,7 @@ from nep.i18n import _, lazy
 from nep.programs.conformance.adapter import AdapterError
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import new_node
+from nep.programs.conformance.ports import bind_again, closed_port
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.verdict import broken, expect, shown
 from nep.protocol.requests import AddPublisher, Leave, PublisherRecord
@@ -103,21 +104,22 @@ def _service_malformed(bench: Bench) -> None:
 
 @contextmanager
 def _server(bench: Bench, name: str) -> Iterator[zmq.Socket[bytes]]:
-    node = new_node("tester_server")
     with _socket(bench, zmq.ROUTER) as socket:
         port = socket.bind_to_random_port("tcp://127.0.0.1")
-        record = PublisherRecord(
-            secrets.randbits(62) | 1,
-            topic_of(name),
-            SERVICE_TYPE,
-            SERVICE_TYPE,
-            (f"tcp://127.0.0.1:{port}",),
-        )
-        bench.master.submit(AddPublisher(node, record))
-        try:
+        with _listed_server(bench, name, f"tcp://127.0.0.1:{port}"):
             yield socket
-        finally:
-            bench.master.submit(Leave(node.id))
+
+
+@contextmanager
+def _listed_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]:
+    node = new_node("tester_server")
+    id = secrets.randbits(62) | 1
+    record = PublisherRecord(id, topic_of(name), SERVICE_TYPE, SERVICE_TYPE, (endpoint,))
+    bench.master.submit(AddPublisher(node, record))
+    try:
+        yield
+    finally:
+        bench.master.submit(Leave(node.id))
 
 
 def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
@@ -146,6 +148,25 @@ def _service_call(bench: Bench) -> None:
         number = bench.adapter.begin("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
         value = _called(bench, socket, number, Reply(CallKind.ANSWER, b""))
         expect("value", value, {"a": [1, None]})
+
+
+@rule(
+    "other-socket-at-server",
+    lazy("A call waits for a server whose port a ZeroMQ socket of another program has, and is then sent."),
+    "a-failed-handshake",
+    "services",
+)
+def _other_socket_at_server(bench: Bench) -> None:
+    name = bench.new_topic()
+    with closed_port() as endpoint:
+        pass
+    with _listed_server(bench, name, endpoint):
+        number = bench.adapter.begin("call", service=name, value=1, timeout_s=_CALL_S)
+        bench.fail_handshake("PUB", endpoint)
+        with _socket(bench, zmq.ROUTER) as socket:
+            bind_again(socket, endpoint)
+            value = _called(bench, socket, number, Reply(CallKind.ANSWER, b""))
+    expect("value", value, 1)
 
 
 @rule(

@@ -1,0 +1,64 @@
+"""Another program's ZeroMQ socket at an address where the client expects a different kind of socket."""
+
+from __future__ import annotations
+
+import contextlib
+import socket as sockets
+import sys
+
+from nep.programs.conformance.ports import retry_bind
+
+__all__ = ["OtherSocket"]
+
+_GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL".ljust(23, b"\0") + bytes(32)
+
+
+class OtherSocket:
+    """Listener that completes the handshake of ZMTP 3.0 as a socket of the given type, such as ``PUB``.
+
+    A client's library ends the connection itself, because the types don't match. A real socket would race
+    with it: libzmq connects again if the other side ended the connection, and never if it did so itself.
+    """
+
+    def __init__(self, endpoint: str, kind: str) -> None:
+        host, _colon, port = endpoint.removeprefix("tcp://").rpartition(":")
+        properties = b"\x0bSocket-Type" + len(kind).to_bytes(4, "big") + kind.encode()
+        body = b"\x05READY" + properties
+        self._said = _GREETING + bytes([4, len(body)]) + body
+        self._clients: list[sockets.socket] = []
+        self._listener = sockets.socket()
+        if sys.platform != "win32":  # there, the port's owner would stay the listener
+            self._listener.setsockopt(sockets.SOL_SOCKET, sockets.SO_REUSEADDR, 1)
+        self._listener.setblocking(False)
+        try:
+            retry_bind(lambda: self._listener.bind((host, int(port))))
+            self._listener.listen()
+        except OSError:
+            self._listener.close()
+            raise
+
+    def has_been_left(self) -> bool:
+        """Accept pending clients; return whether one has ended its connection."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                client, _address = self._listener.accept()
+                client.setblocking(False)
+                client.send(self._said)
+                self._clients.append(client)
+        return any(_has_ended(each) for each in self._clients)
+
+    def close(self) -> None:
+        """Close the listener and all connections."""
+        for each in (self._listener, *self._clients):
+            each.close()
+
+
+def _has_ended(client: sockets.socket) -> bool:
+    try:
+        while client.recv(4096):
+            pass
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
