@@ -1,11 +1,11 @@
-// Tests of the API with a master, which tests/clients/test_javascript.py starts. Skipped without NEP_MASTER.
+// Tests of the API with a master.
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { test } from "node:test";
 import * as nep from "../dist/index.mjs";
+import { hasMaster } from "./support/master.mjs";
 
 const { Node } = nep;
-const hasMaster = { skip: process.env.NEP_MASTER ? false : "needs a master: set NEP_MASTER" };
 
 /** Returns a node that is closed at the end of the test: an open subscription would keep the process alive. */
 function opened(t, name, options) {

@@ -7,10 +7,15 @@ import { CommandDesk } from "../dist/robot/commands.js";
 import { describe } from "../dist/robot/description.js";
 import { Failed, ManualClock, Robot } from "../dist/robot/index.mjs";
 import { Tasks } from "../dist/robot/tasks.js";
+import { hasMaster } from "./support/master.mjs";
 
 const FINAL = ["succeeded", "failed", "canceled"];
 const node = new Node("tester");
-after(() => node.close());
+const robots = [];
+after(async () => {
+  await Promise.all(robots.map((each) => each.close()));
+  await node.close();
+});
 let lastName = 0;
 
 /** Returns a robot whose stop and actions end when the test says so, with a publisher and subscriber on its topics. */
@@ -51,6 +56,7 @@ async function bench(changes = {}) {
     },
     stop: { run: changes.stop ?? (() => done.push("stop")) },
   });
+  robots.push(robot);
   const clock = new ManualClock();
   await robot.start({ name, clock });
   const command = await node.publisher(`${topic}/command`, { type: changes.type ?? "robot/command" });
@@ -75,7 +81,7 @@ async function bench(changes = {}) {
   };
 }
 
-test("stop is carried out before queued commands, which do not run after it", async () => {
+test("stop is carried out before queued commands, which do not run after it", hasMaster, async () => {
   const { robot, done, send, invoke, final, of } = await bench();
   for (let n = 0; n < 300; n++) invoke(`w${n}`, "wave");
   send({ id: "s", op: "stop" });
@@ -88,7 +94,7 @@ test("stop is carried out before queued commands, which do not run after it", as
   await robot.close();
 });
 
-test("stop is answered when the stop function has returned", async () => {
+test("stop is answered when the stop function has returned", hasMaster, async () => {
   let release;
   const { robot, send, invoke, final, of, until } = await bench({ stop: () => new Promise((end) => (release = end)) });
   send({ id: "s", op: "stop" });
@@ -104,7 +110,7 @@ test("stop is answered when the stop function has returned", async () => {
   await closed;
 });
 
-test("a failed stop, or one that an action survives, is answered with a reason", async () => {
+test("a failed stop, or one that an action survives, is answered with a reason", hasMaster, async () => {
   const failing = await bench({
     stop() {
       throw new Failed("the brake is stuck");
@@ -130,7 +136,7 @@ test("a failed stop, or one that an action survives, is answered with a reason",
   await closed;
 });
 
-test("commands that are too large or too deep are refused, and a large stop stops", async () => {
+test("commands that are too large or too deep are refused, and a large stop stops", hasMaster, async () => {
   const { robot, invoke, final } = await bench();
   invoke("large", "say", { words: "x".repeat(65_000) });
   assert.match((await final("large")).error, /at most 64 kB/);
@@ -169,7 +175,7 @@ test("messages that can't be decoded are counted, and the next one is handled", 
   assert.deepEqual(answers.map(({ id }) => id), ["last"]);
 });
 
-test("no message ends the driver", async () => {
+test("no message ends the driver", hasMaster, async () => {
   const { robot, send, invoke, final } = await bench();
   const strange = [null, 7, "stop", [], {}, { op: "stop", id: 7 }, { id: "\ud800", op: "invoke" }, { op: [], id: "a" }];
   for (const each of strange) send(each);
