@@ -6,6 +6,7 @@ import { Message } from "../dist/messages/message.js";
 import { CommandDesk } from "../dist/robot/commands.js";
 import { describe } from "../dist/robot/description.js";
 import { Failed, ManualClock, Robot } from "../dist/robot/index.mjs";
+import { CommandReceiver, RejectedMessages } from "../dist/robot/receiver.js";
 import { Tasks } from "../dist/robot/tasks.js";
 import { hasMaster } from "./support/master.mjs";
 
@@ -161,14 +162,17 @@ test("messages that can't be decoded are counted, and the next one is handled", 
   const description = describe(spec, "Arm");
   const handled = new Promise((resolve) => {
     const publish = (answer) => answers.push(answer) && resolve();
-    const desk = new CommandDesk(new Tasks(host), { description, publish, warn() {} });
+    const tasks = new Tasks(host);
+    const rejected = new RejectedMessages("Arm", () => undefined);
+    const desk = new CommandDesk(tasks, { description, rejected, publish });
+    const receiver = new CommandReceiver("/Arm/command", tasks, desk, rejected, ["stop"]);
     const receive = (text) =>
-      desk.take(new Message("/Arm/command", Buffer.from(text), codecFor("json"), "robot/command", 1n, 0n, 9n, {}, false));
+      receiver.take(new Message("/Arm/command", Buffer.from(text), codecFor("json"), "robot/command", 1n, 0n, 9n, {}, false));
     receive(`{"id": "deep", "op": "invoke", "action": "say", "input": ${"[".repeat(70)}${"]".repeat(70)}}`);
     receive("no JSON");
     receive('{"id": "s", "op": "stop"');
     receive('{"id": "last", "op": "dance"}');
-    host.rejected = () => desk.rejected;
+    host.rejected = () => rejected.count;
   });
   await handled;
   assert.equal(host.rejected(), 3);

@@ -39,6 +39,10 @@ export interface ActionSpec {
   readonly output?: Readonly<Record<string, Value>>;
   /** Named values that `call.feedback` tells. */
   readonly feedback?: Readonly<Record<string, Value>>;
+  /** RIZE's primitive for it, such as `say`: its input becomes the first parameter, its options those of their names. */
+  readonly rize?: string;
+  /** Input that RIZE's input and options stand for, if their names alone don't tell. Throws if there is none. */
+  fromRize?(input: string, options: Members): Members;
   /** Gets the checked input. Wait with `call.wait`, or pass `call.signal` on: that is where a stop ends it. */
   run(input: any, call: Call): unknown;
 }
@@ -70,6 +74,8 @@ export interface EventSpec {
   readonly fields?: Readonly<Record<string, Value>>;
   /** Fields that the block offers as a choice. */
   readonly choose?: readonly string[];
+  /** What RIZE's blackboard gets: a primitive and its inputs, such as `["bumpers", { left: 1 }]`. */
+  rize?(data: Members): readonly [string, Members];
 }
 
 /** How a robot is stopped. */

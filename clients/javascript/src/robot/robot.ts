@@ -1,18 +1,22 @@
 import { createInterface } from "node:readline";
 import { parseArgs } from "node:util";
 import { ClosedError, NepError } from "../errors.js";
+import type { Message } from "../messages/message.js";
 import { Node } from "../node.js";
 import type { Publisher } from "../pubsub/publisher.js";
 import type { Subscriber } from "../pubsub/subscriber.js";
 import { type Clock, ManualClock, systemClock } from "./clock.js";
 import { CommandDesk } from "./commands.js";
 import { describe, type Description, type RobotSpec, sensedValue, topicOf } from "./description.js";
+import { CommandReceiver, MessageQueue, RejectedMessages } from "./receiver.js";
+import { BLACKBOARD, RIZE_ANSWERS, RIZE_COMMANDS, RIZE_EVENTS, RizeDialect } from "./rize_dialect.js";
 import { problemsOf } from "./schema.js";
 import { Tasks } from "./tasks.js";
 import { errorText, type Members } from "./text.js";
 
 const OWNER_CHECK_MS = 500;
 const MAX_WARNED = 100;
+const MAX_WORLD_BYTES = 1_000_000;
 const USAGE = "usage: [--name NAME] [--master HOST:PORT] [--owner-pid PID] [--test-clock]";
 
 /** How a robot is started. */
@@ -29,8 +33,27 @@ interface Running {
   readonly node: Node;
   readonly description: Description;
   readonly tasks: Tasks;
+  readonly rejected: RejectedMessages;
+  /** By topic. */
   readonly publishers: Map<string, Publisher>;
-  readonly commands: Subscriber;
+  readonly subscribers: Subscriber[];
+}
+
+/** The newest value of a topic that is not open yet. */
+interface UnsentValue {
+  readonly topicOf: (name: string) => string;
+  readonly value: unknown;
+}
+
+/** Called with each message of a topic. */
+export type MembersCallback = (message: Members) => void;
+
+/** A topic besides the robot's own ones. */
+interface JoinedTopic {
+  readonly topicOf: (name: string) => string;
+  readonly changed: MembersCallback;
+  /** Of a topic that the robot publishes, too. */
+  readonly sharing: { readonly latched: boolean } | undefined;
 }
 
 /**
@@ -55,7 +78,8 @@ interface Running {
  */
 export class Robot {
   private running: Running | undefined;
-  private readonly sensed = new Map<string, unknown>(); // before the topics are open
+  private readonly unsent = new Map<string, UnsentValue>();
+  private readonly joined: JoinedTopic[] = [];
 
   /** @throws {NepError} for a declaration that is wrong. */
   constructor(readonly spec: RobotSpec) {
@@ -77,22 +101,39 @@ export class Robot {
       if (!warned.has(message)) warn(message);
       if (warned.size < MAX_WARNED) warned.add(message);
     });
+    const tasks = this.tasksOf(name, clock, (...told) => desk.beat(...told));
+    const rejected = new RejectedMessages(name, warn);
+    this.running = { node, description, tasks, rejected, publishers: new Map(), subscribers: [] };
+    const publish = (answer: Members): void => this.publish(topicOf(name, "answer"), answer);
+    const desk = new CommandDesk(tasks, { description, rejected, publish });
+    await Promise.all([this.openTopics(), this.takeCommands(desk), ...this.joined.map((each) => this.join(each))]);
+    await this.openTopic(topicOf(name, "description"), "robot/description", true);
+    this.publish(topicOf(name, "description"), description.document);
+    this.publish(RIZE_EVENTS, { robot: "ready", name });
+  }
+
+  private tasksOf(name: string, clock: Clock, beat: CommandDesk["beat"]): Tasks {
     const { withinS = 0.2, watchdogS = 1 } = this.spec.stop;
-    const beat = (...told: Parameters<CommandDesk["beat"]>): void => desk.beat(...told);
-    const tasks = new Tasks({ name, clock, withinS, watchdogS, stop: () => this.spec.stop.run(), beat, warn });
-    const desk = new CommandDesk(tasks, { description, publish: (answer) => this.publish("answer", answer), warn });
-    const commands = node.subscribe(topicOf(name, "command"), { type: "robot/command", sink: desk.take });
-    this.running = { node, description, tasks, publishers: new Map(), commands };
-    await Promise.all([this.openTopics(), commands.ready]);
-    await this.openTopic("description", "robot/description", true);
-    this.publish("description", description.document);
+    return new Tasks({ name, clock, withinS, watchdogS, stop: () => this.spec.stop.run(), beat, warn });
+  }
+
+  private async takeCommands(desk: CommandDesk): Promise<void> {
+    const { description, tasks, rejected } = this.running!;
+    const publish = (answer: Members): void => this.publish(RIZE_ANSWERS, answer);
+    const rize = new RizeDialect(tasks, { description, specs: this.spec.actions, desk, publish });
+    const words = ["stop", description.stopAction];
+    const command = topicOf(description.name, "command");
+    await Promise.all([
+      this.subscribe(command, "robot/command", new CommandReceiver(command, tasks, desk, rejected, words).take),
+      this.subscribe(RIZE_COMMANDS, "json", new CommandReceiver(RIZE_COMMANDS, tasks, rize, rejected, words, true).take),
+    ]);
   }
 
   /** Stop the robot, answer what is open, and leave the network. */
   async close(): Promise<void> {
     const { running } = this;
     if (!running) return;
-    void running.commands.close();
+    for (const each of running.subscribers) void each.close();
     await running.tasks.close();
     await this.spec.close?.();
     await running.node.close();
@@ -107,29 +148,51 @@ export class Robot {
   sense(sensor: string, value: unknown): void {
     const { sensors = {} } = this.spec;
     if (!Object.hasOwn(sensors, sensor)) throw new NepError(`There is no sensor "${sensor}".`);
-    const told = sensedValue(sensor, sensors[sensor]!, value);
-    if (this.running?.publishers.has(sensor)) this.publish(sensor, told);
-    else this.sensed.set(sensor, told);
+    this.publishWhenOpen((name) => topicOf(name, sensor), sensedValue(sensor, sensors[sensor]!, value));
   }
 
-  /** Publish an event. @throws {NepError} when its values are not as declared. */
+  /** Publish an event, also to RIZE's blackboard if declared so. @throws {NepError} when its values are not as declared. */
   happen(event: string, data: Members = {}): void {
     const { events = {} } = this.spec;
     if (!Object.hasOwn(events, event)) throw new NepError(`There is no event "${event}".`);
     const [problem] = problemsOf(events[event]!.fields ?? {}, data);
     if (problem) throw new NepError(`The event "${event}": ${problem}.`);
-    this.publish(event, data);
+    if (!this.running) return;
+    const { name } = this.running.description;
+    this.publish(topicOf(name, event), data);
+    const told = events[event]!.rize?.(data);
+    if (told) this.publish(BLACKBOARD, { primitive: told[0], input: told[1], robot: name });
   }
 
   /** Publish on a topic of the robot that its description doesn't name, such as `state`. */
   async tell(leaf: string, value: unknown): Promise<void> {
-    if (this.running && !this.running.publishers.has(leaf)) await this.openTopic(leaf);
-    this.publish(leaf, value);
+    if (!this.running) return;
+    const topic = topicOf(this.running.description.name, leaf);
+    if (!this.running.publishers.has(topic)) await this.openTopic(topic);
+    this.publish(topic, value);
   }
 
   /** Number of subscribers of a sensor: nobody needs a picture that nobody sees. */
   watchers(sensor: string): number {
-    return this.running?.publishers.get(sensor)?.subscribers ?? 0;
+    if (!this.running) return 0;
+    const { description, publishers } = this.running;
+    return publishers.get(topicOf(description.name, sensor))?.subscribers ?? 0;
+  }
+
+  /** Let people act on a virtual robot's world: `changed` gets each message of `/NAME/world`, in turns that let stops pass. */
+  onWorld(changed: MembersCallback): void {
+    this.add({ topicOf: (name) => topicOf(name, "world"), changed, sharing: undefined });
+  }
+
+  /**
+   * Join a topic that several robots share.
+   *
+   * @param changed Gets each message, also those of this robot.
+   * @returns a function that publishes a message. Before the topic is open, only the newest one is kept.
+   */
+  share(topic: string, changed: MembersCallback, { latched = false } = {}): MembersCallback {
+    this.add({ topicOf: () => topic, changed, sharing: { latched } });
+    return (message) => this.publishWhenOpen(() => topic, message);
   }
 
   /**
@@ -164,27 +227,64 @@ export class Robot {
     process.exit(0);
   }
 
-  private async openTopics(): Promise<void> {
-    const { sensors = {}, events = {} } = this.spec;
+  private add(joined: JoinedTopic): void {
+    this.joined.push(joined);
+    if (this.running) this.join(joined).catch((error: unknown) => warn(errorText(error)));
+  }
+
+  private async join({ topicOf, changed, sharing }: JoinedTopic): Promise<void> {
+    const { description, tasks, rejected } = this.running!;
+    const topic = topicOf(description.name);
+    const queue = new MessageQueue(topic, tasks, rejected, MAX_WORLD_BYTES);
     await Promise.all([
-      this.openTopic("answer", "robot/answer"),
-      ...Object.entries(sensors).map(([name, { type }]) =>
-        this.openTopic(name, type === "camera" ? "image" : "json", type !== "camera"),
-      ),
-      ...Object.keys(events).map((name) => this.openTopic(name)),
+      this.subscribe(topic, "json", (message) => void queue.put(message, changed)),
+      sharing && this.openTopic(topic, "json", sharing.latched),
     ]);
   }
 
-  private async openTopic(leaf: string, type = "json", latched = false): Promise<void> {
-    const { node, description, publishers } = this.running!;
-    publishers.set(leaf, await node.publisher(topicOf(description.name, leaf), { type, latched }));
-    if (this.sensed.has(leaf)) this.publish(leaf, this.sensed.get(leaf));
-    this.sensed.delete(leaf);
+  private async subscribe(topic: string, type: string, sink: (message: Message) => void): Promise<void> {
+    const { node, subscribers } = this.running!;
+    const subscriber = node.subscribe(topic, { type, sink });
+    subscribers.push(subscriber);
+    await subscriber.ready;
   }
 
-  private publish(leaf: string, value: unknown): void {
+  private async openTopics(): Promise<void> {
+    const { name } = this.running!.description;
+    const { sensors = {}, events = {} } = this.spec;
+    const openOwn = (leaf: string, type?: string, latched?: boolean): Promise<void> =>
+      this.openTopic(topicOf(name, leaf), type, latched);
+    await Promise.all([
+      openOwn("answer", "robot/answer"),
+      ...Object.entries(sensors).map(([leaf, { type }]) =>
+        openOwn(leaf, type === "camera" ? "image" : "json", type !== "camera"),
+      ),
+      ...Object.keys(events).map((leaf) => openOwn(leaf)),
+      this.openTopic(RIZE_ANSWERS),
+      this.openTopic(RIZE_EVENTS, "json", true),
+      Object.values(events).some(({ rize }) => rize) && this.openTopic(BLACKBOARD),
+    ]);
+  }
+
+  private async openTopic(topic: string, type = "json", latched = false): Promise<void> {
+    const { node, publishers } = this.running!;
+    publishers.set(topic, await node.publisher(topic, { type, latched }));
+    for (const [key, { topicOf, value }] of this.unsent) {
+      if (topicOf(this.running!.description.name) !== topic) continue;
+      this.unsent.delete(key);
+      this.publish(topic, value);
+    }
+  }
+
+  private publishWhenOpen(topicOf: UnsentValue["topicOf"], value: unknown): void {
+    const topic = this.running && topicOf(this.running.description.name);
+    if (topic !== undefined && this.running!.publishers.has(topic)) this.publish(topic, value);
+    else this.unsent.set(topicOf(""), { topicOf, value });
+  }
+
+  private publish(topic: string, value: unknown): void {
     try {
-      this.running?.publishers.get(leaf)?.publish(value);
+      this.running?.publishers.get(topic)?.publish(value);
     } catch (error) {
       if (!(error instanceof ClosedError)) throw error;
     }

@@ -1,0 +1,170 @@
+// Messages to a robot: stops are carried out on arrival, before any other message is decoded; everything else waits
+// for its turn.
+import { DecodeError } from "../errors.js";
+import type { Message } from "../messages/message.js";
+import type { Tasks } from "./tasks.js";
+import { asMembers, type Members } from "./text.js";
+
+const MAX_COMMAND_BYTES = 64_000;
+const MAX_BACKLOG = 2000;
+const MAX_BACKLOG_BYTES = 16_000_000;
+const MAX_TURN_MS = 5; // then the sockets are read: a stop may be there
+const END_BYTES = 2048;
+const WARN_INTERVAL_MS = 10_000;
+const ID = /"id"\s*:\s*"([\w .:/-]{1,200})"/;
+const OPERATION = /"op"\s*:\s*"(\w{1,20})"/;
+
+/** Gives the commands of one topic their meaning. */
+export interface Dialect {
+  /** Whether a command stops the robot. */
+  isStop(command: Members): boolean;
+  /** Carry a stop out. */
+  stop(command: Members): void;
+  /** Handle a command; `epoch` is `Tasks.epoch` when it was received. */
+  receive(command: Members, publisher: bigint | undefined, epoch: number): void;
+  /** Answer a command that was not decoded. */
+  refuse(id: string, operation: string, error: string): void;
+}
+
+/** Counts messages to one robot that were not handled, and warns at intervals. */
+export class RejectedMessages {
+  count = 0;
+  private warnedAt = -Infinity;
+
+  constructor(
+    private readonly robot: string,
+    private readonly warn: (message: string) => void,
+  ) {}
+
+  add(topic: string, reason: string): void {
+    this.count++;
+    const now = performance.now();
+    if (now < this.warnedAt + WARN_INTERVAL_MS) return;
+    this.warnedAt = now;
+    this.warn(`${this.robot}: a message on "${topic}" was rejected (${this.count} so far): ${reason}`);
+  }
+}
+
+interface Backlogged {
+  readonly message: Message;
+  readonly use: (members: Members, message: Message) => void;
+}
+
+/** Decodes the messages of one topic in turns that leave room for stops. Bounded. */
+export class MessageQueue {
+  private readonly backlog: Backlogged[] = [];
+  private backlogBytes = 0;
+  private isWorking = false;
+
+  constructor(
+    private readonly topic: string,
+    private readonly tasks: Tasks,
+    private readonly rejected: RejectedMessages,
+    private readonly maxMessageBytes: number,
+  ) {}
+
+  /** Decode a message later and use its members. Returns a sentence if it is too large. */
+  put(message: Message, use: (members: Members, message: Message) => void): string | undefined {
+    const size = message.data.length;
+    if (size > this.maxMessageBytes) {
+      const limit = this.maxMessageBytes / 1000;
+      const error = `the message has ${(size / 1000).toFixed(0)} kB; at most ${limit} kB are read`;
+      this.rejected.add(this.topic, error);
+      return error;
+    }
+    if (this.backlog.length >= MAX_BACKLOG || this.backlogBytes + size > MAX_BACKLOG_BYTES) {
+      this.rejected.add(this.topic, "messages come faster than they are handled");
+      return undefined;
+    }
+    this.backlog.push({ message, use });
+    this.backlogBytes += size;
+    if (!this.isWorking) {
+      this.isWorking = true;
+      setImmediate(() => this.work());
+    }
+    return undefined;
+  }
+
+  private work(): void {
+    const endMs = performance.now() + MAX_TURN_MS;
+    let next = 0;
+    while (next < this.backlog.length && performance.now() < endMs) {
+      const { message, use } = this.backlog[next++]!;
+      this.backlogBytes -= message.data.length;
+      this.tasks.act(() => this.decode(message, use));
+    }
+    this.backlog.splice(0, next);
+    this.isWorking = this.backlog.length > 0;
+    if (this.isWorking) setImmediate(() => this.work());
+  }
+
+  private decode(message: Message, use: Backlogged["use"]): void {
+    let payload: unknown;
+    try {
+      payload = message.payload;
+    } catch (error) {
+      if (!(error instanceof DecodeError)) throw error;
+      this.rejected.add(this.topic, error.message);
+      return;
+    }
+    use(asMembers(payload), message);
+  }
+}
+
+/** Takes the commands of one topic. */
+export class CommandReceiver {
+  private readonly queue: MessageQueue;
+  private readonly stopWords: readonly Buffer[];
+
+  /**
+   * @param stopWords Each command that stops the robot contains one of these texts.
+   * @param queuesStops A stop that was carried out also gets its turn, because `Dialect.receive` answers it.
+   */
+  constructor(
+    topic: string,
+    private readonly tasks: Tasks,
+    private readonly dialect: Dialect,
+    rejected: RejectedMessages,
+    stopWords: readonly string[],
+    private readonly queuesStops = false,
+  ) {
+    this.queue = new MessageQueue(topic, tasks, rejected, MAX_COMMAND_BYTES);
+    this.stopWords = stopWords.map((each) => Buffer.from(JSON.stringify(each).slice(1, -1)));
+  }
+
+  /** Take a message: carry out a stop at once, queue everything else. Throws nothing. */
+  readonly take = (message: Message): void => {
+    const stop = this.stopIn(message);
+    if (stop) this.tasks.act(() => this.dialect.stop(stop));
+    if (stop && !this.queuesStops) return;
+    const { epoch } = this.tasks;
+    const error = this.queue.put(message, (command) => this.dialect.receive(command, message.publisher, epoch));
+    if (error === undefined) return;
+    const [id, operation] = [found(ID, message.data), found(OPERATION, message.data)];
+    if (id && operation === "invoke") this.tasks.act(() => this.dialect.refuse(id, operation, error));
+  };
+
+  private stopIn(message: Message): Members | undefined {
+    if (message.data.length > MAX_COMMAND_BYTES) {
+      if (found(OPERATION, message.data) !== "stop") return undefined;
+      return { op: "stop", id: found(ID, message.data) };
+    }
+    if (!this.stopWords.some((each) => message.data.includes(each))) return undefined;
+    try {
+      const command = asMembers(message.payload);
+      return this.dialect.isStop(command) ? command : undefined;
+    } catch {
+      return undefined; // reported when its turn comes
+    }
+  }
+}
+
+/** The member of a command that is too large to decode, if it is in the first or last 2 kB. */
+function found(pattern: RegExp, data: Buffer): string {
+  const ends = [data.subarray(0, END_BYTES), data.subarray(-END_BYTES)];
+  for (const each of ends) {
+    const match = pattern.exec(each.toString("latin1"));
+    if (match) return match[1]!;
+  }
+  return "";
+}
