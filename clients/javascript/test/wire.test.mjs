@@ -314,3 +314,44 @@ test("images keep their bytes and shape", () => {
   assert.deepEqual(codec.encode(jpeg).extension, { shape: [16, 32, 3], encoding: "jpeg" });
   assert.throws(() => codec.decode(Buffer.from("none"), {}), { name: "DecodeError" });
 });
+
+test("lists of numbers have the JSON of JSON.stringify", () => {
+  const list = (next) => Array.from({ length: 200 }, (_, index) => next(index));
+  const random = (index) => {
+    const decimals = 10 ** (index % 8);
+    return Math.round((Math.random() - 0.5) * 10 ** (index % 15)) / decimals;
+  };
+  const payloads = [
+    list(random),
+    list((index) => index - 100),
+    list(() => Math.random()),
+    list(() => -0),
+    [...list(random), 1e-6, 1e-7, 1.5e9, 2 ** 53, 999_999_999.999_999, 0.999_999_9, NaN, -Infinity, 7],
+    [...list(random), "text", null, undefined, 1],
+    list((index) => (index === 7 ? undefined : index)),
+    { name: 'quoted "é"', stamp: 1.25, ranges: list(random), "7": null, nested: { x: [1] }, last: list(random) },
+    { gone: undefined, ranges: list(random) },
+    { date: new Date(0), ranges: list(random) },
+    Object.assign(list(random), { toJSON: () => "replaced" }),
+    { ranges: new Array(200) },
+  ];
+  const { encode, decode } = codecFor("json");
+  for (const payload of payloads) assert.equal(encode(payload).data.toString(), JSON.stringify(payload));
+  assert.equal(encode({ ranges: [...list(random), NaN], low: -Infinity }).nonFinite, 2);
+  assert.throws(() => encode({ ranges: list(random), wide: 1n }), { name: "EncodeError" });
+  const own = list(random);
+  const first = encode(own).data;
+  encode(list(random));
+  assert.deepEqual(decode(first, {}), JSON.parse(JSON.stringify(own)), "a message that waits is not overwritten by the next one");
+});
+
+test("received bytes are published again without a copy, and a program's own bytes with one", () => {
+  for (const [type, large] of [["bytes", Buffer.alloc(100_000)], ["image", Buffer.alloc(100_000, "\xff\xd8\xff", "latin1")]]) {
+    const { encode, decode } = codecFor(type);
+    const { data, extension } = encode(large);
+    assert.notEqual(data, large);
+    const payload = decode(data, extension ?? {});
+    assert.equal(encode(payload).data, data);
+    assert.notEqual(encode(Buffer.from(large)).data, large);
+  }
+});

@@ -2,8 +2,9 @@
 import { DecodeError, EncodeError } from "../errors.js";
 import type { Extension } from "../wire/extension.js";
 import { decodeUtf8 } from "../wire/utf8.js";
-import { copied } from "./copying.js";
+import { copied, isShared, shared } from "./copying.js";
 import { decodeImage, encodeImage } from "./image.js";
+import { encodeJson } from "./json_text.js";
 import { countNonFinite, isTooDeep, MAX_LEVELS } from "./nesting.js";
 import { pack, unpack, withWideIntegers } from "./packing.js";
 
@@ -31,16 +32,15 @@ const json: Codec = {
   name: "json",
   number: 1,
   encode(payload) {
-    let text: string | undefined;
+    let data: Buffer | undefined;
     try {
-      text = JSON.stringify(payload);
+      data = encodeJson(payload);
     } catch (error) {
       throw new EncodeError(`The payload has no form in JSON: ${(error as Error).message}`);
     }
-    if (text === undefined) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
-    if (text.length > 2 * MAX_LEVELS && isTooDeep(payload))
+    if (!data) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
+    if (data.length > 2 * MAX_LEVELS && isTooDeep(payload))
       throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
-    const data = Buffer.from(text, "utf8");
     const nonFinite = data.includes(NULL) ? countNonFinite(payload) : 0;
     return { data, nonFinite };
   },
@@ -80,7 +80,7 @@ const bytes: Codec = {
     return { data: copyOf(payload) };
   },
   decode(data) {
-    return data;
+    return shared(data);
   },
 };
 
@@ -121,6 +121,7 @@ export function codecNumbered(number: number): Codec | undefined {
 
 /** Return a copy: the caller may go on writing into its own bytes while the message is queued. */
 export function copyOf(payload: unknown): Buffer {
+  if (isShared(payload)) return payload;
   if (ArrayBuffer.isView(payload))
     return copied(new Uint8Array(payload.buffer, payload.byteOffset, payload.byteLength));
   if (payload instanceof ArrayBuffer || payload instanceof SharedArrayBuffer) return copied(new Uint8Array(payload));

@@ -1,6 +1,6 @@
 /** Pictures: JPEG or PNG files and raw pixels with their shape. The bytes are neither encoded nor decoded here. */
 import { DecodeError, EncodeError } from "../errors.js";
-import { copied } from "./copying.js";
+import { copied, isShared, shared } from "./copying.js";
 import type { Extension } from "../wire/extension.js";
 
 /** A picture as it is published and received on topics of type `image`. */
@@ -56,7 +56,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
       'A topic of type "image" takes the bytes of a JPEG or PNG file, or {data, encoding, shape}.',
     );
   }
-  const data = copied(image.data);
+  const data = isShared(image.data) ? image.data : copied(image.data);
   const kind = fileKind(data);
   if (kind) {
     const shape = image.shape ?? (kind === "png" ? pngShape(data) : jpegShape(data));
@@ -73,6 +73,7 @@ export function encodeImage(payload: unknown): { data: Buffer; extension: Extens
 
 /** Read an {@link Image}: of files, the bytes decide what they are. @throws {DecodeError} */
 export function decodeImage(data: Buffer, extension: Extension): Image {
+  shared(data);
   const shape = readShape(extension["shape"]);
   const kind = fileKind(data);
   if (kind) return { data, encoding: kind, ...(shape && { shape }) };
