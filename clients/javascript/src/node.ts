@@ -26,6 +26,7 @@ import type { Hold } from "./sockets/socket.js";
 import { MASTER_WAIT_S, MasterSession } from "./session/master_session.js";
 import { hostOf, LOOPBACK, masterAddress } from "./system/addresses.js";
 import { nowNs } from "./system/clock.js";
+import { computerId } from "./system/computer.js";
 import { idFrom, newKey, nodeIdFrom } from "./wire/ids.js";
 import { checkNodeName, checkTopic } from "./wire/names.js";
 import { isPattern } from "./wire/pattern.js";
@@ -102,6 +103,7 @@ export class Node extends EventEmitter<{ warning: [string] }> {
       language: "JavaScript",
       since_ns: nowNs(),
       key,
+      computer: computerId(),
     };
     openNodes.add(this);
   }

@@ -1,9 +1,14 @@
+import { driftNs, type PublisherClock } from "./clocks.js";
+import { nowNs, steadyNs } from "../system/clock.js";
 import { type Codec } from "./codecs.js";
 import type { Extension } from "../wire/extension.js";
+
+const NOT_COMPARED: PublisherClock = { difference: undefined };
 
 /** A received message. */
 export class Message<T = unknown> {
   private decoded: { readonly value: T } | undefined;
+  private seenNs: bigint | undefined;
 
   /** @internal */
   constructor(
@@ -23,6 +28,7 @@ export class Message<T = unknown> {
     readonly extension: Extension,
     /** Whether the publisher keeps it for late subscribers. */
     readonly latched: boolean,
+    private readonly clock = NOT_COMPARED,
   ) {}
 
   /** `json`, `string`, `bytes`, `msgpack` or `image`. */
@@ -33,6 +39,24 @@ export class Message<T = unknown> {
   /** When it was published, by the publisher's clock. */
   get date(): Date {
     return new Date(Number(this.stampNs / 1_000_000n));
+  }
+
+  /**
+   * Seconds from its publication until this was first asked for; ask as soon as a message arrives.
+   *
+   * Between two computers it is corrected by the difference of their clocks, so it may be a little below 0.
+   */
+  get latencyS(): number {
+    this.seenNs ??= nowNs();
+    return Number(this.seenNs - this.stampNs - (this.clock.difference?.addNs ?? 0n)) / 1e9;
+  }
+
+  /** By how many seconds `latencyS` may be wrong because clocks differ: 0 on one computer, undefined if nobody has compared them. */
+  get latencyUncertaintyS(): number | undefined {
+    const { difference } = this.clock;
+    if (!difference) return undefined;
+    const { uncertaintyNs, knownAtNs } = difference;
+    return Number(uncertaintyNs + (knownAtNs === undefined ? 0n : driftNs(steadyNs() - knownAtNs))) / 1e9;
   }
 
   /** The decoded payload. @throws {DecodeError} if it is none of its codec. */

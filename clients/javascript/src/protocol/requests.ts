@@ -18,6 +18,8 @@ export interface NodeRecord {
   readonly since_ns: bigint;
   /** Random text that proves the id; only the node and its master know it. */
   readonly key: string;
+  /** The same for programs that read the same clock. */
+  readonly computer?: string;
 }
 
 export interface PublisherRecord {
@@ -78,6 +80,8 @@ export type Request =
       readonly publishers: readonly PublisherCount[];
       readonly subscribers: readonly SubscriberCount[];
       readonly cpu_ratio?: number;
+      /** Offset to the master's clock and its uncertainty, in nanoseconds; empty while unknown. */
+      readonly clock?: readonly bigint[];
     }
   | {
       readonly do: "missing";
@@ -95,7 +99,10 @@ export interface RemotePublisher {
   readonly codec: string;
   readonly endpoints: readonly string[];
   readonly history: number;
+  readonly nodeId: string;
   readonly nodeName: string;
+  /** Its node's computer; empty if unknown. */
+  readonly computer: string;
 }
 
 /** A subscriber that a new publisher waits for. */
@@ -133,6 +140,10 @@ export type Answer = FromMaster &
         readonly lastSeqs: ReadonlyMap<bigint, bigint>;
         readonly hosts: string[];
         readonly nextS: number;
+        /** When the master received and answered the renewal, by its clock. */
+        readonly times: readonly bigint[];
+        /** By node: what to add to its clock for this node's, and the uncertainty. */
+        readonly clocks: ReadonlyMap<string, readonly bigint[]>;
       }
     | { readonly is: "refused"; readonly reason: string; readonly code: string }
     | {
@@ -208,6 +219,8 @@ function readAnswer(name: string, what: Fields): Answer | undefined {
         lastSeqs: what.integers("last_seqs"),
         hosts: what.texts("hosts"),
         nextS: what.number("next_s", 1),
+        times: what.integerList("times"),
+        clocks: what.integerLists("clocks"),
       };
     case "refused":
       return { is: name, ...common, reason: what.text("reason"), code: what.text("code", "") };
@@ -240,7 +253,9 @@ function readRemote(each: Fields): RemotePublisher {
     codec: record.text("codec"),
     endpoints: record.texts("endpoints"),
     history: Number(record.integer("history", 0n)),
+    nodeId: each.text("node_id"),
     nodeName: each.text("node_name"),
+    computer: each.text("computer", ""),
   };
 }
 
@@ -302,6 +317,21 @@ class Fields {
       found.set(BigInt(key), BigInt(value as number | bigint));
     }
     return found;
+  }
+
+  integerList(name: string): bigint[] {
+    return this.asIntegers(name, this.list(name));
+  }
+
+  integerLists(name: string): Map<string, bigint[]> {
+    const values = this.typed<Record<string, unknown>>(name, {}, isMap);
+    return new Map(Object.entries(values).map(([key, value]) => [key, this.asIntegers(name, value)]));
+  }
+
+  private asIntegers(name: string, values: unknown): bigint[] {
+    const isRight = Array.isArray(values) && values.every((each) => typeof each === "bigint" || Number.isInteger(each));
+    if (!isRight) throw this.misfit(name);
+    return (values as (number | bigint)[]).map(BigInt);
   }
 
   private list(name: string): unknown[] {

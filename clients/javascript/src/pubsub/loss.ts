@@ -1,5 +1,8 @@
 /** The publishers that a subscriber hears, and how many of their messages were lost. No sockets. */
 import { WireError } from "../errors.js";
+import { type ClockDifference, type PublisherClock, SAME_CLOCK } from "../messages/clocks.js";
+import { isLoopback } from "../system/addresses.js";
+import { computerId } from "../system/computer.js";
 import type { ReachablePublisher } from "../session/master_session.js";
 
 const FAREWELL_MS = 3000; // so long after a publisher has unregistered its last messages may still come
@@ -12,6 +15,8 @@ const MAX_RECONNECT_MS = 30_000;
 /** One publisher. */
 export class Source {
   remote: ReachablePublisher | undefined;
+  /** Its computer's clock. */
+  readonly clock: PublisherClock = { difference: undefined };
   /** Where it is connected. */
   endpoint: string | undefined;
   /** Whether something was received since it was connected to `endpoint`. */
@@ -56,6 +61,7 @@ export class Sources {
   received = 0;
   lost = 0;
   readonly byId = new Map<bigint, Source>();
+  private clocks: ReadonlyMap<string, ClockDifference> = new Map();
   private readonly unlisted = new Set<bigint>();
 
   /** The source of this id, made when it is new; the oldest that no master lists may go for it. */
@@ -78,8 +84,19 @@ export class Sources {
   listed(remote: ReachablePublisher): Source {
     const source = this.get(remote.id);
     source.remote = remote;
+    source.clock.difference = this.differenceTo(remote);
     this.unlisted.delete(remote.id);
     return source;
+  }
+
+  /** By node: how the clocks of other computers differ from this one's. No others are known. */
+  correct(clocks: ReadonlyMap<string, ClockDifference>): void {
+    this.clocks = clocks;
+    for (const { remote, clock } of this.byId.values()) if (remote) clock.difference = this.differenceTo(remote);
+  }
+
+  private differenceTo(remote: ReachablePublisher): ClockDifference | undefined {
+    return isHere(remote) ? SAME_CLOCK : this.clocks.get(remote.nodeId);
   }
 
   remove(id: bigint): Source | undefined {
@@ -208,4 +225,11 @@ export class Sources {
       source.isLapsed && id !== remote.id && source.remote?.nodeName === remote.nodeName;
     return [...this.byId].filter(isReplaced).map(([id]) => id);
   }
+}
+
+/** Whether a publisher is on this computer; of one that doesn't tell, its endpoint says so. */
+function isHere({ computer, endpoint }: ReachablePublisher): boolean {
+  const own = computerId();
+  if (own && computer) return own === computer;
+  return endpoint !== undefined && isLoopback(endpoint.slice("tcp://".length));
 }

@@ -1,6 +1,7 @@
 import { ClosedError, DecodeError } from "../errors.js";
 import type { Message } from "../messages/message.js";
 import { problemText, type SubscriberCount } from "../protocol/requests.js";
+import type { ClockDifference } from "../messages/clocks.js";
 import type { ReachablePublisher, SessionSubscriber } from "../session/master_session.js";
 import type { Hold } from "../sockets/socket.js";
 import { isPattern } from "../wire/pattern.js";
@@ -77,6 +78,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   private readonly readers = new Map<string, TopicReader>();
   private readonly original: OriginalReader | undefined;
   private readonly inbox: Inbox;
+  private clocks: ReadonlyMap<string, ClockDifference> = new Map();
   private readonly readerHost: TopicReaderHost;
   private readonly waiters: ((message: Message<T> | undefined) => void)[] = [];
   private onGreeted: (() => void) | undefined;
@@ -210,6 +212,7 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
     let reader = this.readers.get(topic);
     if (!reader) {
       reader = new TopicReader(this.spec.id, topic, this.type, this.readerHost);
+      reader.sources.correct(this.clocks);
       this.readers.set(topic, reader);
     }
     return reader;
@@ -373,6 +376,12 @@ export class Subscriber<T = unknown> implements AsyncIterable<Message<T>>, Sessi
   /** @internal */
   gone(id: bigint, lastSeq: bigint, isClosed: boolean): void {
     for (const each of this.readers.values()) each.gone(id, lastSeq, isClosed);
+  }
+
+  /** @internal */
+  correct(clocks: ReadonlyMap<string, ClockDifference>): void {
+    this.clocks = clocks;
+    for (const each of this.readers.values()) each.sources.correct(clocks);
   }
 
   /** @internal */

@@ -157,11 +157,12 @@ export class TopicReader {
     }
     if (!isAlone && this.sources.isEarly(publisher)) return;
     if (!this.sources.arrived(publisher, seq, isAlone)) return;
-    const type = this.sources.byId.get(publisher)?.remote?.msgType ?? this.type;
+    const source = this.sources.byId.get(publisher);
+    const type = source?.remote?.msgType ?? this.type;
     const codec = codecNumbered(header.codec)!;
     const isLatched = (flags & Flag.LATCHED) !== 0;
     this.host.onMessage(
-      new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched),
+      new Message(this.topic, payload, codec, type, seq, header.stampNs, publisher, extension, isLatched, source?.clock),
       this,
     );
   }

@@ -1,3 +1,4 @@
+import { type ClockDifference, toldDifference } from "../messages/clocks.js";
 import { MasterUnreachableError, NepError } from "../errors.js";
 import type {
   Answer,
@@ -11,6 +12,7 @@ import type {
 } from "../protocol/requests.js";
 import { hostTowards, isLoopback, LOOPBACK, nearestEndpoint } from "../system/addresses.js";
 import { matchesPattern } from "../wire/pattern.js";
+import { ClockSamples, type Moment } from "./clock_samples.js";
 import { RpcClient } from "./rpc.js";
 
 const RENEW_S = 1;
@@ -19,6 +21,7 @@ const ANSWER_MS = 1000; // a renewal without an answer is sent again after this,
 const RESEND_MS = 300; // ... then at this interval, ...
 const RECONNECT_MS = 3000; // ... and over a new connection when nothing was heard for so long
 const JOIN_AGAIN_MS = 500;
+const MAX_TIMED_RENEWALS = 8;
 const MAX_CPU_RATIO = 1024;
 /** How long `publisher` and `subscriber` wait for a master before they fail or warn. */
 export const MASTER_WAIT_S = 2;
@@ -42,6 +45,8 @@ export interface SessionSubscriber {
   reconcile(topic: string, remotes: readonly ReachablePublisher[]): void;
   /** A publisher is not listed any more. */
   gone(id: bigint, lastSeq: bigint, isClosed: boolean): void;
+  /** By node: how the clocks of other computers differ from this one's. No others are known. */
+  correct?(clocks: ReadonlyMap<string, ClockDifference>): void;
   /** Called with each renewal: the newest messages of publishers that the master knows. */
   tick(lastSeqs: ReadonlyMap<bigint, bigint>): void;
 }
@@ -76,6 +81,10 @@ export class MasterSession {
   private ownHost = LOOPBACK;
   private movedTo = "";
   private isClosed = false;
+  private readonly clock = new ClockSamples();
+  private clocks: ReadonlyMap<string, ClockDifference> = new Map();
+  /** When the newest renewals were sent, by call. */
+  private readonly renewals = new Map<number, Moment>();
   private cpu = process.cpuUsage();
   private cpuAt = performance.now();
 
@@ -87,7 +96,7 @@ export class MasterSession {
   ) {
     this.rpc = new RpcClient(
       address,
-      (answer) => this.obey(answer),
+      (answer, call) => this.obey(answer, call),
       (error) => warn(error.message),
       isHeld,
     );
@@ -233,7 +242,9 @@ export class MasterSession {
     if (!this.isKnown) return;
     const confirmed = <R, T>(registry: Map<bigint, Registered<R, T>>): T[] =>
       [...registry.values()].filter((each) => each.isConfirmed).map((each) => each.owner);
-    this.rpc.tell({
+    const clock = this.clock.offset();
+    if (clock.length === 0) this.correct(new Map()); // also when this computer's clock was set
+    const call = this.rpc.tell({
       do: "renew",
       node_id: this.node.id,
       epoch: this.epoch,
@@ -241,7 +252,10 @@ export class MasterSession {
       publishers: confirmed(this.publishers).map((each) => each.counts()),
       subscribers: confirmed(this.subscribers).map((each) => each.counts()),
       cpu_ratio: this.cpuRatio(),
+      clock,
     });
+    this.renewals.set(call, this.clock.now());
+    if (this.renewals.size > MAX_TIMED_RENEWALS) this.renewals.delete(this.renewals.keys().next().value!);
   }
 
   private cpuRatio(): number {
@@ -274,7 +288,8 @@ export class MasterSession {
 
   // ---- what the master says
 
-  private obey(answer: Answer): void {
+  private obey(answer: Answer, call: number): void {
+    this.compareClocks(answer, call);
     if ("hosts" in answer && String(answer.hosts) !== String(this.servedHosts)) {
       this.servedHosts = answer.hosts;
       void this.followHosts();
@@ -298,6 +313,21 @@ export class MasterSession {
     if (this.isKnown && answer.epoch !== this.epoch) this.join();
   }
 
+  private compareClocks(answer: Answer, call: number): void {
+    const sent = this.renewals.get(call);
+    this.renewals.delete(call);
+    if (!sent || answer.is !== "renewed" || answer.epoch !== this.epoch || answer.times.length !== 2) return;
+    const wasKnown = this.clock.offset().length > 0;
+    const [receivedNs, answeredNs] = answer.times as [bigint, bigint];
+    if (this.clock.add(sent, receivedNs, answeredNs) && !wasKnown) setImmediate(() => this.renew()); // others wait for it
+  }
+
+  private correct(clocks: ReadonlyMap<string, ClockDifference>): void {
+    if (clocks.size === 0 && this.clocks.size === 0) return;
+    this.clocks = clocks;
+    for (const { owner } of this.subscribers.values()) owner.correct?.(clocks);
+  }
+
   private publisherCame(remote: ReachablePublisher, isNew: boolean): void {
     for (const { owner, isConfirmed } of this.subscribersOf(remote.topic)) owner.connect([remote], isNew && isConfirmed);
   }
@@ -314,6 +344,8 @@ export class MasterSession {
       const remotes = each.publishers.map((remote) => this.inReach(remote));
       for (const { owner } of this.subscribersOf(each.topic)) owner.reconcile(each.topic, remotes);
     }
+    const clocks = [...answer.clocks].map(([id, told]) => [id, toldDifference(told)] as const);
+    this.correct(new Map(clocks.filter((each): each is [string, ClockDifference] => each[1] !== undefined)));
     this.tickAfter(this.renewS * 1000);
     for (const each of this.subscribers.values()) each.owner.tick(answer.lastSeqs);
   }
@@ -346,6 +378,7 @@ export class MasterSession {
   private joined(found: Found, registered: { isConfirmed: boolean }[]): void {
     this.epoch = found.epoch;
     this.revision = found.revision;
+    this.clock.forget(); // the master may be on another computer now
     this.joinAgainAt = -Infinity;
     for (const each of registered) each.isConfirmed = true;
     const byTopic = new Map<string, ReachablePublisher[]>();

@@ -24,7 +24,7 @@ export class RpcClient {
 
   constructor(
     readonly address: string,
-    private readonly onAnswer: (answer: Answer) => void,
+    private readonly onAnswer: (answer: Answer, call: number) => void,
     private readonly onRefused: (error: WireError) => void,
     private readonly isHeld: () => boolean,
   ) {
@@ -52,9 +52,11 @@ export class RpcClient {
     for (const [call, each] of this.pending) this.socket.send([encodeRequest(each.request, call)]);
   }
 
-  /** Send a request whose answer only reaches `onAnswer`. */
-  tell(request: Request): void {
-    if (!this.isClosed) this.socket.send([encodeRequest(request, this.nextCall++)]);
+  /** Send a request whose answer only reaches `onAnswer`. Returns the number of the call. */
+  tell(request: Request): number {
+    const call = this.nextCall++;
+    if (!this.isClosed) this.socket.send([encodeRequest(request, call)]);
+    return call;
   }
 
   /**
@@ -104,7 +106,7 @@ export class RpcClient {
       return;
     }
     this.heardAt = performance.now();
-    this.onAnswer(read.answer);
+    this.onAnswer(read.answer, read.call);
     const pending = this.pending.get(read.call);
     if (!pending) return;
     this.pending.delete(read.call);

@@ -1,20 +1,25 @@
-const RESET_NS = 2_000_000n;
-const CHECK_NS = 1_000_000_000n;
+const MS = 1_000_000n;
+const CHECK_NS = 20_000_000n;
 
-let offsetNs = BigInt(Date.now()) * 1_000_000n - process.hrtime.bigint();
-let checkAtNs = process.hrtime.bigint() + CHECK_NS;
+let offsetNs = BigInt(Math.round(performance.timeOrigin * 1e6)) + BigInt(Math.round(performance.now() * 1e6)) - steadyNs();
+let checkAtNs = 0n;
+
+/** Return nanoseconds of a clock that nobody sets. */
+export function steadyNs(): bigint {
+  return process.hrtime.bigint();
+}
 
 /**
- * Return the time in nanoseconds since 1970. `Date.now()` has milliseconds only, so this adds the steady clock
- * to an offset, which follows when somebody sets the computer's clock.
+ * Return the time in nanoseconds since 1970. `Date.now()` has only full milliseconds, so this adds the steady clock
+ * to an offset, which follows when the computer's clock is set or adjusted.
  */
 export function nowNs(): bigint {
-  const steadyNs = process.hrtime.bigint();
-  if (steadyNs >= checkAtNs) {
-    checkAtNs = steadyNs + CHECK_NS;
-    const exactNs = BigInt(Date.now()) * 1_000_000n - steadyNs;
-    const driftNs = exactNs - offsetNs;
-    if (driftNs > RESET_NS || driftNs < -RESET_NS) offsetNs = exactNs;
+  const now = steadyNs();
+  if (now >= checkAtNs) {
+    checkAtNs = now + CHECK_NS;
+    const leastNs = BigInt(Date.now()) * MS - now; // the time is within this millisecond
+    if (offsetNs < leastNs) offsetNs = leastNs;
+    else if (offsetNs > leastNs + MS) offsetNs = leastNs + MS;
   }
-  return steadyNs + offsetNs;
+  return now + offsetNs;
 }
