@@ -11,6 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 if sys.platform != "win32":
     import fcntl
@@ -64,11 +65,12 @@ def _compiled(name: str, files: list[Path], options: tuple[str, ...]) -> Path:
 class MonoProgram:
     """Running C# program that reads and writes lines."""
 
-    def __init__(self, path: Path, *args: str, **environment: str) -> None:
+    def __init__(self, path: Path, *args: str, stderr: IO[str] | None = None, **environment: str) -> None:
         self.process = subprocess.Popen(
             ["mono", str(path), *args],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=stderr,
             encoding="utf-8",
             env={**os.environ, "MONO_PATH": str(BUILD), **environment},
         )
@@ -118,9 +120,11 @@ class MonoProgram:
 
 
 @contextmanager
-def running(path: Path, *args: str, **environment: str) -> Iterator[MonoProgram]:
+def running(
+    path: Path, *args: str, stderr: IO[str] | None = None, **environment: str
+) -> Iterator[MonoProgram]:
     """Run a program, and kill it at the end."""
-    started = MonoProgram(path, *args, **environment)
+    started = MonoProgram(path, *args, stderr=stderr, **environment)
     try:
         yield started
     finally:

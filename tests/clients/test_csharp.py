@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import zmq
 
 import nep
 from nep.masters.master import Master
+from nep.masters.process import view
 from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, ROOT, WITHOUT, MonoProgram, program, running
 from tests.nep.backends.test_unheard_publishers import UnreachablePublisher
 from tests.nep.masters.test_attacks import attacker_at
@@ -269,6 +271,43 @@ def test_master_restart_under_traffic_loses_nothing(monkeypatch: pytest.MonkeyPa
                 counts = adapter.ask("counts", sub=sub)
                 assert (counts["lost"], subscriber.lost) == ("0", 0)
                 eventually(lambda: adapter.ask("counts", sub=sub)["received"] == str(publisher.count))
+
+
+def test_foreign_program_at_the_masters_address_is_named_and_the_master_found_later(tmp_path: Path) -> None:
+    """In the exception, and once in the log until a master has answered."""
+    with Master("127.0.0.1:0") as free:
+        address = free.address
+    adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
+    log = tmp_path / "log"
+    with (
+        log.open("w+") as stderr,
+        running(
+            adapter_program, stderr=stderr, NEP_MASTER=address, MONO_TRACE_LISTENER="Console.Error"
+        ) as started,
+    ):
+        adapter = Adapter(started)
+        adapter.ask("node", name="csharp")
+        with foreign_socket(zmq.PULL, address):
+            assert "(it is a PULL socket)" in adapter.refused("publisher", topic="t", type="json")
+        with foreign_socket(zmq.REP, address):
+            assert "did not answer" in adapter.refused("publisher", topic="t", type="json")
+        with Master(address, learn_s=0.0) as master:
+            adapter.ask("publisher", topic="t", type="json")
+            assert [each.name for each in view(master.address).nodes.values()] == ["csharp"]
+        with foreign_socket(zmq.PUB, address):
+            eventually(lambda: "(it is a PUB socket)" in log.read_text())
+        with Master(address, learn_s=0.0) as master:
+            eventually(lambda: "csharp" in {each.name for each in view(master.address).nodes.values()})
+    assert len(log.read_text().splitlines()) == 2
+
+
+@contextmanager
+def foreign_socket(kind: int, address: str) -> Iterator[None]:
+    """Bind a socket of another program at an address."""
+    with zmq.Context() as context, context.socket(kind) as made:
+        made.linger = 0
+        made.bind(f"tcp://{address}")
+        yield
 
 
 def names(node: Node) -> set[str]:

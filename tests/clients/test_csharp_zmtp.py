@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import random
 import socket
-from collections.abc import Iterator
-from contextlib import ExitStack
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, suppress
 
 import pytest
 import zmq
 
 from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program
+from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(not HAS_MONO, reason=WITHOUT)
+LONG_S = 20.0
+Context = zmq.Context[zmq.Socket[bytes]]
 TOPIC = b"example\0"
 LAST = b"\xffhello3/0000000000000001/example"
 
@@ -22,7 +27,7 @@ def peer(*args: str) -> MonoProgram:
 
 
 @pytest.fixture
-def context() -> Iterator[zmq.Context[zmq.Socket[bytes]]]:
+def context() -> Iterator[Context]:
     with zmq.Context() as made:
         made.linger = 0
         yield made
@@ -40,7 +45,7 @@ def started(stack: ExitStack, *args: str) -> MonoProgram:
     return made
 
 
-def bound(context: zmq.Context[zmq.Socket[bytes]], kind: int) -> tuple[zmq.Socket[bytes], str]:
+def bound(context: Context, kind: int) -> tuple[zmq.Socket[bytes], str]:
     made = context.socket(kind)
     made.rcvtimeo = 20_000
     port = made.bind_to_random_port("tcp://127.0.0.1")
@@ -220,6 +225,128 @@ def test_mutated_peers_do_not_stop_the_socket(context, stack: ExitStack) -> None
     while not (lines := xpub.line()).startswith("refused"):
         pass
     assert "unexpected" not in lines
+
+
+class ForeignServer:
+    """Program at a port that is no peer: sends fixed bytes on each connection, then waits or closes it."""
+
+    def __init__(self, port: int, answer: bytes, *, waits: bool) -> None:
+        self._answer = answer
+        self._waits = waits
+        self.accepted: list[socket.socket] = []
+        self._server = socket.create_server(("127.0.0.1", port))
+        self.port = self._server.getsockname()[1]
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                connection = self._server.accept()[0]
+            except OSError:
+                return  # it was shut down
+            self.accepted.append(connection)
+            with suppress(OSError):
+                connection.sendall(self._answer)
+            if not self._waits:
+                connection.close()
+
+    def close(self) -> None:
+        self._server.shutdown(socket.SHUT_RDWR)
+        self._thread.join()
+        for each in (*self.accepted, self._server):
+            each.close()
+
+
+class ForeignSocket:
+    """Socket of libzmq at a port that is no peer."""
+
+    def __init__(self, port: int, kind: int, mechanism: str = "NULL") -> None:
+        self._context: Context = zmq.Context()
+        self._socket = self._context.socket(kind)
+        if mechanism == "CURVE":
+            self._socket.curve_server = True
+            self._socket.curve_publickey, self._socket.curve_secretkey = zmq.curve_keypair()
+        if mechanism == "PLAIN":
+            self._socket.plain_server = True
+        self._socket.bind(f"tcp://127.0.0.1:{port}")
+
+    def close(self) -> None:
+        self._context.destroy(linger=0)  # which waits until the port is free
+
+
+def foreign_programs(own: str) -> Iterator[tuple[str, Callable[[int], ForeignServer | ForeignSocket]]]:
+    """Yield what a client says about each program that is no peer, and a function that starts it."""
+    kinds = {"dealer": ("PUB", "PULL", "PAIR"), "sub": ("REP", "PULL", "ROUTER")}[own]
+    for kind in kinds:
+        yield (
+            f"it is a {kind} socket",
+            lambda port, kind=kind: ForeignSocket(port, getattr(zmq, kind)),
+        )
+    for mechanism in ("CURVE", "PLAIN"):
+        yield (
+            "it closed the connection during the handshake",
+            lambda port, mechanism=mechanism: ForeignSocket(port, zmq.XPUB, mechanism),
+        )
+    for said, answer, waits in (
+        ("it closed the connection", b"", False),
+        ("it closed the connection", GREETING, False),
+        ("it uses the security mechanism CURVE", GREETING.replace(b"NULL\0", b"CURVE"), True),
+        ("it uses an unknown security mechanism", GREETING.replace(b"NULL", b"\nABC"), True),
+        ("it does not speak ZMTP", b"HTTP/1.1 400 Bad Request\r\n\r\n" + bytes(60), False),
+        ("it does not speak ZMTP", b"SSH-2.0-OpenSSH\r\n", True),
+        ("it sent nothing", b"", True),
+        ("it sent half a handshake", GREETING, True),
+        ("it speaks a version of ZMTP before 3", GREETING.replace(b"\x03\x00NULL", b"\x01\x00NULL"), True),
+        ("it reports an error: too?hot", GREETING + b"\x04\x0e\x05ERROR\x07too\nhot", True),
+        ("it sent a malformed handshake", GREETING + b"\x00\x01x", True),
+        ("it sent a malformed handshake", GREETING + READY.replace(b"\0\0\0\x03", b"\0\0\0\x09"), True),
+    ):
+        yield said, lambda port, answer=answer, waits=waits: ForeignServer(port, answer, waits=waits)
+
+
+@pytest.mark.parametrize(("own", "real"), [("dealer", zmq.DEALER), ("sub", zmq.XPUB)])
+def test_client_names_foreign_programs_and_finds_the_real_one_later(
+    context: Context, stack: ExitStack, own: str, real: int
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    options = ("handshake_ms=50", "reconnect_ms=10")
+    endpoint = f"tcp://127.0.0.1:{port}"
+    if own == "dealer":
+        client = started(stack, "dealer", endpoint, *options)
+    else:
+        client = started(stack, "sub", *options)
+        client.say(f"connect {endpoint}")
+        client.say(f"subscribe {TOPIC.hex()}")
+    for said, start in foreign_programs(own):
+        with closing(start(port)) as foreign:
+            eventually(lambda said=said: client.ask("problem").startswith(f"problem {said}"))
+            if isinstance(foreign, ForeignServer):  # libzmq doesn't tell
+                eventually(lambda accepted=foreign.accepted: len(accepted) > 2)
+    with context.socket(real) as found:
+        found.bind(endpoint)
+        found.rcvtimeo = int(LONG_S * 1000)
+        if own == "dealer":
+            assert client.line() == "connected"
+        else:
+            assert found.recv() == b"\1" + TOPIC
+        assert client.ask("problem") == "problem "
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [b"", GREETING + READY.replace(b"\x03SUB", b"\x03PUB")],
+    ids=["at once", "after the handshake"],
+)
+def test_waits_grow_while_a_program_closes_each_connection(stack: ExitStack, answer: bytes) -> None:
+    foreign = ForeignServer(0, answer, waits=False)
+    stack.callback(foreign.close)
+    sub = started(stack, "sub")
+    began = time.monotonic()
+    sub.say(f"connect tcp://127.0.0.1:{foreign.port}")
+    eventually(lambda: len(foreign.accepted) == 5)
+    assert time.monotonic() - began >= (0.05 + 0.1 + 0.2 + 0.4) * 7 / 8
 
 
 def test_silent_peer_is_disconnected_and_answering_peer_is_kept(context, stack: ExitStack) -> None:

@@ -1,5 +1,4 @@
 using System;
-using System.Globalization;
 
 namespace Nep
 {
@@ -23,9 +22,7 @@ namespace Nep
     /// <summary>No master answered within the timeout.</summary>
     public sealed class MasterUnreachableException : NepException
     {
-        internal MasterUnreachableException(string address, double timeoutS)
-            : base(string.Format(CultureInfo.InvariantCulture,
-                "No master answered at {0} within {1:0.#} s. Start one with 'nep master', or set NEP_MASTER to its address.", address, timeoutS))
+        internal MasterUnreachableException(string address, string message) : base(message)
         {
             Address = address;
         }

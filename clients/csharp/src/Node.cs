@@ -392,7 +392,7 @@ namespace Nep
             }
             else
             {
-                Trace.TraceError("NEP: a callback failed: " + exception);
+                Log.Warning("A callback failed: " + exception);
             }
         }
 

@@ -1,6 +1,7 @@
 using System;
 using System.Collections.Generic;
 using System.Diagnostics;
+using System.Globalization;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -76,7 +77,7 @@ namespace Nep.Session
                     if (_isClosed || timeoutMs >= 0 && nowMs >= timeoutMs)
                     {
                         _calls.Remove(call.Number);
-                        throw new MasterUnreachableException(_address, Math.Max(0, timeoutMs) / 1000.0);
+                        throw new MasterUnreachableException(_address, Unreached(timeoutMs));
                     }
                     if (_isConnected && nowMs >= sendAtMs)
                     {
@@ -133,6 +134,20 @@ namespace Nep.Session
                 _isClosed = true;
                 Monitor.PulseAll(_lock);
             }
+        }
+
+        private string Unreached(int timeoutMs)
+        {
+            string seconds = (Math.Max(0, timeoutMs) / 1000.0).ToString("0.#", CultureInfo.InvariantCulture);
+            if (_isConnected)
+            {
+                return "The program at " + _address + " did not answer within " + seconds + " s. It is no master, or a master that hangs. "
+                    + "Restart it, or set NEP_MASTER to the address of a master.";
+            }
+            string missed = "No master answered at " + _address + " within " + seconds + " s";
+            return _socket.Problem == null
+                ? missed + ". Start one with 'nep master', or set NEP_MASTER to its address."
+                : missed + ": the program at this address is no master (" + _socket.Problem + "). Stop it, or set NEP_MASTER to the address of a master.";
         }
 
         private Call Begin(string name, Dictionary<object, object> what, Action<Fields> then, bool isWaited)

@@ -66,6 +66,7 @@ namespace Nep.Session
         private double _renewS = MinRenewS;
         private double _dueAtS;
         private double _joinAgainAtS;
+        private volatile bool _isProblemReported;
         private bool _isLeaving;
         private bool _isClosed;
 
@@ -278,6 +279,7 @@ namespace Nep.Session
 
         private void Obey(string name, long number, Fields what)
         {
+            _isProblemReported = false;
             ulong epoch = what.Unsigned("epoch", 0);
             bool isRegistration = name == "added" || name == "found";
             if (isRegistration || name == "renewed")
@@ -399,10 +401,22 @@ namespace Nep.Session
                 }
                 followAtS = _clock.Elapsed.TotalSeconds + 1.0;
                 FollowAddresses();
+                ReportProblem();
                 if (isDue && !_isLeaving)
                 {
                     Renew();
                 }
+            }
+        }
+
+        /// <summary>Log once that another program is at the master's address, and again only after a master has answered.</summary>
+        private void ReportProblem()
+        {
+            string problem = _socket.Problem;
+            if (problem != null && !_isProblemReported)
+            {
+                _isProblemReported = true;
+                Log.Warning("The program at the master's address " + _address + " is no master (" + problem + "). Still trying to reach a master there.");
             }
         }
 

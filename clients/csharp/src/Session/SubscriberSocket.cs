@@ -88,9 +88,14 @@ namespace Nep.Session
             lock (_lock)
             {
                 var statistics = new Dictionary<object, object> { { "id", Record.Id }, { "received", Math.Max(0, _sources.Received) }, { "lost", Math.Max(0, _sources.Lost) } };
+                string problem = ConnectionProblem();
                 if (_rejected > 0 && Clock.SteadyS < _rejectedAtS + 5.0)
                 {
                     statistics["problem"] = "a message was rejected: " + _rejection + " (" + _rejected + " so far)";
+                }
+                else if (problem != null)
+                {
+                    statistics["problem"] = problem;
                 }
                 return statistics;
             }
@@ -287,6 +292,20 @@ namespace Nep.Session
             {
                 throw new WireException("seq-leap");
             }
+        }
+
+        private string ConnectionProblem()
+        {
+            foreach (KeyValuePair<ulong, HeardPublisher> each in _sources.All)
+            {
+                SubConnection connection = each.Value.IsLapsed ? null : each.Value.Connection;
+                string problem = connection == null ? null : connection.Problem;
+                if (problem != null)
+                {
+                    return "the program at " + connection.Endpoint + " is no publisher (" + problem + ")";
+                }
+            }
+            return null;
         }
 
         private bool AllHaveEchoed()

@@ -58,6 +58,7 @@ namespace Nep.Zmtp
             return body;
         }
 
+        /// <summary>The peer's text, without characters that control a terminal.</summary>
         public static string ErrorReason(byte[] body)
         {
             if (body.Length < 7)
@@ -65,7 +66,8 @@ namespace Nep.Zmtp
                 return "no reason";
             }
             int count = Math.Min(body[6], body.Length - 7);
-            return Encoding.ASCII.GetString(body, 7, count);
+            char[] text = Encoding.ASCII.GetString(body, 7, count).ToCharArray();
+            return new string(Array.ConvertAll(text, each => char.IsControl(each) ? '?' : each));
         }
 
         public static void ReadProperties(byte[] body, int at, IDictionary<string, byte[]> into)
@@ -76,7 +78,7 @@ namespace Nep.Zmtp
                 int valueAt = at + 1 + nameSize + 4;
                 if (nameSize == 0 || valueAt > body.Length || into.Count >= MaxProperties)
                 {
-                    throw new ZmtpException("bad-handshake", "the properties of READY are malformed");
+                    throw new ZmtpException("bad-handshake", "it sent a malformed handshake");
                 }
                 string name = Encoding.ASCII.GetString(body, at + 1, nameSize);
                 long size = 0;
@@ -86,7 +88,7 @@ namespace Nep.Zmtp
                 }
                 if (size > body.Length - valueAt)
                 {
-                    throw new ZmtpException("bad-handshake", "the properties of READY are malformed");
+                    throw new ZmtpException("bad-handshake", "it sent a malformed handshake");
                 }
                 var value = new byte[(int)size];
                 Buffer.BlockCopy(body, valueAt, value, 0, value.Length);

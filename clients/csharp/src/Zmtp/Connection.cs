@@ -11,6 +11,10 @@ namespace Nep.Zmtp
     internal sealed class Connection
     {
         private const int IdlePollMs = 1000;
+        private static readonly string[] SocketTypes =
+        {
+            "PUB", "SUB", "XPUB", "XSUB", "REQ", "REP", "DEALER", "ROUTER", "PUSH", "PULL", "PAIR", "STREAM",
+        };
 
         private readonly Socket _socket;
         private readonly ZmtpLimits _limits;
@@ -22,6 +26,7 @@ namespace Nep.Zmtp
         private readonly bool _isFar;
         private readonly Stopwatch _sinceReceived = Stopwatch.StartNew();
         private readonly Stopwatch _sincePing = Stopwatch.StartNew();
+        private bool _hasReceived;
         private int _isClosed;
 
         /// <summary>Take a connected socket over. Call <see cref="Handshake"/> before anything else.</summary>
@@ -78,7 +83,15 @@ namespace Nep.Zmtp
             int count = 0;
             while (count < greeting.Length)
             {
-                Fill(watch);
+                try
+                {
+                    Fill(watch);
+                }
+                catch (ConnectionClosedException) when (count >= Greeting.SignatureSize)
+                {
+                    // libzmq closes before it sends its mechanism when that is another one.
+                    throw new ZmtpException("refused-by-peer", "it closed the connection during the handshake; it may require encryption or a password");
+                }
                 count += _decoder.Peek(greeting, count, greeting.Length - count);
                 Greeting.Check(greeting, count, _mechanism.Name);
             }
@@ -91,7 +104,7 @@ namespace Nep.Zmtp
                 Frame frame = ReadFrame(watch);
                 if (!frame.IsCommand)
                 {
-                    throw new ZmtpException("bad-handshake", "the peer sent a message before READY");
+                    throw new ZmtpException("bad-handshake", "it sent a malformed handshake");
                 }
                 _mechanism.Receive(frame.Body);
             }
@@ -177,7 +190,7 @@ namespace Nep.Zmtp
                 : new[] { "SUB", "XSUB" };
             if (Array.IndexOf(allowed, theirs) < 0)
             {
-                throw new ZmtpException("other-socket-type", "a socket of another type than " + allowed[0] + " is at the other end");
+                throw new ZmtpException("other-socket-type", "it is a " + (Array.IndexOf(SocketTypes, theirs) >= 0 ? theirs + " socket" : "socket of an unknown type"));
             }
         }
 
@@ -190,7 +203,7 @@ namespace Nep.Zmtp
             }
             else if (Commands.Is(body, "ERROR"))
             {
-                throw new ZmtpException("refused-by-peer", "the peer reports an error: " + Commands.ErrorReason(body));
+                throw new ZmtpException("refused-by-peer", "it reports an error: " + Commands.ErrorReason(body));
             }
             else if (Commands.Is(body, "SUBSCRIBE") || Commands.Is(body, "CANCEL"))
             {
@@ -230,6 +243,7 @@ namespace Nep.Zmtp
                             throw new ConnectionClosedException("the peer closed the connection");
                         }
                         _decoder.Advance(count);
+                        _hasReceived = true;
                         _sinceReceived.Restart();
                         return;
                     }
@@ -258,7 +272,7 @@ namespace Nep.Zmtp
                 waitMs = _limits.HandshakeTimeoutMs - (int)handshake.ElapsedMilliseconds;
                 if (waitMs <= 0)
                 {
-                    throw new ZmtpException("handshake-timeout", "the handshake took too long");
+                    throw HandshakeTimeout();
                 }
                 waitMs = Math.Min(waitMs, IdlePollMs);
             }
@@ -267,6 +281,11 @@ namespace Nep.Zmtp
             {
                 Heartbeat();
             }
+        }
+
+        private ZmtpException HandshakeTimeout()
+        {
+            return new ZmtpException("handshake-timeout", _hasReceived ? "it sent half a handshake" : "it sent nothing");
         }
 
         private void Heartbeat()
@@ -295,7 +314,7 @@ namespace Nep.Zmtp
                     {
                         if (handshake.ElapsedMilliseconds > _limits.HandshakeTimeoutMs)
                         {
-                            throw new ZmtpException("handshake-timeout", "the handshake took too long");
+                            throw HandshakeTimeout();
                         }
                         _socket.Poll(100000, SelectMode.SelectWrite);
                     }

@@ -1,4 +1,5 @@
 using System;
+using System.Diagnostics;
 using System.Net;
 using System.Net.Sockets;
 using System.Threading;
@@ -30,6 +31,7 @@ namespace Nep.Zmtp
         private readonly Random _random;
         private Thread _thread;
         private volatile Connection _connection;
+        private volatile string _problem;
         private int _waitMs;
 
         public Connector(ZmtpEndpoint endpoint, string socketType, ZmtpLimits limits, MechanismFactory mechanism,
@@ -52,6 +54,12 @@ namespace Nep.Zmtp
         public Connection Connection
         {
             get { return _connection; }
+        }
+
+        /// <summary>What is wrong with the program at the address, such as "it is a PULL socket"; null while it is a peer, or nobody is there.</summary>
+        public string Problem
+        {
+            get { return _problem; }
         }
 
         public void Start()
@@ -112,17 +120,19 @@ namespace Nep.Zmtp
         private string ServeOne()
         {
             Connection connection = null;
+            Stopwatch sinceConnected = null;
             try
             {
                 connection = new Connection(Dial(), _socketType, false, _limits, _mechanism);
                 connection.Handshake();
+                _problem = null;
                 _connection = connection;
                 if (IsStopped)
                 {
                     return "this side closed the connection";
                 }
                 _owner.Connected(this, connection);
-                _waitMs = _limits.MinReconnectMs;
+                sinceConnected = Stopwatch.StartNew();
                 while (true)
                 {
                     _owner.Received(this, connection.ReadMessage());
@@ -131,14 +141,17 @@ namespace Nep.Zmtp
             catch (ZmtpException exception)
             {
                 _refused.Add(exception.Code);
+                _problem = exception.Message;
                 return exception.Message;
             }
             catch (ConnectionClosedException exception)
             {
+                _problem = sinceConnected == null ? "it closed the connection" : _problem;
                 return exception.Message;
             }
             catch (SocketException exception)
             {
+                _problem = null;
                 return exception.Message;
             }
             catch (ObjectDisposedException)
@@ -155,6 +168,10 @@ namespace Nep.Zmtp
                 if (connection != null)
                 {
                     connection.Close();
+                }
+                if (sinceConnected != null && sinceConnected.ElapsedMilliseconds >= _limits.MaxReconnectMs)
+                {
+                    _waitMs = _limits.MinReconnectMs; // a peer that ends each connection at once is dialled less and less often
                 }
             }
         }

@@ -34,6 +34,12 @@ namespace Nep.Zmtp
             get { return _connector.Connection; }
         }
 
+        /// <summary>What is wrong with the program at the address; see <see cref="Connector.Problem"/>.</summary>
+        public string Problem
+        {
+            get { return _connector.Problem; }
+        }
+
         public void Start()
         {
             _connector.Start();

@@ -121,7 +121,7 @@ namespace Nep.Zmtp
             bool hasMore = (flags & 1) != 0;
             if ((flags & 0xF8) != 0 || isCommand && hasMore || isCommand && _parts > 0)
             {
-                throw new ZmtpException("bad-frame", "the flags of a frame are not allowed");
+                throw new ZmtpException("bad-frame", "it sent a frame with unknown flags");
             }
             if (isLong && available < 9)
             {
@@ -148,18 +148,18 @@ namespace Nep.Zmtp
             {
                 if (size > (ulong)_limits.MaxCommandBytes)
                 {
-                    throw new ZmtpException("command-too-large", "a command has " + size + " bytes");
+                    throw new ZmtpException("command-too-large", "it sent a command of " + size + " bytes");
                 }
                 return;
             }
             _parts++;
             if (_parts > _limits.MaxParts)
             {
-                throw new ZmtpException("too-many-parts", "a message has more than " + _limits.MaxParts + " parts");
+                throw new ZmtpException("too-many-parts", "it sent a message of more than " + _limits.MaxParts + " parts");
             }
             if (size > 0x7FFFFFC7UL || _messageBytes + (long)size > _limits.MaxMessageBytes)
             {
-                throw new ZmtpException("message-too-large", "a message has more than " + _limits.MaxMessageBytes + " bytes");
+                throw new ZmtpException("message-too-large", "it sent a message of more than " + _limits.MaxMessageBytes + " bytes");
             }
             _messageBytes += (long)size;
             if (!hasMore)

@@ -1,3 +1,4 @@
+using System;
 using System.Text;
 
 namespace Nep.Zmtp
@@ -6,6 +7,7 @@ namespace Nep.Zmtp
     internal static class Greeting
     {
         public const int Size = 64;
+        public const int SignatureSize = 10;
         private const int MechanismAt = 12;
         private const int MechanismBytes = 20;
         private const int AsServerAt = 32;
@@ -27,11 +29,11 @@ namespace Nep.Zmtp
         {
             if (count >= 1 && greeting[0] != 0xFF || count >= 10 && (greeting[9] & 1) != 1)
             {
-                throw new ZmtpException("no-greeting", "the peer does not speak ZMTP");
+                throw new ZmtpException("no-greeting", "it does not speak ZMTP");
             }
             if (count >= 11 && greeting[10] < 3)
             {
-                throw new ZmtpException("old-version", "the peer speaks ZMTP " + greeting[10] + ", 3 is needed");
+                throw new ZmtpException("old-version", "it speaks a version of ZMTP before 3");
             }
             if (count < Size)
             {
@@ -45,7 +47,8 @@ namespace Nep.Zmtp
             string theirs = Encoding.ASCII.GetString(greeting, MechanismAt, end - MechanismAt);
             if (theirs != mechanism)
             {
-                throw new ZmtpException("other-mechanism", "the peer uses another security mechanism");
+                bool isKnown = Array.IndexOf(new[] { "NULL", "PLAIN", "CURVE", "GSSAPI" }, theirs) >= 0;
+                throw new ZmtpException("other-mechanism", "it uses " + (isKnown ? "the security mechanism " + theirs : "an unknown security mechanism"));
             }
         }
     }

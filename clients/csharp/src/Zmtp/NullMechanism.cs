@@ -56,11 +56,11 @@ namespace Nep.Zmtp
         {
             if (Commands.Is(command, "ERROR"))
             {
-                throw new ZmtpException("refused-by-peer", "the peer refused the connection: " + Commands.ErrorReason(command));
+                throw new ZmtpException("refused-by-peer", "it reports an error: " + Commands.ErrorReason(command));
             }
             if (!Commands.Is(command, "READY") || _hasReceived)
             {
-                throw new ZmtpException("bad-handshake", "the peer sent another command than READY");
+                throw new ZmtpException("bad-handshake", "it sent a malformed handshake");
             }
             Commands.ReadProperties(command, 6, PeerProperties);
             _hasReceived = true;

@@ -24,6 +24,12 @@ namespace Nep.Zmtp
         /// <summary>Data of the owner.</summary>
         public object Tag { get; set; }
 
+        /// <summary>What is wrong with the program at the address; see <see cref="Zmtp.Connector.Problem"/>.</summary>
+        public string Problem
+        {
+            get { return Connector.Problem; }
+        }
+
         internal Connector Connector { get; set; }
     }
 

@@ -24,6 +24,10 @@ internal static class ZmtpPeer
             {
                 limits.HandshakeTimeoutMs = int.Parse(each.Substring(13), CultureInfo.InvariantCulture);
             }
+            if (each.StartsWith("reconnect_ms=", StringComparison.Ordinal))
+            {
+                limits.MinReconnectMs = limits.MaxReconnectMs = int.Parse(each.Substring(13), CultureInfo.InvariantCulture);
+            }
             if (each.StartsWith("heartbeat_ms=", StringComparison.Ordinal))
             {
                 limits.HeartbeatMs = int.Parse(each.Substring(13), CultureInfo.InvariantCulture);
@@ -119,6 +123,10 @@ internal static class ZmtpPeer
                 {
                     Say(Show(_socket.Refused));
                 }
+                else if (line == "problem")
+                {
+                    Say("problem " + _socket.Problem);
+                }
             }
             _socket.Close(1000);
             return 0;
@@ -143,6 +151,7 @@ internal static class ZmtpPeer
     private sealed class SubPeer : ISubOwner
     {
         private readonly SubSocket _socket;
+        private SubConnection _connection;
         private long _count;
         private bool _isQuiet;
 
@@ -160,7 +169,10 @@ internal static class ZmtpPeer
                 switch (words[0])
                 {
                     case "connect":
-                        _socket.Connect(words[1], null);
+                        _connection = _socket.Connect(words[1], null);
+                        break;
+                    case "problem":
+                        Say("problem " + _connection.Problem);
                         break;
                     case "subscribe":
                         _socket.Subscribe(FromHex(words[1]));

@@ -147,6 +147,14 @@ namespace UnityEngine
         public static void LogException(Exception exception)
         {
         }
+
+        public static void LogWarning(object message)
+        {
+        }
+
+        public static void LogWarning(object message, Object context)
+        {
+        }
     }
 
     public static class Application
