@@ -1,16 +1,25 @@
-"""The C# client on the native wire and nep-js 0.1.1 on the original one, through the gateway of `nep master`.
+"""The C# client on the native wire and originals, through the gateway of `nep master`.
 
+The originals are nep-js 0.1.1, and programs with `Nep.dll` 0.0.0.5, which are played by sockets.
+The three languages among themselves are in tests/clients/test_directions.py.
 Python with nep-js 0.1.1 is in test_matrix.py, nep-js 0.2 with it in test_javascript.py.
 """
 
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 
+from nep.masters.process import view
 from tests.clients import mono_programs
-from tests.clients.node_programs import NEEDS_NODE
+from tests.clients.node_programs import NEEDS_NODE, build_package
+from tests.clients.test_directions import LANGUAGES, LISTENERS, TALKERS, Programs, listing
+from tests.interop.gateway.conftest import Original
 from tests.nep.programs import eventually
 
 pytestmark = [
@@ -53,3 +62,45 @@ def test_csharp_and_the_original_nep_js_exchange_messages(peers, start):
     eventually(has_ended)
     eventually(lambda: listener.printed.endswith("\n"))
     assert json.loads(listener.printed) == ["to_csharp", message]
+
+
+@pytest.fixture
+def original() -> Iterator[Original]:
+    program = Original()
+    yield program
+    program.context.destroy(linger=0)
+
+
+def read_by_nep_dll(frame: bytes) -> object:
+    """Return the value that `Nep.dll` gives to its program: the piece after the first of all spaces."""
+    return json.loads(frame.decode().split(" ")[1])
+
+
+@pytest.fixture
+def listings(master, tmp_path: Path) -> Iterator[Programs]:
+    build_package()
+    with closing(Programs(tmp_path)) as made:
+        yield made
+
+
+def test_listings_exchange_messages_with_programs_of_the_original_csharp_library(
+    peers, nep_home, listings, original, tmp_path
+):
+    about = {"node": "original", "pid": str(os.getpid())}  # as text, as only Nep.dll sends it
+    port = original.ask("test", "subscriber", **about)["port"]
+    assert original.ask("test", "publisher", **about)["port"] == port
+    with original.subscriber(port + 1, b"test") as subscriber, original.publisher(port) as publisher:
+        original.publish_until(publisher, b'test {"message":"own"}', lambda: subscriber.poll(0))
+        eventually(lambda: len(view(nep_home).topics["test"].subscribers) == 2)  # itself and the gateway
+        for language, message in zip(LANGUAGES, ("hello", "hello world", "hello"), strict=True):
+            listings.start(f"{language}_talker", listing(language, TALKERS, "Listing9", tmp_path))
+            while (heard := read_by_nep_dll(subscriber.recv())) == {"message": "own"}:
+                pass
+            assert heard == {"message": message}, language
+        for language in LANGUAGES:
+            listings.start(language, listing(language, LISTENERS, "Listing10", tmp_path))
+
+        def all_have_heard() -> bool:
+            return all("hello" in " ".join(listings.lines(language)) for language in LANGUAGES)
+
+        original.publish_until(publisher, b'test {"message":"hello"}', all_have_heard)
