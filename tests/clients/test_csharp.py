@@ -32,6 +32,7 @@ RULES = (
     "first-message",
     "closed-is-heard",
     "lost-bye",
+    "lost-new",
     "batches-to-readers",
     "malformed",
     "service-malformed",
