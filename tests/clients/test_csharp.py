@@ -371,6 +371,19 @@ def test_messages_of_new_publishers_that_cannot_be_reached_are_lost(adapter: Ada
             assert adapter.ask("counts", sub=sub)["received"] == "0"
 
 
+def test_rejected_payload_is_a_problem_in_the_graph_until_the_next_message(
+    adapter: Adapter, node: Node
+) -> None:
+    def problems() -> list[str]:
+        return [alert.sentence for alert in node.graph().alerts if "“blob”" in alert.sentence]
+
+    pub = adapter.ask("publisher", topic="blob", type="bytes")["pub"]
+    adapter.refused("publish", pub=pub, text="not bytes")
+    eventually(lambda: bool(problems()))
+    adapter.ask("publish", pub=pub, bytes="AAEC")
+    eventually(lambda: not problems())
+
+
 def test_services_are_called_in_both_directions(adapter: Adapter, node: Node) -> None:
     adapter.ask("serve", service="/echo")
     client = node.new_client("/echo", timeout_s=LONG_S)

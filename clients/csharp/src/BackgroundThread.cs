@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 
 namespace Nep
@@ -33,7 +32,7 @@ namespace Nep
         /// <summary>Wait until all threads have ended; false when the time is over first.</summary>
         public static bool JoinAll(int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             Thread[] threads;
             lock (Running)
             {
@@ -43,7 +42,7 @@ namespace Nep
             foreach (Thread each in threads)
             {
                 bool isOwn = each == Thread.CurrentThread; // a callback may end the process
-                allEnded &= isOwn || each.Join(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+                allEnded &= isOwn || each.Join(deadline.LeftMs);
             }
             return allEnded;
         }

@@ -21,11 +21,6 @@ namespace Nep
             _codec = codec;
         }
 
-        internal ClientSocket Socket
-        {
-            get { return _socket; }
-        }
-
         /// <summary>Call the service and wait for its answer.</summary>
         /// <typeparam name="TAnswer">Type of the answer, as for <see cref="Message.As{T}"/>.</typeparam>
         /// <param name="request">Request, as for <see cref="Publisher.Publish"/>.</param>
@@ -46,19 +41,15 @@ namespace Nep
         /// <param name="request">Request.</param>
         /// <param name="timeout">Longest wait for a server and its answer.</param>
         /// <param name="cancellation">Ends the wait; the server may carry it out all the same.</param>
-        public async Task<TAnswer> CallAsync<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation = default(CancellationToken))
+        public Task<TAnswer> CallAsync<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation = default(CancellationToken))
         {
-            using (cancellation.Register(_socket.Wake))
-            {
-                return await Task.Factory.StartNew(() => Call<TAnswer>(request, timeout, cancellation), cancellation,
-                    TaskCreationOptions.LongRunning, TaskScheduler.Default).ConfigureAwait(false);
-            }
+            return BackgroundTask.Run(() => Call<TAnswer>(request, timeout, cancellation), _socket.Wake, cancellation);
         }
 
         /// <summary>Close; waiting calls end with <see cref="ObjectDisposedException"/>.</summary>
         public void Dispose()
         {
-            _node.Close(this);
+            _node.Close(_socket);
         }
 
         private TAnswer Call<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation)

@@ -26,10 +26,8 @@ namespace Nep
         private readonly NodeOptions _options;
         private readonly NodeRecord _record;
         private readonly Dictionary<string, MasterSession> _sessions = new Dictionary<string, MasterSession>();
-        private readonly Dictionary<Publisher, MasterSession> _publishers = new Dictionary<Publisher, MasterSession>();
-        private readonly Dictionary<Subscriber, MasterSession> _subscribers = new Dictionary<Subscriber, MasterSession>();
-        private readonly Dictionary<Server, MasterSession> _servers = new Dictionary<Server, MasterSession>();
-        private readonly Dictionary<Client, MasterSession> _clients = new Dictionary<Client, MasterSession>();
+        private readonly Dictionary<ISessionPublisher, MasterSession> _publishers = new Dictionary<ISessionPublisher, MasterSession>();
+        private readonly Dictionary<ISessionSubscriber, MasterSession> _subscribers = new Dictionary<ISessionSubscriber, MasterSession>();
         private readonly List<Subscription> _subscriptions = new List<Subscription>();
         private long _numbers;
         private bool _isClosed;
@@ -99,34 +97,17 @@ namespace Nep
                 throw new ArgumentException("A publisher keeps 0 to 10 000 messages.", "options");
             }
             Codec codec = Codec.For(type);
-            long number = Interlocked.Increment(ref _numbers);
-            var record = new PublisherRecord
-            {
-                Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type, Codec = codec.Name,
-                IsLatched = options.Latched || options.History > 0, History = options.History,
-            };
+            PublisherRecord record = PublisherRecordOf(topic, type, codec.Name);
+            record.IsLatched = options.Latched || options.History > 0;
+            record.History = options.History;
             MasterSession session = SessionOf(options.Master);
             var socket = new PublisherSocket(record, codec.Number);
-            List<ExpectedSubscriber> missing;
-            try
-            {
-                if (!socket.Move(session.Hosts()))
-                {
-                    throw new NepException("No port could be opened for the topic '" + topic + "'.");
-                }
-                missing = socket.WaitFor(session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout)), HandshakeMs);
-            }
-            catch
-            {
-                socket.Finish(0);
-                throw;
-            }
+            List<ExpectedSubscriber> missing = socket.WaitFor(Register(socket, session), HandshakeMs);
             if (missing.Count > 0)
             {
                 session.ReportMissing(record.Id, missing.ConvertAll(each => each.Id));
             }
-            var made = new Publisher(this, socket, codec, missing.ConvertAll(each => each.NodeName));
-            return Keep(_publishers, made, session);
+            return new Publisher(this, socket, codec, missing.ConvertAll(each => each.NodeName));
         }
 
         /// <summary>Create a subscriber. It receives the next message of every publisher that is registered.</summary>
@@ -147,25 +128,15 @@ namespace Nep
             {
                 throw new ArgumentException("A subscriber keeps at least one message.", "options");
             }
-            long number = Interlocked.Increment(ref _numbers);
-            var record = new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type };
-            MasterSession session = SessionOf(options.Master);
+            SubscriberRecord record = SubscriberRecordOf(topic, type);
             record.IsPattern = options.Wildcards && TopicPattern.IsPattern(topic);
+            MasterSession session = SessionOf(options.Master);
             ISubscriberSocket socket = record.IsPattern
                 ? (ISubscriberSocket)new PatternSocket(record, options)
                 : new SubscriberSocket(record, new Inbox(options), true);
-            try
-            {
-                session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
-            }
-            catch
-            {
-                socket.Close();
-                throw;
-            }
+            Register(socket, session);
             socket.WaitForEchoes(HandshakeMs);
-            var made = new Subscriber(this, socket);
-            return Keep(_subscribers, made, session);
+            return new Subscriber(this, socket);
         }
 
         /// <summary>Call a function with each message of a topic.</summary>
@@ -207,28 +178,10 @@ namespace Nep
             {
                 throw new ArgumentException("A server has a callback and at least one thread.");
             }
-            long number = Interlocked.Increment(ref _numbers);
-            var record = new PublisherRecord
-            {
-                Id = Ids.Id(_record.Key, number), Number = number, Topic = ServicePrefix + service, MsgType = "service", Codec = "service",
-            };
             MasterSession session = SessionOf(null);
-            var socket = new ServerSocket(record);
-            try
-            {
-                if (!socket.Move(session.Hosts()))
-                {
-                    throw new NepException("No port could be opened for the service '" + service + "'.");
-                }
-                session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout));
-            }
-            catch
-            {
-                socket.Finish(0);
-                throw;
-            }
-            var made = new Server(this, socket, (payload, codec) => Answer(callback, payload, codec), threads);
-            return Keep(_servers, made, session);
+            var socket = new ServerSocket(PublisherRecordOf(ServicePrefix + service, "service", "service"));
+            Register(socket, session);
+            return new Server(this, socket, (payload, codec) => Answer(callback, payload, codec), threads);
         }
 
         /// <summary>Create a client of a service. Its server need not be there yet.</summary>
@@ -240,13 +193,11 @@ namespace Nep
         public Client CreateClient(string service, string type = "json")
         {
             CheckTopic(ServicePrefix + service);
-            long number = Interlocked.Increment(ref _numbers);
-            var record = new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = ServicePrefix + service, MsgType = "service" };
+            Codec codec = Codec.For(type);
             MasterSession session = SessionOf(null);
-            var socket = new ClientSocket(record, service);
-            session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
-            var made = new Client(this, socket, Codec.For(type));
-            return Keep(_clients, made, session);
+            var socket = new ClientSocket(SubscriberRecordOf(ServicePrefix + service, "service"), service);
+            Register(socket, session);
+            return new Client(this, socket, codec);
         }
 
         /// <summary>Run waiting callbacks of subscriptions with <see cref="CallbackMode.Update"/> in the calling thread.</summary>
@@ -285,10 +236,8 @@ namespace Nep
         public void Close()
         {
             List<MasterSession> sessions;
-            List<Publisher> publishers;
-            List<Subscriber> subscribers;
-            List<Server> servers;
-            List<Client> clients;
+            List<ISessionPublisher> publishers;
+            List<ISessionSubscriber> subscribers;
             lock (_lock)
             {
                 if (_isClosed)
@@ -297,30 +246,19 @@ namespace Nep
                 }
                 _isClosed = true;
                 sessions = new List<MasterSession>(_sessions.Values);
-                publishers = new List<Publisher>(_publishers.Keys);
-                subscribers = new List<Subscriber>(_subscribers.Keys);
-                servers = new List<Server>(_servers.Keys);
-                clients = new List<Client>(_clients.Keys);
+                publishers = new List<ISessionPublisher>(_publishers.Keys);
+                subscribers = new List<ISessionSubscriber>(_subscribers.Keys);
             }
             lock (Open)
             {
                 Open.Remove(this);
             }
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(TimeoutMs(_options.CloseTimeout));
             sessions.ForEach(each => each.BeginLeave());
-            servers.ForEach(each => each.Socket.BeginClose());
-            publishers.ForEach(each => each.Socket.SayBye());
+            publishers.ForEach(each => each.BeginClose());
             sessions.ForEach(each => each.Close(LeaveMs));
-            subscribers.ForEach(each => each.Socket.Close());
-            clients.ForEach(each => each.Socket.Close());
-            foreach (Server each in servers)
-            {
-                each.Socket.Finish(Math.Max(0, TimeoutMs(_options.CloseTimeout) - (int)watch.ElapsedMilliseconds));
-            }
-            foreach (Publisher each in publishers)
-            {
-                each.Socket.Finish(Math.Max(0, TimeoutMs(_options.CloseTimeout) - (int)watch.ElapsedMilliseconds));
-            }
+            subscribers.ForEach(each => each.Close());
+            publishers.ForEach(each => each.Finish(deadline.LeftMs));
         }
 
         /// <summary>Same as <see cref="Close()"/>.</summary>
@@ -329,50 +267,27 @@ namespace Nep
             Close();
         }
 
-        internal void Close(Publisher publisher)
+        /// <summary>Close a publisher or a server.</summary>
+        internal void Close(ISessionPublisher publisher)
         {
             MasterSession session;
-            if (!TryRemove(_publishers, publisher, out session))
+            if (TryRemove(_publishers, publisher, out session))
             {
-                return;
+                session.RemovePublisher(publisher.Record.Id, publisher.LastSeq);
+                publisher.BeginClose();
+                publisher.Finish(TimeoutMs(_options.CloseTimeout));
             }
-            session.RemovePublisher(publisher.Socket.Record.Id, publisher.Socket.Count);
-            publisher.Socket.SayBye();
-            publisher.Socket.Finish(TimeoutMs(_options.CloseTimeout));
         }
 
-        internal void Close(Subscriber subscriber)
+        /// <summary>Close a subscriber or a client.</summary>
+        internal void Close(ISessionSubscriber subscriber)
         {
             MasterSession session;
-            if (!TryRemove(_subscribers, subscriber, out session))
+            if (TryRemove(_subscribers, subscriber, out session))
             {
-                return;
+                session.RemoveSubscriber(subscriber.Record.Id);
+                subscriber.Close();
             }
-            session.RemoveSubscriber(subscriber.Socket.Record.Id);
-            subscriber.Socket.Close();
-        }
-
-        internal void Close(Server server)
-        {
-            MasterSession session;
-            if (!TryRemove(_servers, server, out session))
-            {
-                return;
-            }
-            session.RemovePublisher(server.Socket.Record.Id, (ulong)server.Socket.Calls);
-            server.Socket.BeginClose();
-            server.Socket.Finish(TimeoutMs(_options.CloseTimeout));
-        }
-
-        internal void Close(Client client)
-        {
-            MasterSession session;
-            if (!TryRemove(_clients, client, out session))
-            {
-                return;
-            }
-            session.RemoveSubscriber(client.Socket.Record.Id);
-            client.Socket.Close();
         }
 
         internal void Forget(Subscription subscription)
@@ -468,13 +383,63 @@ namespace Nep
             }
         }
 
-        private T Keep<T>(Dictionary<T, MasterSession> owned, T made, MasterSession session)
+        private PublisherRecord PublisherRecordOf(string topic, string type, string codec)
+        {
+            long number = Interlocked.Increment(ref _numbers);
+            return new PublisherRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type, Codec = codec };
+        }
+
+        private SubscriberRecord SubscriberRecordOf(string topic, string type)
+        {
+            long number = Interlocked.Increment(ref _numbers);
+            return new SubscriberRecord { Id = Ids.Id(_record.Key, number), Number = number, Topic = topic, MsgType = type };
+        }
+
+        /// <summary>Bind a publisher or a server and register it; returns the subscribers to wait for. It is closed when that fails.</summary>
+        private List<ExpectedSubscriber> Register(ISessionPublisher socket, MasterSession session)
+        {
+            try
+            {
+                if (!socket.Move(session.Hosts()))
+                {
+                    throw new NepException("No port could be opened for '" + socket.Record.Topic + "'.");
+                }
+                List<ExpectedSubscriber> expected = session.AddPublisher(socket, TimeoutMs(_options.MasterTimeout));
+                Keep(_publishers, socket, session);
+                return expected;
+            }
+            catch
+            {
+                socket.Finish(0);
+                throw;
+            }
+        }
+
+        /// <summary>Register a subscriber or a client. It is closed when that fails.</summary>
+        private void Register(ISessionSubscriber socket, MasterSession session)
+        {
+            try
+            {
+                session.AddSubscriber(socket, TimeoutMs(_options.MasterTimeout));
+                Keep(_subscribers, socket, session);
+            }
+            catch
+            {
+                socket.Close();
+                throw;
+            }
+        }
+
+        private void Keep<T>(Dictionary<T, MasterSession> owned, T made, MasterSession session)
         {
             lock (_lock)
             {
+                if (_isClosed)
+                {
+                    throw new ObjectDisposedException("Node"); // it was closed meanwhile, without this
+                }
                 owned[made] = session;
             }
-            return made;
         }
 
         /// <summary>Remove an object that is about to be closed; false if it was removed before.</summary>

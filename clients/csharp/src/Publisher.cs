@@ -44,7 +44,7 @@ namespace Nep
         /// <summary>Number of messages published so far.</summary>
         public long Count
         {
-            get { return (long)_socket.Count; }
+            get { return (long)_socket.LastSeq; }
         }
 
         /// <summary>Number of subscribers that are connected.</summary>
@@ -61,11 +61,6 @@ namespace Nep
 
         /// <summary>Names of nodes that subscribed and did not connect within 0.5 s when the publisher was created.</summary>
         public IList<string> UnconnectedSubscribers { get; private set; }
-
-        internal PublisherSocket Socket
-        {
-            get { return _socket; }
-        }
 
         /// <summary>Publish a payload. Returns at once; a subscriber that is too slow loses messages and counts them.</summary>
         /// <param name="payload">
@@ -124,7 +119,7 @@ namespace Nep
         /// <summary>Close: subscribers receive what was published, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
         public void Close()
         {
-            _node.Close(this);
+            _node.Close(_socket);
         }
 
         /// <summary>Same as <see cref="Close"/>.</summary>

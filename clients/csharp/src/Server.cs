@@ -47,15 +47,10 @@ namespace Nep
             get { return _socket.Refused; }
         }
 
-        internal ServerSocket Socket
-        {
-            get { return _socket; }
-        }
-
         /// <summary>Close: refuses waiting calls and lets running callbacks answer, within <see cref="NodeOptions.CloseTimeout"/>.</summary>
         public void Dispose()
         {
-            _node.Close(this);
+            _node.Close(_socket);
         }
 
         private void Run()

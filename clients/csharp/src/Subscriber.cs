@@ -82,22 +82,19 @@ namespace Nep
         /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
         public async Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
         {
-            using (cancellation.Register(_socket.Inbox.Wake))
+            Inbox inbox = _socket.Inbox;
+            Message message = await BackgroundTask.Run(() => inbox.Take(-1, cancellation), inbox.Wake, cancellation).ConfigureAwait(false);
+            if (message == null)
             {
-                Message message = await Task.Factory.StartNew(() => _socket.Inbox.Take(-1, cancellation), cancellation,
-                    TaskCreationOptions.LongRunning, TaskScheduler.Default).ConfigureAwait(false);
-                if (message == null)
-                {
-                    cancellation.ThrowIfCancellationRequested();
-                }
-                return message;
+                cancellation.ThrowIfCancellationRequested();
             }
+            return message;
         }
 
         /// <summary>Close; a waiting <see cref="Receive"/> returns null.</summary>
         public void Close()
         {
-            _node.Close(this);
+            _node.Close(_socket);
         }
 
         /// <summary>Same as <see cref="Close"/>.</summary>

@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -96,15 +95,15 @@ namespace Nep.Session
         /// <summary>Send a call and wait for its answer.</summary>
         public OutgoingCall Call(byte codec, byte[] payload, int timeoutMs, CancellationToken cancellation)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
                 ServerLink link;
                 while ((link = FirstConnected()) == null)
                 {
-                    Wait(watch, timeoutMs, cancellation, () => new NoServerException(_service));
+                    Wait(deadline, cancellation, () => new NoServerException(_service));
                 }
-                int leftMs = timeoutMs < 0 ? 0 : Math.Max(1, timeoutMs - (int)watch.ElapsedMilliseconds);
+                int leftMs = timeoutMs < 0 ? 0 : Math.Max(1, deadline.LeftMs);
                 var call = new OutgoingCall { Number = ++_numbers, Link = link };
                 var header = new ServiceHeader { Kind = ServiceHeader.Call, Codec = codec, TimeoutMs = (uint)leftMs, Number = call.Number };
                 _calls[call.Number] = call;
@@ -120,7 +119,7 @@ namespace Nep.Session
                         {
                             throw new ServerGoneException(_service);
                         }
-                        Wait(watch, timeoutMs, cancellation, () => new ServiceTimeoutException(_service));
+                        Wait(deadline, cancellation, () => new ServiceTimeoutException(_service));
                     }
                     _answered++;
                     return call;
@@ -286,19 +285,18 @@ namespace Nep.Session
             ThreadPool.QueueUserWorkItem(state => link.Socket.Close(0)); // which waits for the thread that may have called
         }
 
-        private void Wait(Stopwatch watch, int timeoutMs, CancellationToken cancellation, Func<NepException> error)
+        private void Wait(Deadline deadline, CancellationToken cancellation, Func<NepException> error)
         {
             cancellation.ThrowIfCancellationRequested();
             if (_isClosed)
             {
                 throw new ObjectDisposedException("Client");
             }
-            int leftMs = timeoutMs < 0 ? Timeout.Infinite : timeoutMs - (int)watch.ElapsedMilliseconds;
-            if (timeoutMs >= 0 && leftMs <= 0)
+            if (deadline.IsOver)
             {
                 throw error();
             }
-            Monitor.Wait(_lock, leftMs);
+            deadline.Wait(_lock);
         }
     }
 }

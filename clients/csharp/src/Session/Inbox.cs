@@ -1,5 +1,4 @@
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 
 namespace Nep.Session
@@ -49,17 +48,16 @@ namespace Nep.Session
         /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
         public Message Take(int timeoutMs, CancellationToken cancellation)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
                 while (_messages.Count == 0)
                 {
-                    int leftMs = timeoutMs < 0 ? Timeout.Infinite : timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (_isClosed || timeoutMs >= 0 && leftMs <= 0 || cancellation.IsCancellationRequested)
+                    if (_isClosed || deadline.IsOver || cancellation.IsCancellationRequested)
                     {
                         return null;
                     }
-                    Monitor.Wait(_lock, leftMs);
+                    deadline.Wait(_lock);
                 }
                 Message message = _messages.Dequeue();
                 _bytes -= message.Size;

@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Globalization;
 using System.Threading;
 using Nep.Wire;
@@ -67,22 +66,21 @@ namespace Nep.Session
         public void Ask(string name, Dictionary<object, object> what, int timeoutMs, Action<Fields> then)
         {
             Call call = Begin(name, what, then, true);
-            Stopwatch watch = Stopwatch.StartNew();
-            long sendAtMs = 0;
+            var deadline = new Deadline(timeoutMs);
+            var sendAgain = new Deadline(0);
             lock (_lock)
             {
                 while (!call.IsAnswered)
                 {
-                    long nowMs = watch.ElapsedMilliseconds;
-                    if (_isClosed || timeoutMs >= 0 && nowMs >= timeoutMs)
+                    if (_isClosed || deadline.IsOver)
                     {
                         _calls.Remove(call.Number);
                         throw new MasterUnreachableException(_address, Unreached(timeoutMs));
                     }
-                    if (_isConnected && nowMs >= sendAtMs)
+                    if (_isConnected && sendAgain.IsOver)
                     {
                         // It may have gone to a master that ended just then.
-                        sendAtMs = nowMs + (_socket.Send(call.Body) ? AskAgainMs : SendAgainMs);
+                        sendAgain = new Deadline(_socket.Send(call.Body) ? AskAgainMs : SendAgainMs);
                     }
                     Monitor.Wait(_lock, SendAgainMs);
                 }

@@ -7,18 +7,27 @@ using Nep.Zmtp;
 
 namespace Nep.Session
 {
-    /// <summary>A publisher as its session needs it. All methods are thread-safe.</summary>
+    /// <summary>A publisher, or a server, as its session and its node need it. All methods are thread-safe.</summary>
     internal interface ISessionPublisher
     {
         PublisherRecord Record { get; }
+
+        /// <summary>Number of the newest message, or of answered calls.</summary>
+        ulong LastSeq { get; }
 
         Dictionary<object, object> Statistics();
 
         /// <summary>Be reached at these addresses; true when the endpoints of the record changed.</summary>
         bool Move(IList<string> hosts);
+
+        /// <summary>Send nothing new: say bye to subscribers, refuse the calls of clients.</summary>
+        void BeginClose();
+
+        /// <summary>Wait until peers have everything, for a limited time, and close the socket.</summary>
+        void Finish(int timeoutMs);
     }
 
-    /// <summary>A subscriber as its session needs it. All methods are thread-safe.</summary>
+    /// <summary>A subscriber, or a client, as its session and its node need it. All methods are thread-safe.</summary>
     internal interface ISessionSubscriber
     {
         SubscriberRecord Record { get; }
@@ -41,6 +50,8 @@ namespace Nep.Session
 
         /// <summary>A renewal was answered: the newest messages of publishers that the master knows.</summary>
         void Tick(Dictionary<ulong, ulong> lastSeqs);
+
+        void Close();
     }
 
     /// <summary>A node's link to one master: registers, renews, hears of publishers, joins a master that was started again.</summary>
@@ -170,13 +181,7 @@ namespace Nep.Session
 
         public void RemovePublisher(ulong id, ulong lastSeq)
         {
-            bool wasKnown;
-            lock (_lock)
-            {
-                wasKnown = _publishers.Remove(id);
-                _confirmed.Remove(id);
-            }
-            if (wasKnown)
+            if (Forget(_publishers, id))
             {
                 _calls.Tell("publisher-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id }, { "last_seq", lastSeq } }, null);
             }
@@ -184,15 +189,18 @@ namespace Nep.Session
 
         public void RemoveSubscriber(ulong id)
         {
-            bool wasKnown;
-            lock (_lock)
-            {
-                wasKnown = _subscribers.Remove(id);
-                _confirmed.Remove(id);
-            }
-            if (wasKnown)
+            if (Forget(_subscribers, id))
             {
                 _calls.Tell("subscriber-", new Dictionary<object, object> { { "node_id", _node.Id }, { "id", id } }, null);
+            }
+        }
+
+        private bool Forget<T>(Dictionary<ulong, T> owned, ulong id)
+        {
+            lock (_lock)
+            {
+                _confirmed.Remove(id);
+                return owned.Remove(id);
             }
         }
 

@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 
 namespace Nep.Session
@@ -18,8 +17,6 @@ namespace Nep.Session
 
         /// <summary>Wait until all listed publishers have echoed.</summary>
         void WaitForEchoes(int timeoutMs);
-
-        void Close();
     }
 
     /// <summary>A subscriber of all topics that match a pattern: one member for each topic, one inbox. Thread-safe.</summary>
@@ -142,8 +139,8 @@ namespace Nep.Session
 
         public void WaitForEchoes(int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
-            Members().ForEach(each => each.WaitForEchoes(timeoutMs - (int)watch.ElapsedMilliseconds));
+            var deadline = new Deadline(timeoutMs);
+            Members().ForEach(each => each.WaitForEchoes(deadline.LeftMs));
         }
 
         public void Close()

@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -40,7 +39,7 @@ namespace Nep.Session
 
         public PublisherRecord Record { get; private set; }
 
-        public ulong Count
+        public ulong LastSeq
         {
             get
             {
@@ -65,7 +64,7 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Trouble with a payload, told with the next renewal.</summary>
+        /// <summary>Why the last payload could not be encoded, for the next renewal; cleared by the next message.</summary>
         public string Problem
         {
             set { _problem = value; }
@@ -106,6 +105,7 @@ namespace Nep.Session
                 {
                     throw new ObjectDisposedException("Publisher");
                 }
+                _problem = "";
                 _seq++;
                 _bytes += (ulong)payload.Length;
                 _lastStampNs = Clock.NowNs;
@@ -132,24 +132,22 @@ namespace Nep.Session
         /// <summary>Wait until these have said hello; returns those that have not in time.</summary>
         public List<ExpectedSubscriber> WaitFor(List<ExpectedSubscriber> expected, int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
                 while (true)
                 {
                     List<ExpectedSubscriber> missing = expected.FindAll(each => !_greeted.ContainsKey(each.Id));
-                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (missing.Count == 0 || leftMs <= 0)
+                    if (missing.Count == 0 || deadline.IsOver)
                     {
                         return missing;
                     }
-                    Monitor.Wait(_lock, leftMs);
+                    deadline.Wait(_lock);
                 }
             }
         }
 
-        /// <summary>Publish nothing more; every subscriber disconnects when it has read everything.</summary>
-        public void SayBye()
+        public void BeginClose()
         {
             lock (_lock)
             {
@@ -158,26 +156,20 @@ namespace Nep.Session
             }
         }
 
-        /// <summary>Wait until all have disconnected, and close the socket.</summary>
         public void Finish(int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(Math.Max(0, timeoutMs));
             lock (_lock)
             {
-                while (_greeted.Count > 0)
+                while (_greeted.Count > 0 && !deadline.IsOver)
                 {
-                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (leftMs <= 0)
-                    {
-                        break;
-                    }
-                    if (!Monitor.Wait(_lock, Math.Min(leftMs, ByeAgainMs)))
+                    if (!Monitor.Wait(_lock, Math.Min(deadline.LeftMs, ByeAgainMs)))
                     {
                         Bye(); // a full queue drops it like anything else
                     }
                 }
             }
-            _socket.Close(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+            _socket.Close(deadline.LeftMs);
         }
 
         // ---- in the connections' threads

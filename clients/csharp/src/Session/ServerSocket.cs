@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -39,6 +38,11 @@ namespace Nep.Session
         }
 
         public PublisherRecord Record { get; private set; }
+
+        public ulong LastSeq
+        {
+            get { return (ulong)Calls; }
+        }
 
         public long Calls { get; private set; }
 
@@ -114,7 +118,6 @@ namespace Nep.Session
             Send(call, kind, payload);
         }
 
-        /// <summary>Refuse what waits and what still comes.</summary>
         public void BeginClose()
         {
             List<IncomingCall> refused;
@@ -128,20 +131,17 @@ namespace Nep.Session
             refused.ForEach(each => Refuse(each, "the server closes"));
         }
 
-        /// <summary>Let the callbacks that run answer, and close.</summary>
         public void Finish(int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(Math.Max(0, timeoutMs));
             lock (_lock)
             {
-                int leftMs = timeoutMs;
-                while (_running > 0 && leftMs > 0)
+                while (_running > 0 && !deadline.IsOver)
                 {
-                    Monitor.Wait(_lock, leftMs);
-                    leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
+                    deadline.Wait(_lock);
                 }
             }
-            _socket.Acceptor.Close(Math.Max(0, timeoutMs - (int)watch.ElapsedMilliseconds));
+            _socket.Acceptor.Close(deadline.LeftMs);
         }
 
         void IRouterOwner.Received(Connection from, byte[][] parts)

@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Threading;
 using Nep.Wire;
 using Nep.Zmtp;
@@ -68,17 +67,12 @@ namespace Nep.Session
         /// <summary>Wait until all listed publishers have echoed.</summary>
         public void WaitForEchoes(int timeoutMs)
         {
-            Stopwatch watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
-                while (!AllHaveEchoed())
+                while (!AllHaveEchoed() && !deadline.IsOver)
                 {
-                    int leftMs = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (leftMs <= 0)
-                    {
-                        return;
-                    }
-                    Monitor.Wait(_lock, leftMs);
+                    deadline.Wait(_lock);
                 }
             }
         }

@@ -125,14 +125,10 @@ namespace Nep.Zmtp
         /// <summary>Deliver what is queued, for <paramref name="lingerMs"/> at most, and close.</summary>
         public void Close(int lingerMs)
         {
-            var watch = System.Diagnostics.Stopwatch.StartNew();
+            var deadline = new Deadline(lingerMs);
             foreach (Connection each in _snapshot)
             {
-                int left = lingerMs - (int)watch.ElapsedMilliseconds;
-                if (left > 0)
-                {
-                    each.Flush(left);
-                }
+                each.Flush(deadline.LeftMs);
             }
             List<Connection> open;
             List<Listener> listeners;

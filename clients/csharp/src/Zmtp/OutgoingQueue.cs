@@ -1,6 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Diagnostics;
 using System.Net.Sockets;
 using System.Runtime.InteropServices;
 using System.Threading;
@@ -95,16 +94,12 @@ namespace Nep.Zmtp
         /// <summary>Wait until the socket has taken everything; false when it has not in time.</summary>
         public bool Flush(int timeoutMs)
         {
-            var watch = Stopwatch.StartNew();
+            var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
-                while (_bytes > 0 && !_isClosed)
+                while (_bytes > 0 && !_isClosed && !deadline.IsOver)
                 {
-                    int left = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (left <= 0 || !Monitor.Wait(_lock, left))
-                    {
-                        return _bytes == 0;
-                    }
+                    deadline.Wait(_lock);
                 }
                 return _bytes == 0;
             }
