@@ -152,6 +152,20 @@ def test_xpub_bounds_the_queue_of_a_slow_reader_and_keeps_serving_others(context
         assert slow.recv_multipart() == [TOPIC, b"end"]
 
 
+def test_burst_of_small_messages_arrives_whole_and_in_order(context: Context, stack: ExitStack) -> None:
+    xpub = started(stack, "xpub", "127.0.0.1")
+    with context.socket(zmq.SUB) as sub:
+        sub.rcvhwm, sub.rcvtimeo = 0, 20_000
+        sub.subscribe(TOPIC)
+        sub.connect(f"tcp://127.0.0.1:{xpub.line().split()[1]}")
+        xpub.line()
+        xpub.say(f"burst {TOPIC.hex()} 20000 3")
+        assert [int.from_bytes(sub.recv_multipart()[1], "little") for _ in range(20_000)] == list(
+            range(20_000)
+        )
+        assert xpub.line() == "sent 20000"
+
+
 def test_ipv6_works_where_the_computer_has_it(context, stack: ExitStack) -> None:
     if not socket.has_ipv6:
         pytest.skip("no IPv6")

@@ -1,5 +1,6 @@
 using System;
 using System.Collections.Generic;
+using System.Diagnostics;
 using System.Net.Sockets;
 using System.Runtime.InteropServices;
 using System.Threading;
@@ -9,12 +10,20 @@ namespace Nep.Zmtp
     /// <summary>Messages on their way out of one connection. Bounded; drops the newest. Thread-safe.</summary>
     /// <remarks>
     /// The caller's thread writes as much as the socket takes at once; what is left is written by a thread that is
-    /// started when it is first needed.
+    /// started when it is first needed. That thread also writes bursts, many messages in one call of the system.
     /// </remarks>
     internal sealed class OutgoingQueue
     {
         private const int JoinBytes = 65536;
         private const int SendBufferBytes = 262144;
+
+        /// <summary>After so many messages that follow each other within <see cref="BurstTicks"/> the thread takes over.</summary>
+        private const int MinBurst = 8;
+
+        /// <summary>A caller gives the thread a millisecond when so many messages wait although the socket takes them.</summary>
+        private const int MaxAhead = 10000;
+
+        private static readonly long BurstTicks = Stopwatch.Frequency * 20 / 1000000;
         private static readonly bool IsMono = !RuntimeInformation.FrameworkDescription.StartsWith(".NET", StringComparison.Ordinal);
 
         private readonly object _lock = new object();
@@ -27,6 +36,9 @@ namespace Nep.Zmtp
         private int _segment;
         private int _offset;
         private long _bytes;
+        private long _sentAt;
+        private int _burst;
+        private bool _isBlocked;
         private bool _isWriting;
         private bool _threadMayWrite;
         private bool _hasThread;
@@ -66,6 +78,10 @@ namespace Nep.Zmtp
         {
             lock (_lock)
             {
+                if (_waiting.Count >= MaxAhead && !_isBlocked && _threadMayWrite)
+                {
+                    Monitor.Wait(_lock, 1);
+                }
                 if (_isClosed)
                 {
                     return false;
@@ -78,15 +94,25 @@ namespace Nep.Zmtp
                 }
                 _waiting.Enqueue(message);
                 _bytes += message.Bytes;
+                bool isBurst = IsBurst();
                 if (_isWriting)
                 {
                     return true;
                 }
                 _isWriting = true;
+                if (isBurst)
+                {
+                    HandOver();
+                    return true;
+                }
             }
             if (!Write())
             {
-                HandOver();
+                lock (_lock)
+                {
+                    _isBlocked = true;
+                    HandOver();
+                }
             }
             return true;
         }
@@ -114,6 +140,14 @@ namespace Nep.Zmtp
                 _waiting.Clear();
                 Monitor.PulseAll(_lock);
             }
+        }
+
+        private bool IsBurst()
+        {
+            long now = Stopwatch.GetTimestamp();
+            _burst = now - _sentAt < BurstTicks ? Math.Min(MinBurst, _burst + 1) : 0;
+            _sentAt = now;
+            return _burst == MinBurst;
         }
 
         /// <summary>Write until there is nothing more (true) or the socket is full (false). The caller owns the writing.</summary>
@@ -236,16 +270,13 @@ namespace Nep.Zmtp
 
         private void HandOver()
         {
-            lock (_lock)
+            _threadMayWrite = true;
+            if (!_hasThread)
             {
-                _threadMayWrite = true;
-                if (!_hasThread)
-                {
-                    _hasThread = true;
-                    BackgroundThread.Start("writer", WriteInThread, BackgroundThread.SmallStackBytes);
-                }
-                Monitor.PulseAll(_lock);
+                _hasThread = true;
+                BackgroundThread.Start("writer", WriteInThread, BackgroundThread.SmallStackBytes);
             }
+            Monitor.PulseAll(_lock);
         }
 
         private void WriteInThread()
@@ -277,7 +308,11 @@ namespace Nep.Zmtp
                     Fail(exception.SocketErrorCode.ToString());
                     return;
                 }
-                Write();
+                bool isBlocked = !Write();
+                lock (_lock)
+                {
+                    _isBlocked = isBlocked;
+                }
             }
         }
     }
