@@ -1,7 +1,8 @@
 """Build the Unity package of the C# client: ``python -m tools.unity_package FOLDER``.
 
 The package contains the library's sources. Unity ignores files of an installed package without a ``.meta``
-file, so one is generated for each, with an id derived from the file's path.
+file, so one is generated for each, with an id derived from the file's path: references to a script survive
+an update of the package.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import gzip
 import hashlib
 import io
 import json
+import re
 import sys
 import tarfile
 from pathlib import Path, PurePosixPath
@@ -17,36 +19,52 @@ from pathlib import Path, PurePosixPath
 ROOT = Path(__file__).parents[1]
 CSHARP = ROOT / "clients" / "csharp"
 UNITY = CSHARP / "unity"
+IMPORTERS = {
+    ".asmdef": "AssemblyDefinitionImporter",
+    ".cs": "MonoImporter",
+    ".json": "PackageManifestImporter",
+    ".md": "TextScriptImporter",
+}
+HIDDEN = ("Documentation~", "Samples~")
+"""Folders that Unity does not import. Samples are copied into a project with their ``.meta`` files."""
 
 
 def package_files() -> dict[str, bytes]:
     """Return the content of each file by its path in the package."""
     placed = {
         "package.json": UNITY / "package.json",
-        "README.md": CSHARP / "README.md",
         "LICENSE.md": ROOT / "LICENSE",
         "Runtime/Nep/Nep.asmdef": UNITY / "Nep.asmdef",
     }
     for source in (CSHARP / "src").rglob("*.cs"):
         placed[f"Runtime/Nep/{source.relative_to(CSHARP / 'src').as_posix()}"] = source
-    for source in (UNITY / "Runtime").iterdir():
+    for source in (UNITY / "Runtime").glob("*.*"):
         placed[f"Runtime/Unity/{source.name}"] = source
     for source in (UNITY / "Samples~").rglob("*.cs"):
         placed[source.relative_to(UNITY).as_posix()] = source
-    files = {path: source.read_bytes() for path, source in sorted(placed.items())}
+    readme = (CSHARP / "README.md").read_text("utf-8")
+    for page in re.findall(r"\(\.\./\.\./docs/([\w-]+\.md)", readme):
+        placed[f"Documentation~/{page}"] = ROOT / "docs" / page
+    files = {path: source.read_bytes() for path, source in placed.items()}
+    files["README.md"] = readme.replace("(../../docs/", "(Documentation~/").encode()
     return dict(sorted((files | _metas(files)).items()))
 
 
 def _metas(files: dict[str, bytes]) -> dict[str, bytes]:
-    shown = [PurePosixPath(path) for path in files if not path.startswith("Samples~/")]
+    shown = [PurePosixPath(path) for path in files if not path.startswith("Documentation~/")]
     folders = {parent for path in shown for parent in path.parents if parent.name}
-    return {f"{path}.meta": _meta(path, is_folder=path in folders) for path in {*shown, *folders}}
+    return {
+        f"{path}.meta": _meta(path, is_folder=path in folders)
+        for path in {*shown, *folders}
+        if path.name not in HIDDEN
+    }
 
 
 def _meta(path: PurePosixPath, *, is_folder: bool) -> bytes:
     guid = hashlib.md5(f"org.nep.unity/{path}".encode(), usedforsecurity=False).hexdigest()
-    folder = "folderAsset: yes\n" if is_folder else ""
-    return f"fileFormatVersion: 2\nguid: {guid}\n{folder}".encode()
+    importer = "folderAsset: yes\nDefaultImporter:" if is_folder else f"{IMPORTERS[path.suffix]}:"
+    settings = "externalObjects: {}\n  userData: \n  assetBundleName: \n  assetBundleVariant: \n"
+    return f"fileFormatVersion: 2\nguid: {guid}\n{importer}\n  {settings}".encode()
 
 
 def build(folder: Path) -> Path:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import xml.etree.ElementTree as ET
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from installers.context import Context, PackageError
 from tools import unity_package
 
-__all__ = ["build", "pack_built_javascript", "pack_javascript", "pack_nuget"]
+__all__ = ["build", "check_nuget", "pack_built_javascript", "pack_javascript", "pack_nuget"]
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
@@ -55,7 +57,28 @@ def pack_nuget(source: Path, target: Path) -> list[Path]:
     for old in target.glob("Nep.*.nupkg"):
         old.unlink()
     _run([dotnet, "pack", "Nep.csproj", "--configuration", "Release", "--output", str(target)], source)
-    return sorted(target.glob("Nep.*.nupkg"))
+    packages = sorted(target.glob("Nep.*.nupkg"))
+    for package in packages:
+        check_nuget(package)
+    return packages
+
+
+def check_nuget(package: Path) -> None:
+    """Raise `PackageError` if the package lacks a file or a statement of its manifest."""
+    with zipfile.ZipFile(package) as archive:
+        names = archive.namelist()
+        manifest = archive.read("Nep.nuspec") if "Nep.nuspec" in names else b"<package/>"
+    missing = {"Nep.nuspec", "README.md", *(f"lib/netstandard2.0/Nep.{kind}" for kind in ("dll", "xml"))}
+    missing -= set(names)
+    metadata = {each.tag.rpartition("}")[2]: each for each in ET.fromstring(manifest).iter()}  # noqa: S314 - we built it
+    for name in ("id", "version", "authors", "license", "readme", "description"):
+        if name not in metadata or not metadata[name].text:
+            missing.add(name)
+    dependency = metadata.get("dependency")
+    if dependency is None or dependency.get("id") != "Newtonsoft.Json":
+        missing.add("dependency Newtonsoft.Json")
+    if missing:
+        raise PackageError(f"{package.name} lacks {', '.join(sorted(missing))}")
 
 
 def _run(command: Sequence[str], folder: Path) -> str:

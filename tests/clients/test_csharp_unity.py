@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import re
 import tarfile
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -35,12 +37,27 @@ def test_package_has_every_source_once_and_a_meta_file_with_its_own_id(tmp_path:
     assert names == [f"package/{path}" for path in files]
     runtime = [path for path in files if path.endswith(".cs") and path.startswith("Runtime/Nep/")]
     assert len(runtime) == len(sources("src"))
-    shown = [path for path in files if not path.endswith(".meta") and not path.startswith("Samples~/")]
-    assert all(f"{path}.meta" in files for path in shown)
-    ids = re.findall(
-        r"guid: (\w{32})\n", "".join(files[path].decode() for path in files if path.endswith(".meta"))
+    shown = [PurePosixPath(path) for path in files if not path.startswith("Documentation~/")]
+    folders = {str(folder) for path in shown for folder in path.parents} - {".", "Samples~"}
+    metas = [path for path in files if path.endswith(".meta")]
+    assert sorted(metas) == sorted(
+        f"{path}.meta" for path in {*map(str, shown), *folders} if not path.endswith(".meta")
     )
-    assert len(set(ids)) == len([path for path in files if path.endswith(".meta")])
+    ids = re.findall(r"guid: (\w{32})\n", "".join(files[path].decode() for path in metas))
+    assert len(set(ids)) == len(metas)
+
+
+def test_manifest_names_what_is_in_the_package() -> None:
+    files = unity_package.package_files()
+    manifest = json.loads(files["package.json"])
+    project = ET.parse(CSHARP / "Nep.csproj")
+    assert manifest["version"] == project.findtext("PropertyGroup/Version")
+    assert "com.unity.nuget.newtonsoft-json" in manifest["dependencies"]
+    for sample in manifest["samples"]:
+        assert any(path.startswith(f"{sample['path']}/") for path in files), sample
+    definitions = [json.loads(files[path]) for path in files if path.endswith(".asmdef")]
+    assert {each["name"]: each["references"] for each in definitions} == {"Nep": [], "Nep.Unity": ["Nep"]}
+    assert definitions[0]["precompiledReferences"] == ["Newtonsoft.Json.dll"]
 
 
 def rotated(quaternion: Numbers, vector: Numbers) -> list[float]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from installers.clients.packer import pack_built_javascript, pack_javascript, pack_nuget
+from installers.clients.packer import check_nuget, pack_built_javascript, pack_javascript, pack_nuget
 from installers.context import PackageError
 from tests.clients.node_programs import NEEDS_NODE, PACKAGE, build_package, node, npm, run_npm
 
@@ -51,15 +53,50 @@ def test_package_is_skipped_without_its_tool(
     assert len(capsys.readouterr().out.splitlines()) == 1
 
 
+NUSPEC = """<?xml version="1.0" encoding="utf-8"?>
+<package xmlns="http://schemas.microsoft.com/packaging/2013/05/nuspec.xsd"><metadata>
+<id>Nep</id><version>0.1.0</version><authors>The NEP Studio authors</authors>
+<license type="expression">MIT</license><readme>README.md</readme><description>Messages</description>
+<dependencies><group targetFramework=".NETStandard2.0"><dependency id="Newtonsoft.Json" version="13.0.3" />
+</group></dependencies></metadata></package>
+"""
+
+
+def write_nuget(path: Path, nuspec: str = NUSPEC, *, leaves_out: str = "") -> None:
+    """Write a package with the files that `dotnet pack` puts into one."""
+    files = ("README.md", "lib/netstandard2.0/Nep.dll", "lib/netstandard2.0/Nep.xml", "_rels/.rels")
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("Nep.nuspec", nuspec)
+        for name in files:
+            if name != leaves_out:
+                archive.writestr(name, "")
+
+
+def test_incomplete_nuget_package_is_rejected(tmp_path: Path) -> None:
+    package = tmp_path / "Nep.0.1.0.nupkg"
+    write_nuget(package)
+    check_nuget(package)
+    write_nuget(package, leaves_out="lib/netstandard2.0/Nep.xml")
+    with pytest.raises(PackageError, match=r"Nep\.xml"):
+        check_nuget(package)
+    write_nuget(package, NUSPEC.replace("Newtonsoft.Json", "Other").replace("authors", "owners"))
+    with pytest.raises(PackageError, match=r"authors, dependency Newtonsoft\.Json"):
+        check_nuget(package)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for dotnet is a shell script")
 def test_only_the_nuget_package_just_built_is_returned(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    cp = shutil.which("cp")
     dotnet, source, target = tmp_path / "dotnet", tmp_path / "source", tmp_path / "target"
     source.mkdir()
     target.mkdir()
     (target / "Nep.0.0.9.nupkg").touch()
-    dotnet.write_text(f'#!/bin/sh\n[ "$1" = pack ] && : > "{target}/Nep.0.1.0.nupkg"\n', "utf-8")
+    write_nuget(tmp_path / "built")
+    dotnet.write_text(
+        f'#!/bin/sh\n[ "$1" = pack ] && {cp} "{tmp_path}/built" "{target}/Nep.0.1.0.nupkg"\n', "utf-8"
+    )
     dotnet.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert pack_nuget(source, target) == [target / "Nep.0.1.0.nupkg"]
