@@ -21,6 +21,7 @@ import nep
 from nep.masters.master import Master
 from nep.masters.process import view
 from tests.clients.mono_programs import BUILD, CSHARP, HAS_MONO, ROOT, WITHOUT, MonoProgram, program, running
+from tests.nep import programs
 from tests.nep.backends.test_unheard_publishers import UnreachablePublisher
 from tests.nep.masters.test_attacks import attacker_at
 from tests.nep.programs import eventually
@@ -382,6 +383,44 @@ def test_rejected_payload_is_a_problem_in_the_graph_until_the_next_message(
     eventually(lambda: bool(problems()))
     adapter.ask("publish", pub=pub, bytes="AAEC")
     eventually(lambda: not problems())
+
+
+FAR_MASTER = """
+    import select, sys, time
+    real_ns = time.time_ns
+    time.time_ns = lambda: real_ns() - 86_400 * 10**9
+    from nep.system import computer
+    computer.clock_name = lambda: "another computer"
+    import nep
+    from nep.masters.master import Master
+    with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("far", master=master.address) as node:
+        pub = node.new_pub("far")
+        print(master.address)
+        while not select.select([sys.stdin], [], [], 0.05)[0]:
+            pub.publish({})
+"""
+
+
+def test_latency_is_corrected_by_the_clock_of_another_computer() -> None:
+    """The clock of the other computer, on which the master and the publisher run, is a day late."""
+    adapter_program = program("Adapter.exe", CSHARP / "conformance" / "Adapter.cs")
+    with programs.running(FAR_MASTER) as far, running(adapter_program, NEP_MASTER=far.line()) as started:
+        adapter = Adapter(started)
+        adapter.ask("node", name="csharp")
+        adapter.ask("subscriber", topic="far", type="json")
+        while adapter.heard(1)[-1]["latency_uncertainty_s"] is None:
+            assert adapter.events.pop()["latency_s"] == pytest.approx(86_400, abs=20)
+        message = adapter.events[-1]
+        assert 0 < message["latency_uncertainty_s"] < 10
+        assert -message["latency_uncertainty_s"] <= message["latency_s"] < 20
+
+
+def test_message_of_this_computer_has_a_certain_latency(adapter: Adapter, node: Node) -> None:
+    adapter.ask("subscriber", topic="near", type="json")
+    node.new_pub("near").publish({})
+    (message,) = adapter.heard(1)
+    assert message["latency_uncertainty_s"] == 0
+    assert 0 <= message["latency_s"] < LONG_S
 
 
 def test_services_are_called_in_both_directions(adapter: Adapter, node: Node) -> None:

@@ -16,7 +16,9 @@ import pytest
 from nep.backends.zeromq.loss import HeardPublishers
 from nep.errors import WireError
 from nep.messages import image_codec
+from nep.protocol.clock_samples import ClockSamples
 from nep.protocol.requests import PublisherRecord, RemotePublisher
+from nep.system.computer import computer_id
 from tests.clients.mono_programs import CSHARP, HAS_MONO, WITHOUT, MonoProgram, program, running
 from tests.nep import bad_pictures as bad
 
@@ -183,6 +185,48 @@ def test_losses_are_counted_as_in_python(wire: MonoProgram) -> None:
             steps.append((step, chance.randrange(1, 3), number if is_leap else small))
         asked = " ".join(":".join(map(str, each)) for each in steps)
         assert json.loads(wire.ask(f"loss {asked}")) == losses_in_python(steps), asked
+
+
+def clock_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
+    """Apply steps to samples of a clock; return whether each sample was of use, and each known offset."""
+    wall = steady = 0
+    samples = ClockSamples(lambda: wall, lambda: steady, 1e-9)
+    sent = samples.now()
+    results: list[object] = []
+    for step, first, second in steps:
+        if step == "add":
+            results.append(samples.add(sent, first, second))
+        elif step == "forget":
+            samples.forget()
+        else:
+            wall, steady = first, second
+            sent = samples.now() if step == "now" else sent
+        offset = samples.offset()
+        results.append("" if offset is None else f"{offset[0]} {offset[1]}")
+    return results
+
+
+def test_clocks_are_compared_as_in_python(wire: MonoProgram) -> None:
+    chance = random.Random(27)
+    for _ in range(300):
+        wall, steady, ahead = 10**18, 0, chance.choice((0, 5 * 10**9, -(10**17), 2**62))
+        steps: list[tuple[str, int, int]] = [("now", wall, steady)]
+        for _ in range(chance.randrange(1, 20)):
+            for step in ("now", "later"):
+                passed, slew = chance.choice((10**3, 10**6, 10**9)), chance.choice((0, 0, 7, 10**9))
+                wall, steady = wall + passed + slew, steady + passed
+                steps.append((step, wall, steady))
+            master = wall + ahead - chance.randrange(10**6)
+            steps.append(("add", master, master + chance.choice((0, 10**3, -5, 10**9))))
+            ahead += chance.choice((0, 0, 0, 10**8))
+            if chance.random() < 0.05:
+                steps.append(("forget", 0, 0))
+        asked = " ".join(":".join(map(str, each)) for each in steps)
+        assert json.loads(wire.ask(f"clock {asked}")) == clock_in_python(steps), asked
+
+
+def test_computer_has_the_same_id_as_in_python(wire: MonoProgram) -> None:
+    assert json.loads(wire.ask("computer")) == computer_id()
 
 
 @pytest.mark.parametrize("order", [">", "<"])

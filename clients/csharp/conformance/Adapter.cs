@@ -165,6 +165,8 @@ internal static class Adapter
         line["seq"] = message.Sequence.ToString(CultureInfo.InvariantCulture);
         line["stamp_ns"] = message.StampNanoseconds.ToString(CultureInfo.InvariantCulture);
         line["publisher"] = message.PublisherId.ToString(CultureInfo.InvariantCulture);
+        line["latency_s"] = message.Latency.TotalSeconds;
+        line["latency_uncertainty_s"] = message.LatencyUncertainty == null ? null : (double?)message.LatencyUncertainty.Value.TotalSeconds;
         line["payload"] = Convert.ToBase64String(message.Payload);
         if (message.Codec == "json")
         {

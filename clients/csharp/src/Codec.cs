@@ -43,7 +43,7 @@ namespace Nep
         public T Decode<T>(byte[] payload)
         {
             var header = new Header { Codec = Number };
-            return new Message(new WireMessage { Header = header, Payload = new ArraySegment<byte>(payload) }, Name).As<T>();
+            return new Message(new WireMessage { Header = header, Payload = new ArraySegment<byte>(payload) }, Name, null).As<T>();
         }
 
         /// <exception cref="PayloadException">The payload has no form in this codec.</exception>

@@ -9,11 +9,18 @@ namespace Nep
     public sealed class Message
     {
         private readonly WireMessage _wire;
+        private readonly Session.PublisherClock _clock;
+        private readonly ulong _receivedNs;
         private byte[] _payload;
 
-        internal Message(WireMessage wire, string messageType)
+        /// <param name="wire">The message as it was read.</param>
+        /// <param name="messageType">Type that its publisher declared.</param>
+        /// <param name="clock">Clock of its publisher, or null.</param>
+        internal Message(WireMessage wire, string messageType, Session.PublisherClock clock)
         {
             _wire = wire;
+            _clock = clock;
+            _receivedNs = Session.Clock.NowNs;
             MessageType = messageType;
         }
 
@@ -48,6 +55,34 @@ namespace Nep
         public DateTime Stamp
         {
             get { return Session.Clock.ToDateTime(_wire.Header.StampNs); }
+        }
+
+        /// <summary>
+        /// Time from its publication until it was received. Between two computers it is corrected by how their clocks differ, as far
+        /// as <see cref="LatencyUncertainty"/> says; so it may be a little below zero.
+        /// </summary>
+        public TimeSpan Latency
+        {
+            get
+            {
+                Session.ClockDifference known = _clock == null ? null : _clock.Difference;
+                decimal ns = (decimal)_receivedNs - _wire.Header.StampNs - (known == null ? 0 : known.AddNs);
+                decimal ticks = Math.Max(long.MinValue, Math.Min(long.MaxValue, decimal.Floor(ns / 100)));
+                return new TimeSpan((long)ticks);
+            }
+        }
+
+        /// <summary>
+        /// How far <see cref="Latency"/> may be wrong to either side: zero for publishers on this computer, null while nobody has
+        /// compared the two clocks; then it is not corrected.
+        /// </summary>
+        public TimeSpan? LatencyUncertainty
+        {
+            get
+            {
+                Session.ClockDifference known = _clock == null ? null : _clock.Difference;
+                return known == null ? (TimeSpan?)null : new TimeSpan(known.UncertaintyNs / 100);
+            }
         }
 
         /// <summary>Id of the publisher.</summary>

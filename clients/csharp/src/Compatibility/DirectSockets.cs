@@ -89,7 +89,7 @@ namespace Nep
                 Topic = _topic,
                 Header = new Header { Codec = Codec.For("string").Number, StampNs = Clock.NowNs, PayloadSize = (uint)size },
                 Payload = new ArraySegment<byte>(parts[0], _prefix.Length, size),
-            }, "string"));
+            }, "string", null));
         }
 
         void ISubOwner.Disconnected(SubConnection from, string reason)

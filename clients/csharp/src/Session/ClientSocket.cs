@@ -198,6 +198,11 @@ namespace Nep.Session
         {
         }
 
+        public void Correct(Dictionary<string, ClockDifference> clocks)
+        {
+            // answers have no times
+        }
+
         public void Close()
         {
             List<ServerLink> links;

@@ -14,6 +14,29 @@ namespace Nep.Session
             get { return Steady.Elapsed.TotalSeconds; }
         }
 
+        /// <summary>Nanoseconds that only go forward.</summary>
+        public static long SteadyNs
+        {
+            get { return (long)(Stopwatch.GetTimestamp() * (1e9 / Stopwatch.Frequency)); }
+        }
+
+        /// <summary>Step in which <see cref="NowNs"/> goes on: 16 ms with .NET Framework, else microseconds.</summary>
+        public static long MeasureResolutionNs()
+        {
+            ulong first = NextNs();
+            return (long)(NextNs() - first);
+        }
+
+        private static ulong NextNs()
+        {
+            ulong begin = NowNs, now = begin;
+            while (now <= begin)
+            {
+                now = NowNs;
+            }
+            return now;
+        }
+
         public static ulong NowNs
         {
             get { return (ulong)(DateTime.UtcNow.Ticks - EpochTicks) * 100; }

@@ -11,6 +11,9 @@ namespace Nep.Session
         public RemotePublisher Remote;
         public SubConnection Connection;
 
+        /// <summary>Clock of its computer; its messages ask for it.</summary>
+        public readonly PublisherClock Clock = new PublisherClock();
+
         /// <summary>Newest message that was received or counted as lost; null while unknown, 0 if all are still to come.</summary>
         public ulong? Last;
 
@@ -36,6 +39,7 @@ namespace Nep.Session
         private const int MaxUnlisted = 1000;
 
         private readonly Dictionary<ulong, HeardPublisher> _byId = new Dictionary<ulong, HeardPublisher>();
+        private Dictionary<string, ClockDifference> _clocks = new Dictionary<string, ClockDifference>();
         private readonly LinkedList<ulong> _unlisted = new LinkedList<ulong>();
 
         public long Received { get; private set; }
@@ -72,6 +76,7 @@ namespace Nep.Session
         {
             HeardPublisher source = Get(remote.Publisher.Id);
             source.Remote = remote;
+            source.Clock.Difference = DifferenceOf(remote);
             source.IsLapsed = false;
             source.EndsAtS = null;
             _unlisted.Remove(remote.Publisher.Id);
@@ -83,6 +88,25 @@ namespace Nep.Session
         {
             HeardPublisher source = Get(publisher);
             source.Last = source.Last ?? 0;
+        }
+
+        /// <summary>Take over how the clocks of other computers' nodes differ; no others are known.</summary>
+        public void Correct(Dictionary<string, ClockDifference> clocks)
+        {
+            _clocks = clocks;
+            foreach (HeardPublisher each in _byId.Values)
+            {
+                if (each.Remote != null)
+                {
+                    each.Clock.Difference = DifferenceOf(each.Remote);
+                }
+            }
+        }
+
+        private ClockDifference DifferenceOf(RemotePublisher remote)
+        {
+            ClockDifference known;
+            return remote.IsHere ? ClockDifference.Same : remote.NodeId != null && _clocks.TryGetValue(remote.NodeId, out known) ? known : null;
         }
 
         public HeardPublisher Remove(ulong publisher)
@@ -142,8 +166,8 @@ namespace Nep.Session
             {
                 return false;
             }
-            source.EarlyUntilS = source.EarlyUntilS ?? Clock.SteadyS + EarlyS;
-            return Clock.SteadyS < source.EarlyUntilS;
+            source.EarlyUntilS = source.EarlyUntilS ?? Session.Clock.SteadyS + EarlyS;
+            return Session.Clock.SteadyS < source.EarlyUntilS;
         }
 
         /// <summary>Messages up to <paramref name="seq"/> were sent before this; false when that cannot be.</summary>
@@ -199,7 +223,7 @@ namespace Nep.Session
             HeardPublisher source = Find(publisher);
             if (source != null && source.EndsAtS == null)
             {
-                source.EndsAtS = Clock.SteadyS + FarewellS;
+                source.EndsAtS = Session.Clock.SteadyS + FarewellS;
                 source.Promised = Math.Max(source.Promised, final);
             }
         }
@@ -231,7 +255,7 @@ namespace Nep.Session
             var ended = new List<ulong>();
             foreach (KeyValuePair<ulong, HeardPublisher> each in _byId)
             {
-                if (each.Value.EndsAtS != null && Clock.SteadyS >= each.Value.EndsAtS)
+                if (each.Value.EndsAtS != null && Session.Clock.SteadyS >= each.Value.EndsAtS)
                 {
                     ended.Add(each.Key);
                 }

@@ -51,6 +51,9 @@ namespace Nep.Session
         /// <summary>A renewal was answered: the newest messages of publishers that the master knows.</summary>
         void Tick(Dictionary<ulong, ulong> lastSeqs);
 
+        /// <summary>How clocks differ from this computer's, by node; no others are known.</summary>
+        void Correct(Dictionary<string, ClockDifference> clocks);
+
         void Close();
     }
 
@@ -69,6 +72,8 @@ namespace Nep.Session
         private readonly Dictionary<ulong, ISessionSubscriber> _subscribers = new Dictionary<ulong, ISessionSubscriber>();
         private readonly HashSet<ulong> _confirmed = new HashSet<ulong>();
         private readonly MasterCalls _calls;
+        private readonly ClockSamples _samples;
+        private bool _hasClocks;
         private readonly Stopwatch _clock = Stopwatch.StartNew();
         private List<string> _served = new List<string>();
         private string _ownHost = MasterAddress.Loopback;
@@ -88,6 +93,7 @@ namespace Nep.Session
             var limits = new ZmtpLimits { MaxMessageBytes = 256L << 20, MaxReconnectMs = 400, HeartbeatMs = 1000, HeartbeatTimeoutMs = 3000 };
             _socket = new DealerSocket(address.Endpoint, this, limits, NullMechanism.Create);
             _calls = new MasterCalls(address.ToString(), _socket);
+            _samples = new ClockSamples(() => (long)Clock.NowNs, () => Clock.SteadyNs, Clock.MeasureResolutionNs());
             _socket.Start();
             BackgroundThread.Start("node", Run, BackgroundThread.SmallStackBytes);
         }
@@ -473,17 +479,38 @@ namespace Nep.Session
             {
                 return;
             }
+            var clock = new List<object>();
+            Moment sent;
+            long offsetNs, uncertaintyNs;
+            lock (_samples)
+            {
+                if (_samples.TryGetOffset(out offsetNs, out uncertaintyNs))
+                {
+                    clock.Add(offsetNs);
+                    clock.Add(uncertaintyNs);
+                }
+                sent = _samples.Now();
+            }
+            if (clock.Count == 0)
+            {
+                Correct(new Dictionary<string, ClockDifference>()); // also when this computer's clock was set just now
+            }
             var what = new Dictionary<object, object>
             {
-                { "node_id", _node.Id }, { "epoch", epoch }, { "revision", revision },
+                { "node_id", _node.Id }, { "epoch", epoch }, { "revision", revision }, { "clock", clock },
                 { "publishers", publishers.ConvertAll(each => (object)each.Statistics()) },
                 { "subscribers", subscribers.ConvertAll(each => (object)each.Statistics()) },
             };
-            _calls.Tell("renew", what, Renewed);
+            _calls.Tell("renew", what, answer => Renewed(answer, sent));
         }
 
-        private void Renewed(Fields answer)
+        private void Renewed(Fields answer, Moment sent)
         {
+            Moment received;
+            lock (_samples)
+            {
+                received = _samples.Now();
+            }
             if (answer.Flag("again"))
             {
                 Join();
@@ -502,10 +529,59 @@ namespace Nep.Session
                 string name = topic.Text("topic", null);
                 EachSubscriberOf(name, subscriber => subscriber.Reconcile(name, remotes));
             }
+            Correct(DifferencesIn(answer));
             Dictionary<ulong, ulong> lastSeqs = answer.Numbers("last_seqs");
             foreach (ISessionSubscriber each in Subscribers())
             {
                 each.Tick(lastSeqs);
+            }
+            CompareClocks(answer, sent, received);
+        }
+
+        private void CompareClocks(Fields answer, Moment sent, Moment received)
+        {
+            List<long> times = answer.Integers("times");
+            if (times.Count != 2 || answer.Unsigned("epoch", 0) != _epoch)
+            {
+                return; // the master has the same clock, or is another one
+            }
+            long ignored;
+            bool isFirst;
+            lock (_samples)
+            {
+                bool wasKnown = _samples.TryGetOffset(out ignored, out ignored);
+                isFirst = _samples.Add(sent, times[0], times[1], received) && !wasKnown;
+            }
+            if (isFirst)
+            {
+                lock (_lock)
+                {
+                    _dueAtS = 0.0; // other nodes wait for it
+                    Monitor.PulseAll(_lock);
+                }
+            }
+        }
+
+        private static Dictionary<string, ClockDifference> DifferencesIn(Fields answer)
+        {
+            var differences = new Dictionary<string, ClockDifference>();
+            foreach (KeyValuePair<string, List<long>> each in answer.IntegersByText("clocks"))
+            {
+                List<long> told = each.Value; // the sums of two clocks
+                if (told.Count == 2 && ClockDifference.IsPossible(told[0] / 2, told[1] / 2))
+                {
+                    differences[each.Key] = new ClockDifference(told[0], told[1], Clock.SteadyNs);
+                }
+            }
+            return differences;
+        }
+
+        private void Correct(Dictionary<string, ClockDifference> clocks)
+        {
+            if (clocks.Count > 0 || _hasClocks)
+            {
+                _hasClocks = clocks.Count > 0;
+                Subscribers().ForEach(each => each.Correct(clocks));
             }
         }
 
@@ -534,6 +610,10 @@ namespace Nep.Session
 
         private void Joined(Fields reply, List<ISessionPublisher> publishers, List<ISessionSubscriber> subscribers)
         {
+            lock (_samples)
+            {
+                _samples.Forget(); // the master may be on another computer now
+            }
             lock (_lock)
             {
                 _epoch = reply.Unsigned("epoch", 0);

@@ -143,6 +143,11 @@ namespace Nep.Session
             Members().ForEach(each => each.WaitForEchoes(deadline.LeftMs));
         }
 
+        public void Correct(Dictionary<string, ClockDifference> clocks)
+        {
+            Members().ForEach(each => each.Correct(clocks));
+        }
+
         public void Close()
         {
             lock (_lock)

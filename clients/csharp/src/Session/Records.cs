@@ -20,6 +20,7 @@ namespace Nep.Session
             return new Dictionary<object, object>
             {
                 { "id", Id }, { "name", Name }, { "host", Host }, { "pid", Pid }, { "language", "C#" }, { "since_ns", SinceNs }, { "key", Key },
+                { "computer", ComputerId.Get() },
             };
         }
     }
@@ -91,7 +92,11 @@ namespace Nep.Session
     internal sealed class RemotePublisher
     {
         public PublisherRecord Publisher;
+        public string NodeId;
         public string NodeName;
+
+        /// <summary>Whether it is on this very computer, with the same clock.</summary>
+        public bool IsHere;
 
         /// <summary>Endpoint to connect to, or null when there is none for this node.</summary>
         public string Endpoint;
@@ -100,9 +105,21 @@ namespace Nep.Session
         {
             var remote = new RemotePublisher();
             remote.Publisher = PublisherRecord.Read(fields.Map("publisher"));
+            remote.NodeId = fields.Text("node_id", "");
             remote.NodeName = fields.Text("node_name", null);
+            remote.IsHere = IsOnThisComputer(fields.Text("computer", ""), remote.Publisher.Endpoints);
             remote.Endpoint = Nearest(remote.Publisher.Endpoints, master);
             return remote;
+        }
+
+        private static bool IsOnThisComputer(string computer, List<string> endpoints)
+        {
+            ZmtpEndpoint first;
+            if (computer.Length > 0 && ComputerId.Get().Length > 0)
+            {
+                return computer == ComputerId.Get();
+            }
+            return endpoints.Count > 0 && ZmtpEndpoint.TryParse(endpoints[0], out first) && first.IsLoopback; // an older program
         }
 
         private static string Nearest(List<string> endpoints, MasterAddress master)

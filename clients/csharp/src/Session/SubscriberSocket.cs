@@ -188,6 +188,14 @@ namespace Nep.Session
             }
         }
 
+        public void Correct(Dictionary<string, ClockDifference> clocks)
+        {
+            lock (_lock)
+            {
+                _sources.Correct(clocks);
+            }
+        }
+
         public void Close()
         {
             lock (_lock)
@@ -261,8 +269,9 @@ namespace Nep.Session
                 _sources.Dropped(1);
                 throw new WireException("shared-memory"); // nobody was told that it would be read
             }
-            RemotePublisher remote = _sources.Get(publisher).Remote;
-            _sources.Dropped(Inbox.Put(new Message(message, remote == null ? Record.MsgType : remote.Publisher.MsgType)));
+            HeardPublisher source = _sources.Get(publisher);
+            string type = source.Remote == null ? Record.MsgType : source.Remote.Publisher.MsgType;
+            _sources.Dropped(Inbox.Put(new Message(message, type, source.Clock)));
         }
 
         private void TakeNotice(SubConnection from, Header header)

@@ -157,6 +157,40 @@ namespace Nep.Wire
             return texts;
         }
 
+        public List<long> Integers(string name)
+        {
+            return ToIntegers(List(name));
+        }
+
+        /// <summary>The map with text keys and lists of integers that <c>clocks</c> is.</summary>
+        public Dictionary<string, List<long>> IntegersByText(string name)
+        {
+            var lists = new Dictionary<string, List<long>>();
+            if (Has(name))
+            {
+                foreach (KeyValuePair<object, object> each in Map(name)._map)
+                {
+                    var key = each.Key as string;
+                    var list = each.Value as List<object>;
+                    if (key == null || list == null)
+                    {
+                        throw new WireException("field-type");
+                    }
+                    lists[key] = ToIntegers(list);
+                }
+            }
+            return lists;
+        }
+
+        private static List<long> ToIntegers(List<object> list)
+        {
+            if (!list.TrueForAll(each => each is long))
+            {
+                throw new WireException("field-type");
+            }
+            return list.ConvertAll(each => (long)each);
+        }
+
         /// <summary>The map with integer keys that <c>last_seqs</c> is.</summary>
         public Dictionary<ulong, ulong> Numbers(string name)
         {

@@ -58,6 +58,10 @@ internal static class WirePeer
             case "id":
                 string key = words[1] == "e9" ? "\u00e9" : words[1];
                 return words.Length == 2 ? Ids.NodeId(key) : Ids.Id(key, long.Parse(words[2], CultureInfo.InvariantCulture)).ToString(CultureInfo.InvariantCulture);
+            case "computer":
+                return ComputerId.Get();
+            case "clock":
+                return Clocks(words);
             case "loss":
                 return Losses(words);
             case "image":
@@ -88,6 +92,41 @@ internal static class WirePeer
         }
         results.Add(sources.Received);
         results.Add(sources.Lost);
+        return results;
+    }
+
+    /// <summary>Applies steps to samples of a clock that the steps set: wall, steady, and what a renewal said.</summary>
+    private static JToken Clocks(string[] words)
+    {
+        long wall = 0, steady = 0;
+        var samples = new ClockSamples(() => wall, () => steady, 1);
+        Moment sent = samples.Now();
+        var results = new JArray();
+        for (int i = 1; i < words.Length; i++)
+        {
+            string[] step = words[i].Split(':');
+            long first = long.Parse(step[1], CultureInfo.InvariantCulture), second = long.Parse(step[2], CultureInfo.InvariantCulture);
+            switch (step[0])
+            {
+                case "now":
+                    wall = first;
+                    steady = second;
+                    sent = samples.Now();
+                    break;
+                case "later":
+                    wall = first;
+                    steady = second;
+                    break;
+                case "add":
+                    results.Add(samples.Add(sent, first, second, samples.Now()));
+                    break;
+                case "forget":
+                    samples.Forget();
+                    break;
+            }
+            long offsetNs, uncertaintyNs;
+            results.Add(samples.TryGetOffset(out offsetNs, out uncertaintyNs) ? offsetNs + " " + uncertaintyNs : "");
+        }
         return results;
     }
 
