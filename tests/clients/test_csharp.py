@@ -303,6 +303,18 @@ def test_foreign_program_at_the_masters_address_is_named_and_the_master_found_la
     assert len(log.read_text().splitlines()) == 2
 
 
+def test_foreign_program_at_a_publishers_address_is_a_problem_in_the_graph(
+    adapter: Adapter, master: Master, node: Node
+) -> None:
+    adapter.ask("subscriber", topic="t", type="json")
+    with attacker_at(master) as connection, socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+        free.close()
+        with foreign_socket(zmq.REP, address):
+            UnreachablePublisher(connection, f"tcp://{address}").register()
+            eventually(lambda: any("(it is a REP socket)" in each.sentence for each in node.graph().alerts))
+
+
 @contextmanager
 def foreign_socket(kind: int, address: str) -> Iterator[None]:
     """Bind a socket of another program at an address."""
