@@ -72,7 +72,7 @@ namespace Nep.Session
         private readonly Dictionary<ulong, ISessionSubscriber> _subscribers = new Dictionary<ulong, ISessionSubscriber>();
         private readonly HashSet<ulong> _confirmed = new HashSet<ulong>();
         private readonly MasterCalls _calls;
-        private readonly ClockSamples _samples;
+        private readonly MasterClock _masterClock = new MasterClock();
         private bool _hasClocks;
         private readonly Stopwatch _clock = Stopwatch.StartNew();
         private List<string> _served = new List<string>();
@@ -93,7 +93,6 @@ namespace Nep.Session
             var limits = new ZmtpLimits { MaxMessageBytes = 256L << 20, MaxReconnectMs = 400, HeartbeatMs = 1000, HeartbeatTimeoutMs = 3000 };
             _socket = new DealerSocket(address.Endpoint, this, limits, NullMechanism.Create);
             _calls = new MasterCalls(address.ToString(), _socket);
-            _samples = new ClockSamples(() => (long)Clock.NowNs, () => Clock.SteadyNs, Clock.MeasureResolutionNs());
             _socket.Start();
             BackgroundThread.Start("node", Run, BackgroundThread.SmallStackBytes);
         }
@@ -454,43 +453,21 @@ namespace Nep.Session
         private void Renew()
         {
             ulong epoch, revision;
-            var publishers = new List<ISessionPublisher>();
-            var subscribers = new List<ISessionSubscriber>();
+            List<ISessionPublisher> publishers;
+            List<ISessionSubscriber> subscribers;
             lock (_lock)
             {
                 epoch = _epoch;
                 revision = _revision;
-                foreach (KeyValuePair<ulong, ISessionPublisher> each in _publishers)
-                {
-                    if (_confirmed.Contains(each.Key))
-                    {
-                        publishers.Add(each.Value);
-                    }
-                }
-                foreach (KeyValuePair<ulong, ISessionSubscriber> each in _subscribers)
-                {
-                    if (_confirmed.Contains(each.Key))
-                    {
-                        subscribers.Add(each.Value);
-                    }
-                }
+                publishers = Publishers().FindAll(each => _confirmed.Contains(each.Record.Id));
+                subscribers = Subscribers().FindAll(each => _confirmed.Contains(each.Record.Id));
             }
             if (epoch == 0)
             {
                 return;
             }
-            var clock = new List<object>();
-            Moment sent;
-            long offsetNs, uncertaintyNs;
-            lock (_samples)
-            {
-                if (_samples.TryGetOffset(out offsetNs, out uncertaintyNs))
-                {
-                    clock.Add(offsetNs);
-                    clock.Add(uncertaintyNs);
-                }
-                sent = _samples.Now();
-            }
+            List<object> clock = _masterClock.Field();
+            Moment sent = _masterClock.Now();
             if (clock.Count == 0)
             {
                 Correct(new Dictionary<string, ClockDifference>()); // also when this computer's clock was set just now
@@ -506,11 +483,7 @@ namespace Nep.Session
 
         private void Renewed(Fields answer, Moment sent)
         {
-            Moment received;
-            lock (_samples)
-            {
-                received = _samples.Now();
-            }
+            Moment received = _masterClock.Now();
             if (answer.Flag("again"))
             {
                 Join();
@@ -529,30 +502,13 @@ namespace Nep.Session
                 string name = topic.Text("topic", null);
                 EachSubscriberOf(name, subscriber => subscriber.Reconcile(name, remotes));
             }
-            Correct(DifferencesIn(answer));
+            Correct(MasterClock.DifferencesIn(answer));
             Dictionary<ulong, ulong> lastSeqs = answer.Numbers("last_seqs");
             foreach (ISessionSubscriber each in Subscribers())
             {
                 each.Tick(lastSeqs);
             }
-            CompareClocks(answer, sent, received);
-        }
-
-        private void CompareClocks(Fields answer, Moment sent, Moment received)
-        {
-            List<long> times = answer.Integers("times");
-            if (times.Count != 2 || answer.Unsigned("epoch", 0) != _epoch)
-            {
-                return; // the master has the same clock, or is another one
-            }
-            long ignored;
-            bool isFirst;
-            lock (_samples)
-            {
-                bool wasKnown = _samples.TryGetOffset(out ignored, out ignored);
-                isFirst = _samples.Add(sent, times[0], times[1], received) && !wasKnown;
-            }
-            if (isFirst)
+            if (answer.Unsigned("epoch", 0) == _epoch && _masterClock.Compare(answer, sent, received))
             {
                 lock (_lock)
                 {
@@ -560,20 +516,6 @@ namespace Nep.Session
                     Monitor.PulseAll(_lock);
                 }
             }
-        }
-
-        private static Dictionary<string, ClockDifference> DifferencesIn(Fields answer)
-        {
-            var differences = new Dictionary<string, ClockDifference>();
-            foreach (KeyValuePair<string, List<long>> each in answer.IntegersByText("clocks"))
-            {
-                List<long> told = each.Value; // the sums of two clocks
-                if (told.Count == 2 && ClockDifference.IsPossible(told[0] / 2, told[1] / 2))
-                {
-                    differences[each.Key] = new ClockDifference(told[0], told[1], Clock.SteadyNs);
-                }
-            }
-            return differences;
         }
 
         private void Correct(Dictionary<string, ClockDifference> clocks)
@@ -610,10 +552,7 @@ namespace Nep.Session
 
         private void Joined(Fields reply, List<ISessionPublisher> publishers, List<ISessionSubscriber> subscribers)
         {
-            lock (_samples)
-            {
-                _samples.Forget(); // the master may be on another computer now
-            }
+            _masterClock.Forget(); // the master may be on another computer now
             lock (_lock)
             {
                 _epoch = reply.Unsigned("epoch", 0);

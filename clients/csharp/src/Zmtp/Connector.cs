@@ -21,6 +21,7 @@ namespace Nep.Zmtp
     /// <summary>Keeps one outgoing connection: dials, reads, and dials again with growing waits, in a background thread.</summary>
     internal sealed class Connector
     {
+        private const string ClosedHere = "this side closed the connection";
         private readonly ZmtpEndpoint _endpoint;
         private readonly string _socketType;
         private readonly ZmtpLimits _limits;
@@ -129,7 +130,7 @@ namespace Nep.Zmtp
                 _connection = connection;
                 if (IsStopped)
                 {
-                    return "this side closed the connection";
+                    return ClosedHere;
                 }
                 _owner.Connected(this, connection);
                 sinceConnected = Stopwatch.StartNew();
@@ -138,30 +139,9 @@ namespace Nep.Zmtp
                     _owner.Received(this, connection.ReadMessage());
                 }
             }
-            catch (ZmtpException exception)
-            {
-                _refused.Add(exception.Code);
-                _problem = exception.Message;
-                return exception.Message;
-            }
-            catch (ConnectionClosedException exception)
-            {
-                _problem = sinceConnected == null ? "it closed the connection" : _problem;
-                return exception.Message;
-            }
-            catch (SocketException exception)
-            {
-                _problem = null;
-                return exception.Message;
-            }
-            catch (ObjectDisposedException)
-            {
-                return "this side closed the connection";
-            }
             catch (Exception exception) // whatever a peer sends, the thread goes on
             {
-                _refused.Add("unexpected-" + exception.GetType().Name);
-                return exception.Message;
+                return Ended(exception, sinceConnected != null);
             }
             finally
             {
@@ -174,6 +154,34 @@ namespace Nep.Zmtp
                     _waitMs = _limits.MinReconnectMs; // a peer that ends each connection at once is dialled less and less often
                 }
             }
+        }
+
+        /// <summary>Note why an attempt ended, and return it.</summary>
+        private string Ended(Exception exception, bool wasConnected)
+        {
+            var broken = exception as ZmtpException;
+            if (broken != null)
+            {
+                _refused.Add(broken.Code);
+                _problem = broken.Message;
+            }
+            else if (exception is ConnectionClosedException)
+            {
+                _problem = wasConnected ? _problem : "it closed the connection";
+            }
+            else if (exception is SocketException)
+            {
+                _problem = null; // nobody is there
+            }
+            else if (exception is ObjectDisposedException)
+            {
+                return ClosedHere;
+            }
+            else
+            {
+                _refused.Add("unexpected-" + exception.GetType().Name);
+            }
+            return exception.Message;
         }
 
         /// <summary>Grows to the limit; a quarter of it is random, so that clients do not dial in step.</summary>
