@@ -359,7 +359,7 @@ def test_waits_grow_while_a_program_closes_each_connection(stack: ExitStack, ans
     sub = started(stack, "sub")
     began = time.monotonic()
     sub.say(f"connect tcp://127.0.0.1:{foreign.port}")
-    eventually(lambda: len(foreign.accepted) == 5)
+    eventually(lambda: len(foreign.accepted) >= 5)
     assert time.monotonic() - began >= (0.05 + 0.1 + 0.2 + 0.4) * 7 / 8
 
 

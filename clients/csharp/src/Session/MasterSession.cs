@@ -83,6 +83,7 @@ namespace Nep.Session
         private double _dueAtS;
         private double _joinAgainAtS;
         private volatile bool _isProblemReported;
+        private string _lastProblem;
         private bool _isLeaving;
         private bool _isClosed;
 
@@ -426,7 +427,9 @@ namespace Nep.Session
         private void ReportProblem()
         {
             string problem = _socket.Problem;
-            if (problem != null && !_isProblemReported)
+            bool isSteady = problem != null && problem == _lastProblem; // a master that ends closes connections, too
+            _lastProblem = problem;
+            if (isSteady && !_isProblemReported)
             {
                 _isProblemReported = true;
                 Log.Warning("The program at the master's address " + _address + " is no master (" + problem + "). Still trying to reach a master there.");
