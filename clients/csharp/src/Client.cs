@@ -41,9 +41,13 @@ namespace Nep
         /// <param name="request">Request.</param>
         /// <param name="timeout">Longest wait for a server and its answer.</param>
         /// <param name="cancellation">Ends the wait; the server may carry it out all the same.</param>
-        public Task<TAnswer> CallAsync<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation = default(CancellationToken))
+        public async Task<TAnswer> CallAsync<TAnswer>(object request, TimeSpan timeout, CancellationToken cancellation = default(CancellationToken))
         {
-            return BackgroundTask.Run(() => Call<TAnswer>(request, timeout, cancellation), _socket.Wake, cancellation);
+            using (cancellation.Register(_socket.Wake))
+            {
+                return await Task.Factory.StartNew(() => Call<TAnswer>(request, timeout, cancellation), cancellation,
+                    TaskCreationOptions.LongRunning, TaskScheduler.Default).ConfigureAwait(false);
+            }
         }
 
         /// <summary>Close; waiting calls end with <see cref="ObjectDisposedException"/>.</summary>

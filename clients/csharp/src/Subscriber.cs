@@ -63,7 +63,7 @@ namespace Nep
         /// <returns>The message, or null when the subscriber was closed.</returns>
         public Message Receive()
         {
-            return _socket.Inbox.Take(-1, CancellationToken.None);
+            return _socket.Inbox.Take(-1);
         }
 
         /// <summary>Wait for the next message, for a limited time.</summary>
@@ -72,7 +72,7 @@ namespace Nep
         /// <returns>Whether there was one.</returns>
         public bool TryReceive(TimeSpan timeout, out Message message)
         {
-            message = _socket.Inbox.Take(Node.TimeoutMs(timeout), CancellationToken.None);
+            message = _socket.Inbox.Take(Node.TimeoutMs(timeout));
             return message != null;
         }
 
@@ -80,15 +80,9 @@ namespace Nep
         /// <param name="cancellation">Ends the wait.</param>
         /// <returns>The message; null when the subscriber was closed.</returns>
         /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
-        public async Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
+        public Task<Message> ReceiveAsync(CancellationToken cancellation = default(CancellationToken))
         {
-            Inbox inbox = _socket.Inbox;
-            Message message = await BackgroundTask.Run(() => inbox.Take(-1, cancellation), inbox.Wake, cancellation).ConfigureAwait(false);
-            if (message == null)
-            {
-                cancellation.ThrowIfCancellationRequested();
-            }
-            return message;
+            return _socket.Inbox.TakeAsync(cancellation);
         }
 
         /// <summary>Close; a waiting <see cref="Receive"/> returns null.</summary>

@@ -1,5 +1,4 @@
 using System;
-using System.Threading;
 
 namespace Nep
 {
@@ -35,7 +34,7 @@ namespace Nep
         /// <summary>Call the callback for one waiting message; false when there is none, or a thread does it.</summary>
         internal bool RunOne()
         {
-            Message message = _hasThread ? null : Subscriber.Socket.Inbox.Take(0, CancellationToken.None);
+            Message message = _hasThread ? null : Subscriber.Socket.Inbox.Take(0);
             if (message == null)
             {
                 return false;

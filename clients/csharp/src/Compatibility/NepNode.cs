@@ -278,7 +278,7 @@ namespace Nep
         /// <summary>Return whether a message is there, and its JSON or text (empty when there is none).</summary>
         public bool Listen(out string message)
         {
-            Message received = _inbox.Take(0, CancellationToken.None);
+            Message received = _inbox.Take(0);
             message = received == null ? "" : received.Text;
             return received != null;
         }
@@ -286,7 +286,7 @@ namespace Nep
         /// <summary>Wait for the next message and return its JSON or text.</summary>
         public string BlockingListen()
         {
-            Message received = _inbox.Take(-1, CancellationToken.None);
+            Message received = _inbox.Take(-1);
             return received == null ? "" : received.Text;
         }
 

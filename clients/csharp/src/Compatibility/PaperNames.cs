@@ -1,5 +1,4 @@
 using System.ComponentModel;
-using System.Threading;
 
 namespace Nep
 {
@@ -59,7 +58,7 @@ namespace Nep
         [EditorBrowsable(EditorBrowsableState.Never)]
         public bool listenNB(ref string msg)
         {
-            Message message = _socket.Inbox.Take(0, CancellationToken.None);
+            Message message = _socket.Inbox.Take(0);
             if (message == null)
             {
                 return false;

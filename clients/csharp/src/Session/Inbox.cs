@@ -1,5 +1,6 @@
 using System.Collections.Generic;
 using System.Threading;
+using System.Threading.Tasks;
 
 namespace Nep.Session
 {
@@ -8,6 +9,7 @@ namespace Nep.Session
     {
         private readonly object _lock = new object();
         private readonly Queue<Message> _messages = new Queue<Message>();
+        private readonly Queue<TaskCompletionSource<Message>> _awaiting = new Queue<TaskCompletionSource<Message>>();
         private readonly SubscriberOptions _options;
         private long _bytes;
         private bool _isClosed;
@@ -31,6 +33,10 @@ namespace Nep.Session
                     _messages.Clear();
                     _bytes = 0;
                 }
+                if (HandOver(message))
+                {
+                    return 0;
+                }
                 _messages.Enqueue(message);
                 _bytes += message.Size;
                 int dropped = 0;
@@ -46,32 +52,65 @@ namespace Nep.Session
         }
 
         /// <summary>Next message, waited for; null after the timeout (-1: none) or when it was closed.</summary>
-        public Message Take(int timeoutMs, CancellationToken cancellation)
+        public Message Take(int timeoutMs)
         {
             var deadline = new Deadline(timeoutMs);
             lock (_lock)
             {
                 while (_messages.Count == 0)
                 {
-                    if (_isClosed || deadline.IsOver || cancellation.IsCancellationRequested)
+                    if (_isClosed || deadline.IsOver)
                     {
                         return null;
                     }
                     deadline.Wait(_lock);
                 }
-                Message message = _messages.Dequeue();
-                _bytes -= message.Size;
-                return message;
+                return TakeFirst();
             }
         }
 
-        /// <summary>Let those who wait look again.</summary>
-        public void Wake()
+        /// <summary>Next message, without a thread that waits; null when it was closed.</summary>
+        /// <exception cref="OperationCanceledException">The wait was cancelled.</exception>
+        public async Task<Message> TakeAsync(CancellationToken cancellation)
         {
+            cancellation.ThrowIfCancellationRequested();
+            var awaiting = new TaskCompletionSource<Message>(TaskCreationOptions.RunContinuationsAsynchronously);
             lock (_lock)
             {
-                Monitor.PulseAll(_lock);
+                if (_isClosed || _messages.Count > 0)
+                {
+                    return _isClosed ? null : TakeFirst();
+                }
+                while (_awaiting.Count > 0 && _awaiting.Peek().Task.IsCompleted)
+                {
+                    _awaiting.Dequeue(); // cancelled
+                }
+                _awaiting.Enqueue(awaiting);
             }
+            using (cancellation.Register(() => awaiting.TrySetCanceled(cancellation)))
+            {
+                return await awaiting.Task.ConfigureAwait(false);
+            }
+        }
+
+        private Message TakeFirst()
+        {
+            Message message = _messages.Dequeue();
+            _bytes -= message.Size;
+            return message;
+        }
+
+        /// <summary>Give a message to the first task that waits; false when none does.</summary>
+        private bool HandOver(Message message)
+        {
+            while (_awaiting.Count > 0)
+            {
+                if (_awaiting.Dequeue().TrySetResult(message))
+                {
+                    return true;
+                }
+            }
+            return false; // all that waited were cancelled
         }
 
         /// <summary>Forget what was not read.</summary>
@@ -81,6 +120,10 @@ namespace Nep.Session
             {
                 _isClosed = true;
                 _messages.Clear();
+                while (_awaiting.Count > 0)
+                {
+                    _awaiting.Dequeue().TrySetResult(null);
+                }
                 Monitor.PulseAll(_lock);
             }
         }

@@ -1,5 +1,6 @@
 using System;
 using System.Collections.Generic;
+using System.Diagnostics;
 using System.Threading;
 using System.Threading.Tasks;
 using Nep;
@@ -36,6 +37,20 @@ internal static class Api
             pending = subscriber.ReceiveAsync(cancellation.Token);
             cancellation.Cancel();
             Expect(Fails<OperationCanceledException>(() => pending.GetAwaiter().GetResult()), "cancellation");
+            var awaited = new List<Task<Message>>();
+            for (int i = 0; i < 300; i++)
+            {
+                awaited.Add(subscriber.ReceiveAsync(CancellationToken.None));
+            }
+            Expect(Process.GetCurrentProcess().Threads.Count < 200, "no thread for each task");
+            for (int i = 0; i < 300; i++)
+            {
+                publisher.Publish(i);
+            }
+            for (int i = 0; i < 300; i++)
+            {
+                Expect(awaited[i].Result.As<int>() == i, "tasks get messages in order");
+            }
             Message message;
             Expect(!subscriber.TryReceive(TimeSpan.Zero, out message), "nothing is left");
             Expect(Fails<PayloadException>(() => publisher.Publish(Nested(65))), "too deep");
@@ -44,6 +59,10 @@ internal static class Api
             Services(node);
             subscriber.Close();
             Expect(subscriber.Receive() == null, "closed");
+            Subscriber silent = node.CreateSubscriber("silent");
+            pending = silent.ReceiveAsync(CancellationToken.None);
+            silent.Close();
+            Expect(pending.Result == null, "closed while a task waits");
             publisher.Close();
             Expect(Fails<ObjectDisposedException>(() => publisher.Publish(1)), "closed publisher");
         }
