@@ -38,6 +38,7 @@ QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
+    "app.ui.shell.dialogs.web_pages.notice_strip": "a widget of the sheet as the others beside it are",
     "app.core.graph.dot": "pure, and tested alone",
     "app.core.robots.awaited": "pure, and tested alone",
     "app.core.robots.motion.bridged_commands": "pure, and tested alone",
@@ -58,6 +59,7 @@ EARNED = {
     "app.ui.blockly.held_keys": "is tested without a page",
     "app.ui.blockly.page_json": "is tested without a page",
     "app.ui.panels.registry": "a seam: panels, ours and those of plug-ins, are found through it",
+    "app.ui.widgets.inputs.check_box": "a widget as the others beside it are",
     "app.ui.widgets.inputs.switch": "one of a list: the widgets; two use it through their face",
 }
 

@@ -466,18 +466,23 @@ class MainWindow(QMainWindow):
         """Figures that nobody can read 30 times a second."""
         facts, document = self._facts, self.session.document
         alerts = facts.alerts(for_developers=self.showing == "developer")
-        self.status.commands = {alerts[1]: OPEN_ALERTS, facts.remote_access()[1]: "network.others"}
+        web = facts.web_pages()
+        self.status.commands = {
+            alerts[1]: OPEN_ALERTS,
+            facts.remote_access()[1]: "network.others",
+            web[1]: "network.web",
+        }
         if self.showing == "behaviour":
             self.status.show_facts(
                 (facts.health(), facts.saved()),
-                (facts.armed(), facts.recording(), facts.topics(), facts.remote_access_quietly()),
+                (facts.armed(), facts.recording(), web, facts.topics(), facts.remote_access_quietly()),
             )
         elif self.showing == "developer":
-            left: tuple[Fact, ...] = (alerts, facts.master(), facts.remote_access(), facts.traffic())
+            left: tuple[Fact, ...] = (alerts, facts.master(), facts.remote_access(), web, facts.traffic())
             left = (*left, facts.armed(), facts.lost())
             right: tuple[Fact, ...] = (facts.recording(), facts.ring(), facts.shown(), facts.window())
             if self.session.replay is not None:
-                left = (alerts, *facts.replayed())
+                left = (alerts, *facts.replayed(), web)
                 right = (
                     facts.recording(),
                     facts.ring(),

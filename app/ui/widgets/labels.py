@@ -32,6 +32,8 @@ def set_role(shown: QLabel, role: str) -> None:
 class ElidedLabel(QLabel):
     """A line that is shortened in its middle where there is too little room; the tooltip has the whole."""
 
+    mode = Qt.TextElideMode.ElideMiddle
+
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
         """Ask for ``least`` pixels always."""
         super().__init__()
@@ -45,7 +47,7 @@ class ElidedLabel(QLabel):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         room = self.contentsRect()
-        fits = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideMiddle, room.width() + 1)
+        fits = self.fontMetrics().elidedText(self.text(), self.mode, room.width() + 1)
         whole = self.text() if fits != self.text() else ""
         if plain.tip(whole) != self.toolTip():
             self.setToolTip(plain.tip(whole))

@@ -162,7 +162,7 @@ def test_patterns_are_tokens_that_keys_make_and_take_away(window, recorder):
     field = sheet.patterns
 
     def tokens() -> list[tuple[str, bool]]:
-        return [(each.pattern, each.is_left_out) for each in field.tokens]
+        return [(each.entry, each.is_left_out) for each in field.tokens]
 
     QTest.keyClicks(field.edit, "/arm/* *camera*,not /arm/raw")
     assert tokens() == [("/arm/*", False), ("*camera*", False)]

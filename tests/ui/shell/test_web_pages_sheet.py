@@ -1,116 +1,324 @@
-"""The sheet "Web pages and tablets": a server that a client connects to, and what the sheet says of it."""
+"""The sheet "Web pages and tablets": its switches, settings, connected pages and refusals."""
 
 from __future__ import annotations
 
 import json
-import socket
-from collections.abc import Iterator
+import queue
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt, QUrl
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages import WebPagesSheet
+from app.ui.shell.dialogs.web_pages.page_model import DISCONNECT
+from app.ui.shell.dialogs.web_pages.qr_code import QUIET_ZONE, modules_of
 from app.ui.theme.theme import Theme
 from nep.masters.master import Master
+from nep.programs.web.context import PageTopic, Refusal
+from nep.system.addresses import OwnAddress
+from tests.core.network.fake_web_server import FakeWebServer, page
 from tests.pseudo import untranslated
 from tests.ui.clipping import clipped
 from tests.ui.panels.test_words import said_by
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
+WIFI = OwnAddress("192.168.1.20", "wlan0")
+CAMERA = PageTopic("/camera", False, 15.0, 15.0, 190e3, 9_970, 30)
+BUTTONS = PageTopic("/buttons", True, rate=0.1, bytes_per_s=6.0)
+
+
+class Desk:
+    """The sheet over a window, with fake servers; `said` are the toasts and their buttons."""
+
+    def __init__(self, qtbot, theme: Theme, web: WebPages, events: queue.Queue) -> None:
+        self.web, self.events = web, events
+        self.said: list[tuple[str, Callable[[], object] | None]] = []
+        self.opened: list[str] = []
+        self.window = QWidget()
+        self.window.resize(1100, 700)
+        qtbot.addWidget(self.window)
+        self.window.show()
+        self.sheet = WebPagesSheet(theme, self.window, web, lambda: ("Turtle",), self._say, self._open)
+        self.sheet.open()
+
+    def _say(self, words: str, _button: str = "", run=None, *, until=None) -> None:
+        self.said.append((words, run))
+
+    def _open(self, url: QUrl) -> bool:
+        self.opened.append(url.toString())
+        return True
+
+    def settle(self):
+        self.web.started(self.events.get(timeout=30))
+        self.sheet.refresh()
+        return self.web._server
+
+    def switch_on(self):
+        self.sheet.switch.setFocus()
+        QTest.keyClick(self.sheet.switch, Qt.Key.Key_Space)
+        return self.settle()
 
 
 @pytest.fixture
-def web(master: Master) -> Iterator[WebPages]:
-    events: list = []
-    made = WebPages(master.address, events.append, addresses=tuple)
-    made.port = 0
-    made.events = events  # type: ignore[attr-defined]
+def events() -> queue.Queue:
+    return queue.Queue()
+
+
+@pytest.fixture
+def web(master: Master, events: queue.Queue) -> Iterator[WebPages]:
+    made = WebPages(master.address, events.put, start=FakeWebServer, addresses=lambda: (WIFI,))
     yield made
     made.close()
 
 
 @pytest.fixture
-def sheet(qtbot, theme: Theme, web: WebPages) -> WebPagesSheet:
-    window = QWidget()
-    window.resize(1100, 700)
-    qtbot.addWidget(window)
-    window.show()
+def desk(qtbot, theme: Theme, web: WebPages, events: queue.Queue) -> Desk:
     theme.apply()
-    theme.set_motion(True)
-    made = WebPagesSheet(theme, window, web, lambda: ("Turtle",))
-    made.open()
-    return made
+    theme.set_motion("on")
+    return Desk(qtbot, theme, web, events)
 
 
-def switch_on(qtbot, sheet: WebPagesSheet, web: WebPages) -> None:
-    sheet.switch.setFocus()
-    QTest.keyClick(sheet.switch, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: bool(web.events))  # type: ignore[attr-defined]
-    web.started(web.events.pop())  # type: ignore[attr-defined]
-    sheet.refresh()
+@pytest.fixture
+def sheet(desk: Desk) -> WebPagesSheet:
+    return desk.sheet
 
 
-def test_client_of_the_server_that_the_sheet_started_is_listed_and_disconnected(
-    qtbot, sheet: WebPagesSheet, web: WebPages
+def with_pages(desk: Desk) -> FakeWebServer:
+    server = desk.switch_on()
+    server.pages = (page(1, CAMERA, title="dashboard.html"), page(2, BUTTONS, title="buttons.html"))
+    desk.sheet.refresh()
+    return server
+
+
+def test_client_of_a_real_server_is_listed_and_disconnected(
+    qtbot, theme: Theme, master: Master, events: queue.Queue
 ) -> None:
-    switch_on(qtbot, sheet, web)
-    assert web.state == "on"
-    with connect(sheet.address.text()) as client:
+    web = WebPages(master.address, events.put, addresses=tuple)
+    web.port = 0
+    desk = Desk(qtbot, theme, web, events)
+    desk.switch_on()
+    sheet = desk.sheet
+    with pytest.raises(InvalidStatus):
+        connect(sheet.access.address.text(), origin="http://192.168.1.77:5173")
+    with connect(sheet.access.address.text()) as client:
         client.send(json.dumps({"op": "subscribe", "topic": "/odom", "type": "nep/Json"}))
         qtbot.waitUntil(lambda: bool(web.pages) and web.pages[0].subscribed == ("/odom",))
         sheet.refresh()
-        item = sheet.list.topLevelItem(0)
-        assert item is not None
-        assert item.childCount() == 1
-        sheet.list.setCurrentItem(item)
-        sheet.list.setFocus()
-        QTest.keyClick(sheet.list, Qt.Key.Key_Delete)
+        assert sheet.model.rowCount(sheet.model.index(0, 0)) == 1
+        sheet.table.setFocus(Qt.FocusReason.TabFocusReason)
+        QTest.keyClick(sheet.table, Qt.Key.Key_Delete)
         qtbot.waitUntil(lambda: not web.pages)
+    sheet.refresh()
+    sheet.notice.button.click()
+    assert web.origins == ("http://192.168.1.77:5173",)
+    with connect(sheet.access.address.text(), origin="http://192.168.1.77:5173"):
+        pass
     sheet.switch.click()
     assert (web.state, web.pages) == ("off", ())
+    web.close()
 
 
-def test_refused_origin_is_shown_and_allowed_by_its_button(
-    qtbot, sheet: WebPagesSheet, web: WebPages
-) -> None:
-    switch_on(qtbot, sheet, web)
-    with pytest.raises(InvalidStatus):
-        connect(sheet.address.text(), origin="http://192.168.1.77:5173")
+def test_figures_change_in_place_and_keep_selection_and_expansion(desk: Desk) -> None:
+    server, model, table = with_pages(desk), desk.sheet.model, desk.sheet.table
+    table.setExpanded(model.index(0, 0), False)
+    table.setCurrentIndex(model.index(0, 0, model.index(1, 0)))
+    server.change_topic(2, rate=12.0)
+    server.pages = (*server.pages, page(3, CAMERA))
+    desk.sheet.refresh()
+    assert [table.isExpanded(model.index(row, 0)) for row in range(3)] == [False, True, True]
+    topic = model.topic(table.currentIndex())
+    assert topic is not None
+    assert (topic.topic, topic.rate) == ("/buttons", 12.0)
+
+
+def test_page_that_left_stays_struck_through_without_a_button(desk: Desk) -> None:
+    server, sheet = with_pages(desk), desk.sheet
+    server.disconnect(1)
     sheet.refresh()
-    assert sheet.allow.isVisible()
-    sheet.allow.click()
-    assert web.origins == ("http://192.168.1.77:5173",)
+    row = sheet.model.page_row(sheet.model.index(0, 0))
+    assert row is not None
+    assert row.listed.gone_s is not None
+    sheet.table.setCurrentIndex(sheet.model.index(0, 0))
+    QTest.keyClick(sheet.table, Qt.Key.Key_Delete)
+    assert [each.id for each in server.pages] == [2]
 
 
-def test_taken_port_offers_the_next_one(qtbot, sheet: WebPagesSheet, web: WebPages) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        web.port = taken.getsockname()[1]
-        switch_on(qtbot, sheet, web)
-        assert (web.state, sheet.switch.isChecked()) == ("off", False)
-        assert str(web.port) in sheet.state.text()
-        assert str(web.port + 1) in sheet.other_port.text()
+def test_button_of_a_row_disconnects_its_page(desk: Desk) -> None:
+    server, sheet = with_pages(desk), desk.sheet
+    rect = sheet.table.visualRect(sheet.model.index(1, DISCONNECT))
+    QTest.mouseClick(sheet.table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
+    assert [each.id for each in server.pages] == [1]
 
 
-def test_wrong_origin_stays_as_typed_with_an_example(sheet: WebPagesSheet, web: WebPages) -> None:
-    sheet.origins.setText("192.168.1.20")
-    sheet.origins.editingFinished.emit()
-    assert (web.origins, sheet.origins.text()) == ((), "192.168.1.20")
-    assert sheet.origins.property("wrong") == "true"
+def test_many_pages_are_refreshed_within_a_frame_of_work(desk: Desk) -> None:
+    server, sheet = desk.switch_on(), desk.sheet
+    topics = [replace(CAMERA, topic=f"/topic{number}") for number in range(50)]
+    server.pages = tuple(page(number, *topics) for number in range(100))
+    sheet.refresh()
+    assert sheet.model.rowCount() == 100
+    told: list[int] = []
+    sheet.model.dataChanged.connect(lambda *_args: told.append(1))
+    server.change_topic(7, rate=2.0)
+    sheet.refresh()
+    assert len(told) == 2  # the page and its topic; nothing else is repainted
 
 
-@pytest.mark.parametrize("percent", [100, 200])
+def test_new_token_disconnects_pages_and_undo_restores_the_old_one(desk: Desk) -> None:
+    desk.web.open_to(WIFI.host)
+    with_pages(desk)
+    before = desk.web.token
+    desk.sheet.access.new_token.click()
+    words, undo = desk.said[-1]
+    assert "2" in words
+    assert desk.web.token != before
+    assert undo is not None
+    undo()
+    assert desk.web.token == before
+
+
+def test_token_is_hidden_and_copied_in_full(desk: Desk) -> None:
+    desk.web.open_to(WIFI.host)
+    access = desk.sheet.access
+    desk.sheet.refresh()
+    assert desk.web.token not in access.token.text()
+    access.token.line.setFocus()
+    QTest.keyClick(access.token.line, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    assert QGuiApplication.clipboard().text() == desk.web.token
+    access.reveal.click()
+    assert access.token.text() == desk.web.token
+
+
+def test_code_opens_the_test_page_and_is_light_in_the_dark_theme(desk: Desk, theme: Theme) -> None:
+    desk.web.open_to(WIFI.host)
+    desk.switch_on()
+    code = desk.sheet.access.qr
+    assert code.text == f"http://192.168.1.20:9090/?token={desk.web.token}"
+    theme.set_mode("dark")
+    image = code.grab().toImage()
+    size = len(modules_of(code.text))
+    ratio = image.width() / code.width()
+    side = int(image.width() / (size + 2 * QUIET_ZONE))
+    quiet = (image.width() - side * size) / 2
+    assert quiet >= QUIET_ZONE * side
+    middle = round(image.height() / 2)
+    for x in range(round(3 * ratio), int(quiet) - 1):
+        assert image.pixelColor(x, middle).lightness() == 255
+    assert image.pixelColor(int(quiet) + side // 2, int(quiet) + side // 2).lightness() == 0
+
+
+def test_there_is_no_code_while_only_this_computer_can_connect(desk: Desk) -> None:
+    desk.switch_on()
+    assert desk.sheet.access.qr.text == ""
+    assert desk.sheet.access.qr.accessibleName() != ""
+
+
+def test_origins_are_tokens_and_a_wrong_one_stays_as_typed(desk: Desk) -> None:
+    field = desk.sheet.permissions.origins
+    field.edit.setFocus()
+    QTest.keyClicks(field.edit, "http://lab.example 192.168.1.20")
+    QTest.keyClick(field.edit, Qt.Key.Key_Return)
+    assert desk.web.origins == ("http://lab.example",)
+    assert (field.edit.text(), field.is_wrong) == ("192.168.1.20", True)
+    field.edit.clear()
+    QTest.keyClick(field.edit, Qt.Key.Key_Backspace)
+    assert (desk.web.origins, list(field.tokens)) == ((), [])
+
+
+def test_robots_are_chosen_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
+    server, choice = desk.switch_on(), desk.sheet.permissions.robots
+    desk.web.set_robots(["Rover"])  # allowed before, not connected now
+    choice.choose.click()
+    assert list(choice.boxes) == ["Rover", "Turtle"]
+    QTest.keyClick(choice.boxes["Turtle"], Qt.Key.Key_Space)
+    assert server.allow_moving == {"Rover", "Turtle"}
+    assert "Turtle" in choice.words.text()
+
+
+def test_refused_robot_leads_to_the_choice_of_robots(desk: Desk) -> None:
+    server, sheet = desk.switch_on(), desk.sheet
+    server.refusals = (Refusal(1.0, "http://lab.example", "refused", kind="robot", robot="Turtle"),)
+    sheet.refresh()
+    sheet.notice.button.click()
+    assert sheet.permissions.robots.boxes["Turtle"].isVisible()
+    sheet.notice.close_button.click()
+    assert not sheet.notice.isVisible()
+
+
+def test_each_tab_has_its_own_switch(desk: Desk) -> None:
+    server, sheet = desk.switch_on(), desk.sheet
+    sheet.tabs.set_value("foxglove")
+    sheet.refresh()
+    assert not sheet.switch.isChecked()
+    assert not sheet.permissions.robots.isVisible()
+    sheet.switch.click()
+    assert server.foxglove is not None
+    sheet.copy_page.click()
+    assert QGuiApplication.clipboard().text() == desk.web.full_url
+
+
+def test_taken_port_offers_a_free_one(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:
+    web = WebPages(master.address, events.put, addresses=tuple)
+    desk = Desk(qtbot, theme, web, events)
+    web.sentence, web.free_port, web._failed = "Port 9090 is in use.", 9091, frozenset({"rosbridge"})
+    desk.sheet.refresh()
+    assert "9091" in desk.sheet.other_port.text()
+    web._start = FakeWebServer  # type: ignore[assignment]
+    desk.sheet.other_port.click()
+    desk.settle()
+    assert (web.state, web.port, desk.sheet.switch.isChecked()) == ("on", 9091, True)
+    web.close()
+
+
+def test_test_page_opens_in_the_browser_of_this_computer(desk: Desk) -> None:
+    assert not desk.sheet.test_page.isEnabled()
+    desk.switch_on()
+    desk.sheet.test_page.click()
+    assert desk.opened == [desk.web.local_page_url]
+
+
+@pytest.mark.parametrize(("size", "percent"), [((1024, 700), 150), ((1100, 700), 200), ((1600, 1000), 100)])
 def test_its_words_are_translated_and_fit(
-    qtbot, pseudo, theme: Theme, sheet: WebPagesSheet, percent: int
+    qtbot, pseudo, theme: Theme, desk: Desk, size: tuple[int, int], percent: int
 ) -> None:
     theme.set_text_percent(percent)
-    sheet.origins.setText("wrong")
-    sheet.origins.editingFinished.emit()
+    desk.window.resize(*size)
+    desk.web.open_to(WIFI.host)
+    server = with_pages(desk)
+    server.refusals = (Refusal(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
+    desk.sheet.permissions.robots.open_list()
+    desk.sheet.permissions.origins.edit.setText("wrong")
+    desk.sheet.permissions.origins.edit.ended.emit()
+    desk.sheet.refresh()
     qtbot.wait(50)  # Qt lays out later
-    data = ("http://192.168.1.20:8080", "ws://127.0.0.1:0", "wrong", "Turtle")
-    assert [text for _where, text in said_by(sheet) if untranslated(text, *data)] == []
-    assert clipped(sheet) == []
+    place = desk.sheet.geometry()
+    assert desk.window.rect().contains(place)
+    data = (
+        "http://192.168.1.20:8080", "http://lab.example", "ws://192.168.1.20:9090", "192.168.1.20:9090",
+        "wrong", "Turtle", "rosbridge", "Foxglove", "192.168.1.20", desk.sheet.command.text(), "Chrome",
+        "dashboard.html", "buttons.html", "/camera", "/buttons",
+    )  # fmt: skip
+    token = desk.sheet.access.token.text()
+    assert [text for _where, text in said_by(desk.sheet) if untranslated(text, *data, token)] == []
+    assert clipped(desk.sheet) == []
+
+
+def test_it_lies_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> None:
+    window.show()
+    window.commands.run("layout.developer")
+    window.commands.run("network.web")
+    (sheet,) = window.findChildren(WebPagesSheet)
+    stop = next(each for each in window.tool_bar.findChildren(QWidget) if type(each).__name__ == "StopButton")
+    assert sheet.isVisible()
+    assert sheet.geometry().right() >= window.width() - 10
+    assert stop.mapTo(window, QPoint(0, stop.height())).y() < sheet.y()
+    assert sheet.geometry().bottom() < window.status.mapTo(window, QPoint()).y()
+    assert sheet.findChildren(QLabel)
+    QTest.keyClick(sheet.switch, Qt.Key.Key_Escape)
+    assert not sheet.isVisible()

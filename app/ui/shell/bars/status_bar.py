@@ -11,6 +11,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.network.remote_access import access_words
+from app.core.network.web_words import host_words, web_status
 from app.core.recording.replay.scale import clock_words, date_words
 from app.core.robots.health_facts import facts_of, has_told
 from app.core.robots.robot_link import STOPPING
@@ -39,6 +40,7 @@ class StatusFacts:
         self._session = session
         self._clock = clock
         self.window_ms = 0.0
+        self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> Fact:
         """How many alerts there are; nothing when there are none."""
@@ -112,6 +114,13 @@ class StatusFacts:
         """The same; without an icon while it is as it always is."""
         icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
+
+    def web_pages(self) -> Fact:
+        """Say who can connect to the web server and how many pages do; nothing while it is off."""
+        web = self._session.web_pages
+        if web.host != self._web_host:  # asking for the computer's addresses takes a while
+            self._web_host, self._web_network = web.host, host_words(web)
+        return web_status(web, self._web_network)
 
     def master(self) -> Fact:
         """Whether a master is there, and where."""
@@ -242,6 +251,7 @@ class StatusBar(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
+        self.setObjectName("statusBar")  # sheets at the edge of the window end above it
         self.setMinimumHeight(theme.size("statusBar"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("Status"))

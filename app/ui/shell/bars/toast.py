@@ -9,6 +9,7 @@ from PySide6.QtGui import QEnterEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsDropShadowEffect, QHBoxLayout, QWidget
 
 from app.ui.shell.bars.floating_card import FloatingCard
+from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
@@ -77,11 +78,15 @@ class Toast(FloatingCard):
             self.hide()
 
     def place(self) -> None:
-        """Go to the bottom right of the window."""
+        """Go to the bottom right of the window, or beside a sheet that lies there if there is room."""
         window = self.parentWidget()
         if window is not None:
             self._fit(window.width() - 2 * MARGIN)
-            left = window.width() - self.width() - MARGIN
+            sheets = [each for each in window.findChildren(Overlay) if each.docks_right and each.isVisible()]
+            right = min((each.x() for each in sheets), default=window.width())
+            if right - self.width() < 2 * MARGIN:
+                right = window.width()
+            left = right - self.width() - MARGIN
             self.move(max(MARGIN, left), window.height() - self.height() - ABOVE_STATUS_BAR)
 
     def _fit(self, room: int) -> None:

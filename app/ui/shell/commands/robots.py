@@ -177,7 +177,11 @@ class RobotCommands:
         """Show the web server: its switch, who may connect, and which pages are connected."""
         if self._web_pages is None:
             self._web_pages = WebPagesSheet(
-                self._shell.theme, self._shell.surface, self._session.web_pages, self._robot_names
+                self._shell.theme,
+                self._shell.surface,
+                self._session.web_pages,
+                self._robot_names,
+                self._shell.say,
             )
         self._web_pages.open()
 

@@ -326,7 +326,7 @@ COMMANDS: tuple[C, ...] = (
     C("network.look", lazy("Browse other robot networks"), lambda do: do.robots.choose_networks(), "Robots",
       icon="waypoints"),
     C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.show_web_pages(), "Robots",
-      icon="wifi"),
+      icon="globe"),
     C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
       why_not=_no_panels),
     C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",

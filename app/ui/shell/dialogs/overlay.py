@@ -137,6 +137,8 @@ class Overlay(QWidget):
 
     closed = Signal()
     top = EDGE
+    docks_right = False
+    """Whether it lies at the right edge of the window, where toasts then stand beside it."""
     lies_over_others = False
     """Whether another one may ask by it: that stays open below, and gets the keyboard back."""
 

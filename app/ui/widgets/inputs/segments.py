@@ -15,6 +15,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
 from app.ui.widgets.flow_layout import Flow
+from nep.i18n import _
 
 _HEIGHTS: dict[str, tuple[int, int, str]] = {
     "small": (24, 10, "body"),
@@ -29,7 +30,7 @@ class _Segment(PaintedButton):
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
         self._icon, self._check = icon, check
-        self._bare = False
+        self._bare = self._dot = False
         self._height, self._padding, self._kind = _HEIGHTS[size]
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
@@ -39,6 +40,15 @@ class _Segment(PaintedButton):
         self._bare = bare and self._icon is not None
         self.updateGeometry()
         self.update()
+
+    def set_dot(self, shown: bool) -> None:
+        """Show a dot behind the word: what it names is on."""
+        if shown != self._dot:
+            self._dot = shown
+            words = _("{choice}, on") if shown else "{choice}"
+            self.setAccessibleName(words.format(choice=self.text()))
+            self.updateGeometry()
+            self.update()
 
     def shown_word(self) -> str:
         """The word that is painted."""
@@ -59,8 +69,8 @@ class _Segment(PaintedButton):
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
-        shown = int(self._icon is not None) + int(self._check)
-        return (self._side() + GAP) * shown - (GAP if self._bare else 0)
+        shown = int(self._icon is not None) + int(self._check) + int(self._dot) / 2
+        return round((self._side() + GAP) * shown) - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
         width = paint.width_of(self._font(), self.shown_word()) + 2 * self._padding + self._icons_width()
@@ -81,11 +91,15 @@ class _Segment(PaintedButton):
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
         text_width = paint.width_of(self._font(), self.shown_word()) - (GAP if self._bare else 0)
         side = self._side()
-        left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP)) / 2)
+        dot = (side + GAP) / 2 if self._dot else 0.0
+        left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP) + dot) / 2)
         for name in shown:
             paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
             left += side + GAP
-        paint.words(painter, rect.adjusted(left, 0, 2, 0), self.shown_word(), self._font(), ink)
+        paint.words(painter, rect.adjusted(left, 0, 2 - dot, 0), self.shown_word(), self._font(), ink)
+        if self._dot:
+            square = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
+            paint_icon(painter, square, "dot", theme.colour("ok"))
 
 
 class Segments(QWidget):
@@ -132,6 +146,10 @@ class Segments(QWidget):
         """Where there is no room for words, only the icons are left."""
         for segment in self._segments.values():
             segment.set_bare(bare)
+
+    def set_dot(self, value: str, shown: bool) -> None:
+        """Show a dot behind one of the words: what it names is on."""
+        self._segments[value].set_dot(shown)
 
     @property
     def value(self) -> str:

@@ -1,0 +1,103 @@
+"""Pages that are connected to the web server, those that have just left, and those that are too slow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nep.programs.web.context import ConnectedPage
+
+GONE_SHOWN_S = 10.0
+SLOW_SHOWN_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ListedPage:
+    """A page; ``gone_s`` is the time since it left, None while it is connected."""
+
+    page: ConnectedPage
+    gone_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SlowTopic:
+    """A topic of which a page has just dropped messages; ``share`` of them in all."""
+
+    page: ConnectedPage
+    topic: str
+    share: float
+
+
+class PageList:
+    """Follows the snapshots of a server. Not thread-safe."""
+
+    def __init__(self) -> None:
+        self._pages: dict[int, ConnectedPage] = {}
+        self._left_at: dict[int, float] = {}
+        self._dropped: dict[tuple[int, str], int] = {}
+        self._drops_at: dict[tuple[int, str], float] = {}
+        self._now = 0.0
+
+    @property
+    def connected(self) -> tuple[ConnectedPage, ...]:
+        """Connected pages of the latest snapshot."""
+        return tuple(page for id_, page in self._pages.items() if id_ not in self._left_at)
+
+    @property
+    def listed(self) -> tuple[ListedPage, ...]:
+        """Connected pages, and for `GONE_SHOWN_S` seconds those that left, in the order of their arrival."""
+        return tuple(
+            ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)
+            for id_, page in self._pages.items()
+        )
+
+    @property
+    def bytes_per_s(self) -> float:
+        """Bandwidth of all connected pages."""
+        return sum(topic.bytes_per_s for page in self.connected for topic in page.topics)
+
+    def update(self, pages: Sequence[ConnectedPage], now: float) -> None:
+        """Apply a snapshot of connected pages; ``now`` is a monotonic time."""
+        self._now = now
+        there = {page.id for page in pages}
+        for id_ in self._pages:
+            if id_ not in there:
+                self._left_at.setdefault(id_, now)
+        for page in pages:
+            self._pages[page.id] = page
+            self._left_at.pop(page.id, None)
+        for id_, left_at in tuple(self._left_at.items()):
+            if now - left_at > GONE_SHOWN_S:
+                del self._left_at[id_], self._pages[id_]
+        self._pages = dict(sorted(self._pages.items()))
+        self._note_drops(pages, now)
+
+    def clear(self, now: float) -> None:
+        """Apply the end of the server: all pages have left."""
+        self.update((), now)
+
+    def slow(self) -> Iterator[SlowTopic]:
+        """Topics of which a connected page dropped messages in the last `SLOW_SHOWN_S` seconds."""
+        for page in self.connected:
+            for topic in page.topics:
+                at = self._drops_at.get((page.id, topic.topic))
+                if at is not None and self._now - at <= SLOW_SHOWN_S:
+                    yield SlowTopic(page, topic.topic, dropped_share(topic.sent_count, topic.dropped_count))
+
+    def _note_drops(self, pages: Sequence[ConnectedPage], now: float) -> None:
+        dropped = {
+            (page.id, topic.topic): topic.dropped_count
+            for page in pages
+            for topic in page.topics
+            if topic.dropped_count
+        }
+        risen = {key: now for key, count in dropped.items() if count > self._dropped.get(key, 0)}
+        self._drops_at = {key: at for key, at in (self._drops_at | risen).items() if key in dropped}
+        self._dropped = dropped
+
+
+def dropped_share(sent_count: int, dropped_count: int) -> float:
+    """Return the share of messages that were dropped, 0 to 1."""
+    return dropped_count / max(1, sent_count + dropped_count)

@@ -1,0 +1,151 @@
+"""Sentences about the web server: the status bar, addresses, refusals, and the command for a terminal."""
+
+from __future__ import annotations
+
+import datetime as dt
+import shlex
+import subprocess
+import sys
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from app.core.network.web_pages import DEFAULT_PORT, WebPages
+from nep.i18n import _, ngettext, number
+from nep.masters.master import master_address
+from nep.system.addresses import OwnAddress
+
+if TYPE_CHECKING:
+    from nep.programs.web.context import ConnectedPage, Refusal
+
+_WIRELESS = ("wl", "wi-fi", "wifi")
+NextStep = Literal["", "allow origin", "choose robots"]
+
+
+@dataclass(frozen=True, slots=True)
+class WebNotice:
+    """Sentence about a refusal or a slow page, and the button that helps; ``value`` is what it allows.
+
+    Notices with the same ``key`` are about the same thing.
+    """
+
+    key: tuple[str, ...]
+    status: Literal["error", "warn"]
+    sentence: str
+    next_step: NextStep = ""
+    value: str = ""
+
+
+def is_wireless(own: OwnAddress) -> bool:
+    """Return whether an address is one of a Wi-Fi interface, judging by the interface's name."""
+    return own.interface.casefold().startswith(_WIRELESS)
+
+
+def address_words(own: OwnAddress) -> str:
+    """Say "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
+    if is_wireless(own):
+        return _("Wi-Fi {address}").format(address=own.host)
+    return f"{own.host} ({own.interface})" if own.interface else own.host
+
+
+def host_words(web: WebPages) -> str:
+    """Name the address that other computers connect to; "" when only this computer can."""
+    if not web.host:
+        return ""
+    own = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
+    return address_words(own)
+
+
+def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
+    """Return icon, words and status for the status bar; no words while the server is off.
+
+    ``network`` is what `host_words` returned when the server was opened.
+    """
+    if web.state != "on":
+        return "", "", None
+    count = len(web.connected)
+    pages = ngettext("{count} page", "{count} pages", count).format(count=count) if count else ""
+    if not web.host:
+        words = _("Web open to this computer")
+        return "globe", ", ".join(filter(None, (words, pages))), None
+    words = _("Web open to {network}").format(network=network or web.host)
+    return "globe", ", ".join(filter(None, (words, pages))), "warn"
+
+
+def page_name(page: ConnectedPage) -> str:
+    """Return what a page is called: its title; a program without one is called by its library."""
+    is_named = page.title and page.title != page.name
+    return page.title if is_named else page.client or page.origin or page.name
+
+
+def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
+    """Return the command that starts the same server without Studio."""
+    words = ["nep", "web"]
+    if web.port != DEFAULT_PORT:
+        words += ["--port", str(web.port)]
+    if web.host:
+        words += ["--listen", web.host]
+    for origin in web.origins:
+        words += ["--origin", origin]
+    for robot in web.robots:
+        words += ["--allow-moving", robot]
+    if "foxglove" in web.protocols:
+        words.append("--foxglove")
+    if web.master != master_address():
+        words += ["--master", web.master]
+    return subprocess.list2cmdline(words) if platform == "win32" else shlex.join(words)
+
+
+def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
+    """Return what a person should know, newest first: refusals that were not allowed since, slow pages."""
+    found: dict[tuple[str, ...], WebNotice] = {}
+    for notice in (*_refused(web), *_slow(web)):
+        if notice.key not in dismissed:
+            found.setdefault(notice.key, notice)
+    return tuple(found.values())
+
+
+def _refused(web: WebPages) -> Iterator[WebNotice]:
+    for refusal in reversed(web.refusals):
+        if refusal.origin and refusal.origin in web.origins:
+            continue
+        if refusal.kind == "robot" and refusal.robot in web.robots:
+            continue
+        yield _notice_of(refusal)
+
+
+def _notice_of(refusal: Refusal) -> WebNotice:
+    key = (refusal.kind, refusal.who, refusal.robot)
+    who, clock = refusal.who, _clock_words(refusal.time_s)
+    if refusal.kind == "robot" and refusal.robot:
+        sentence = _("A page asked to move {robot} and was refused.").format(robot=refusal.robot)
+        return WebNotice(("robot", refusal.robot), "error", sentence, "choose robots", refusal.robot)
+    if refusal.kind == "origin" or refusal.origin:
+        sentence = _("{origin} was refused at {time}. Its origin isn't allowed.")
+        step: NextStep = "allow origin" if refusal.origin else ""
+        return WebNotice(key, "error", sentence.format(origin=who, time=clock), step, refusal.origin)
+    if refusal.kind == "token":
+        sentence = _("{address} was refused at {time}: wrong token.")
+        return WebNotice(key, "error", sentence.format(address=who, time=clock))
+    sentence = _("{address} was refused at {time}: {reason}.")
+    return WebNotice(key, "error", sentence.format(address=who, time=clock, reason=refusal.reason))
+
+
+def _slow(web: WebPages) -> Iterator[WebNotice]:
+    for slow in web.slow:
+        sentence = _("{page} reads slower than {topic} sends. {share} dropped.").format(
+            page=page_name(slow.page), topic=slow.topic, share=share_words(slow.share)
+        )
+        yield WebNotice(("slow", slow.page.name, slow.topic), "warn", sentence)
+
+
+def share_words(share: float) -> str:
+    """Say "0.3 %"; a small share that isn't 0 is "under 0.1 %"."""
+    if 0 < share < 0.0005:
+        return _("under {share}").format(share=number(0.001, ".1%").replace("%", " %"))
+    return number(share, ".1%").replace("%", " %")
+
+
+def _clock_words(time_s: float) -> str:
+    then = dt.datetime.fromtimestamp(time_s).astimezone()
+    return f"{then.hour}:{then.minute:02d}"

@@ -1,0 +1,192 @@
+"""Where web pages connect: address, token, the network that the server is open to, and the QR code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
+
+from app.core.network.web_pages import WebPages
+from app.core.network.web_words import address_words
+from app.ui.shell.dialogs.web_pages.fields import CopyField, RoleIcon
+from app.ui.shell.dialogs.web_pages.qr_code import SIDE, QrCode
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, ComboBox, IconButton, Segments, label, set_role
+from nep.i18n import _
+from nep.system.addresses import OwnAddress
+
+LABEL_WIDE = 80
+_MOST_SEGMENTS = 2
+_HIDDEN = "•••• •••• {end}"
+_END = 4
+
+
+class OpenTo(QWidget):
+    """Choice of this computer or one of its addresses; `chosen` with the address, "" for this computer."""
+
+    chosen = Signal(str)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._choice: Segments | ComboBox | None = None
+        self._hosts: tuple[str, ...] = ()
+
+    def offer(self, addresses: Sequence[OwnAddress], value: str) -> None:
+        """Offer this computer and its addresses, of which ``value`` is chosen."""
+        if value and value not in {own.host for own in addresses}:  # the address is gone
+            addresses = (*addresses, OwnAddress(value, ""))
+        options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
+        options += [(own.host, address_words(own), None) for own in addresses]
+        if self._choice is not None:
+            self._row.removeWidget(self._choice)
+            self._choice.deleteLater()
+        if len(options) <= _MOST_SEGMENTS:
+            segments = Segments(self._theme, options, value, check=True, name=_("Open to"), wraps=True)
+            segments.changed.connect(self.chosen)
+            self._choice = segments
+        else:
+            combo = ComboBox(
+                self._theme, [(host, words) for host, words, _icon in options], name=_("Open to")
+            )
+            combo.set_value(value)
+            combo.activated.connect(lambda _index: self.chosen.emit(combo.value))
+            self._choice = combo
+        self._row.addWidget(self._choice)
+        if isinstance(self._choice, Segments):
+            self._row.addStretch(1)
+
+    @property
+    def value(self) -> str:
+        """The chosen address."""
+        return "" if self._choice is None else self._choice.value
+
+    def set_value(self, value: str) -> None:
+        """Choose without telling."""
+        if self._choice is not None:
+            self._choice.set_value(value)
+
+    @property
+    def choice(self) -> QWidget | None:
+        """The widget that takes the keyboard."""
+        return self._choice
+
+
+class AccessForm(QWidget):
+    """The first part of the form. Signals say what a person wants; `show_state` shows what is so."""
+
+    copy_address = Signal()
+    copy_token = Signal()
+    new_token_wanted = Signal()
+
+    def __init__(self, theme: Theme, web: WebPages) -> None:
+        super().__init__()
+        self._theme, self._web = theme, web
+        self.address = CopyField(theme, _("Address"), _("Copy the address"))
+        self.reveal = IconButton(theme, "eye", _("Show the token"), checkable=True, size=26)
+        self.token = CopyField(theme, _("Token"), _("Copy the token"), self.reveal)
+        self.new_token = Button(theme, _("New"), "refresh-cw")
+        self.open_to = OpenTo(theme)
+        self.reach_icon = RoleIcon(theme, "lock", side=14, is_at_top=True)
+        self.reach = label("", "small", wrap=True)
+        self.works_with = label("", "small", role="textTertiary", wrap=True)
+        self.qr = QrCode(theme)
+        self.qr_words = label("", "small", role="textSecondary", wrap=True)
+        self.qr_words.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        self.address.copy_wanted.connect(self.copy_address)
+        self.token.copy_wanted.connect(self.copy_token)
+        self.new_token.clicked.connect(self.new_token_wanted)
+        self.reveal.toggled.connect(self._show_token)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        token = QHBoxLayout()
+        token.setSpacing(8)
+        token.addWidget(self.token, 1)
+        token.addWidget(self.new_token)
+        reach = QHBoxLayout()
+        reach.setSpacing(6)
+        reach.addWidget(self.reach_icon, 0, Qt.AlignmentFlag.AlignTop)
+        reach.addWidget(self.reach, 1)
+        said = QVBoxLayout()
+        said.setSpacing(2)
+        said.addLayout(reach)
+        said.addWidget(self.works_with)
+        said.addStretch(1)
+        self._grid = grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(8)
+        grid.setColumnStretch(1, 1)
+        for place, words in enumerate((_("Address"), _("Token"), _("Open to"))):
+            grid.addWidget(label(words, "body", role="textSecondary"), place, 0)
+        grid.addWidget(self.address, 0, 1)
+        grid.addLayout(token, 1, 1)
+        grid.addWidget(self.open_to, 2, 1)
+        grid.addLayout(said, 3, 1)
+        code = QVBoxLayout()
+        code.setSpacing(6)
+        code.addWidget(self.qr, 0, Qt.AlignmentFlag.AlignHCenter)
+        code.addWidget(self.qr_words)
+        code.addStretch(1)
+        grid.addLayout(code, 0, 2, 4, 1)
+        self._theme.changed.connect(self._measure)
+        self._measure()
+
+    def _measure(self) -> None:
+        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
+        self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
+
+    def show_state(self, *, is_foxglove: bool) -> None:
+        """Show the server's address, its token, and who can reach it."""
+        web = self._web
+        self.address.show_text(web.url)
+        self._show_token()
+        self.new_token.setEnabled(bool(web.token))
+        self.reveal.setEnabled(bool(web.token))
+        if self.open_to.value != web.host:
+            self.open_to.set_value(web.host)
+        self._show_reach(is_foxglove=is_foxglove)
+        self._show_code(is_foxglove=is_foxglove)
+
+    def _show_token(self) -> None:
+        token = self._web.token
+        shown = token if self.reveal.isChecked() else _HIDDEN.format(end=token[-_END:])
+        self.token.show_text(shown if token else _("not needed on this computer"), can_copy=bool(token))
+        self.reveal.set_icon("eye-off" if self.reveal.isChecked() else "eye")
+        self.reveal.set_name(_("Hide the token") if self.reveal.isChecked() else _("Show the token"))
+
+    def _show_reach(self, *, is_foxglove: bool) -> None:
+        host = self._web.host
+        role = "warn" if host else "textSecondary"
+        self.reach_icon.set("wifi" if host else "lock", role)
+        set_role(self.reach, role)
+        words = _("Other devices can't reach this address.")
+        if host:
+            words = _(
+                "Devices in the network of {address} can reach this address. Messages are not encrypted."
+            )
+        self.reach.setText(words.format(address=host))
+        self.works_with.setText(
+            _(
+                "In Foxglove or Lichtblick: Open connection, Foxglove WebSocket. Address, token and origins "
+                "are the same as for rosbridge."
+            )
+            if is_foxglove
+            else _("Works with roslib, roslibpy and pages of your own.")
+        )
+
+    def _show_code(self, *, is_foxglove: bool) -> None:
+        web = self._web
+        if is_foxglove:
+            self.qr.show_words(_("Copy the link below and paste it in Foxglove or Lichtblick."))
+        elif not web.host:
+            self.qr.show_words(_("Open it to a network to scan a code with a tablet."))
+        elif web.state != "on" or "rosbridge" not in web.protocols:
+            self.qr.show_words(_("The code appears here once web pages can connect."))
+        else:
+            self.qr.show_code(web.page_url, web.host_and_port)
+        self.qr_words.setText(_("Scan with the tablet") if self.qr.text else "")

@@ -1,0 +1,128 @@
+"""Fields that show an address or a token, with their buttons inside the frame."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import IconButton, paint
+from app.ui.widgets.menus import EditMenu
+
+_PADDING, _BUTTON = 10, 26
+
+
+class _ReadOnlyLine(QLineEdit):
+    """Ctrl+C copies the whole when nothing is selected, also where only a part can be read."""
+
+    copy_wanted = Signal()
+    focused = Signal()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.matches(QKeySequence.StandardKey.Copy) and not self.hasSelectedText():
+            self.copy_wanted.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.deselect()
+        self.focused.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self.focused.emit()
+
+
+class CopyField(QWidget):
+    """A text that can be read and copied; `copy_wanted` by its button or Ctrl+C."""
+
+    copy_wanted = Signal()
+
+    def __init__(self, theme: Theme, name: str, copy_words: str, *buttons: IconButton) -> None:
+        """``copy_words`` name the button; ``buttons`` stand before it."""
+        super().__init__()
+        self._theme = theme
+        self.line = _ReadOnlyLine()
+        self.line.setReadOnly(True)
+        self.line.setAccessibleName(name)
+        self.line.setProperty("bare", "true")
+        self.line.setProperty("ownFocus", True)
+        EditMenu(theme, self.line)
+        self.copy = IconButton(theme, "copy", copy_words, size=_BUTTON)
+        self.copy.clicked.connect(self.copy_wanted)
+        self.line.copy_wanted.connect(self.copy_wanted)
+        self.line.focused.connect(self.update)
+        self.setFocusProxy(self.line)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(_PADDING, 2, 4, 2)
+        row.setSpacing(0)
+        row.addWidget(self.line, 1)
+        for button in (*buttons, self.copy):
+            row.addWidget(button)
+        theme.changed.connect(self._set_font)
+        self._set_font()
+
+    def text(self) -> str:
+        """Return what can be read."""
+        return self.line.text()
+
+    def show_text(self, text: str, *, can_copy: bool = True) -> None:
+        """Show another text from its beginning."""
+        if text != self.line.text():
+            self.line.setText(text)
+            self.line.setCursorPosition(0)
+        self.copy.setEnabled(can_copy)
+
+    def _set_font(self) -> None:
+        self.line.setFont(self._theme.font("code"))
+        self.updateGeometry()
+
+    def sizeHint(self) -> QSize:
+        high = max(self._theme.size("control", "normal"), super().sizeHint().height())
+        return QSize(super().sizeHint().width(), high)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(round(self._theme.scaled(140)), self.sizeHint().height())
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        has_focus = self.line.hasFocus()
+        edge, width = theme.colour("accent" if has_focus else "controlBorder"), 2.0 if has_focus else 1.0
+        fill = theme.colour("sunken" if theme.dark else "panel")
+        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, edge, width)
+        painter.end()
+
+
+class RoleIcon(QWidget):
+    """An icon in the colour of a role, beside words that say the same."""
+
+    def __init__(
+        self, theme: Theme, icon: str, role: str = "textSecondary", side: int = 16, *, is_at_top: bool = False
+    ) -> None:
+        """With ``is_at_top`` it stands beside the first of several lines."""
+        super().__init__()
+        self._is_at_top = is_at_top
+        self._theme, self._icon, self._role, self._side = theme, icon, role, side
+
+    def set(self, icon: str, role: str) -> None:
+        """Show another icon."""
+        if (icon, role) != (self._icon, self._role):
+            self._icon, self._role = icon, role
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        side = round(self._theme.scaled(self._side))
+        return QSize(side, side + 4)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        side, painter = self.sizeHint().width(), QPainter(self)
+        top = self._theme.scaled(2) if self._is_at_top else (self.height() - side) / 2
+        square = QRectF(0, top, side, side)
+        paint_icon(painter, square, self._icon, self._theme.colour(self._role))
+        painter.end()

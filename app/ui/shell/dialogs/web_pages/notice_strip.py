@@ -1,0 +1,55 @@
+"""The newest refusal or slow page, with the button that helps and one that dismisses it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+
+from app.core.network.web_words import WebNotice
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, IconButton, label, paint
+from app.ui.widgets.cards import AlertBox
+from nep.i18n import _, lazy, ngettext
+
+_BUTTONS = {"allow origin": lazy("Allow it"), "choose robots": lazy("Choose robots")}
+
+
+class NoticeStrip(AlertBox):
+    """Shows one notice; `helped` when its button is pressed, `dismissed` when its cross is."""
+
+    helped = Signal()
+    dismissed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme)
+        self.notice: WebNotice | None = None
+        self.words = label("", "body", wrap=True)
+        self.more = label("", "small", role="textSecondary", wrap=True)
+        self.button = Button(theme, "", size="small")
+        self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
+        self.text_column.addWidget(self.words)
+        self.text_column.addWidget(self.more)
+        self.button_row.addWidget(self.button)
+        self.button_row.addWidget(self.close_button)
+        self.button.clicked.connect(self.helped)
+        self.close_button.clicked.connect(self.dismissed)
+        self.hide()
+
+    def show_notices(self, notices: tuple[WebNotice, ...]) -> None:
+        """Show the first; the number of the others follows."""
+        paint.show_when(self, bool(notices))
+        if not notices:
+            self.notice = None
+            return
+        notice, others = notices[0], len(notices) - 1
+        if notice != self.notice:
+            self.notice = notice
+            self.set_status(notice.status)
+            self.words.setText(notice.sentence)
+            self.setAccessibleName(notice.sentence)
+            word = _BUTTONS.get(notice.next_step, "")
+            self.button.set_word(_(word) if word else "")
+            paint.show_when(self.button, bool(word))
+        more = ngettext("and {count} more", "and {count} more", others).format(count=others) if others else ""
+        if more != self.more.text():
+            self.more.setText(more)
+        paint.show_when(self.more, bool(more))

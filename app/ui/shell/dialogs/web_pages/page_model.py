@@ -1,0 +1,178 @@
+"""Connected pages and their topics as a tree that Qt shows; updated in place."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+
+from app.core.network.web_page_list import ListedPage
+from app.core.network.web_words import page_name
+from app.ui.shell.dialogs.web_pages.page_words import page_sentence, topic_sentence
+from nep.i18n import _
+
+if TYPE_CHECKING:
+    from nep.programs.web.context import PageTopic
+
+Index = QModelIndex | QPersistentModelIndex
+PAGE, RATE, BANDWIDTH, DROPPED, DISCONNECT = range(5)
+"""Columns."""
+COLUMNS = 5
+_ROOT = QModelIndex()
+_TopicKey = tuple[str, bool]
+
+
+@dataclass(slots=True)
+class PageRow:
+    """Row of a page; ``place`` is its number."""
+
+    listed: ListedPage
+    topics: list[PageTopic] = field(default_factory=list)
+    place: int = 0
+
+    @property
+    def id(self) -> int:
+        """Id of the page."""
+        return self.listed.page.id
+
+
+class PageTreeModel(QAbstractItemModel):
+    """Pages, each with its topics below it. Rows keep their index while others come and go."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._rows: list[PageRow] = []
+        self._by_id: dict[int, PageRow] = {}
+
+    # -- Qt's questions --------------------------------------------------------------------------------------
+
+    def rowCount(self, parent: Index = _ROOT) -> int:
+        if not parent.isValid():
+            return len(self._rows)
+        row = self.page_row(parent)
+        return len(row.topics) if row is not None and self.topic(parent) is None else 0
+
+    def columnCount(self, _parent: Index = _ROOT) -> int:
+        return COLUMNS
+
+    def index(self, row: int, column: int, parent: Index = _ROOT) -> QModelIndex:
+        if not 0 <= row < self.rowCount(parent) or not 0 <= column < COLUMNS:
+            return QModelIndex()
+        if not parent.isValid():
+            return self.createIndex(row, column, 0)
+        return self.createIndex(row, column, self._rows[parent.row()].id + 1)
+
+    def parent(self, index: Index = _ROOT) -> QModelIndex:  # type: ignore[override]
+        row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
+        return QModelIndex() if row is None else self.createIndex(row.place, 0, 0)
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+        row, topic = self.page_row(index), self.topic(index)
+        if row is None or index.column() != PAGE:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return page_name(row.listed.page) if topic is None else topic.topic
+        if role == Qt.ItemDataRole.AccessibleTextRole:
+            return page_sentence(row.listed) if topic is None else topic_sentence(topic)
+        return None
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> object:
+        if orientation != Qt.Orientation.Horizontal or role != Qt.ItemDataRole.DisplayRole:
+            return None
+        return (_("Page and topics"), _("Rate /s"), _("Bandwidth"), _("Dropped"), "")[section]
+
+    # -- what the sheet asks and says ------------------------------------------------------------------------
+
+    def page_row(self, index: Index) -> PageRow | None:
+        """Return the row of a page, or of the page that a topic belongs to."""
+        if not index.isValid():
+            return None
+        page_id = index.internalId() - 1
+        if page_id >= 0:
+            return self._by_id.get(page_id)
+        return self._rows[index.row()] if index.row() < len(self._rows) else None
+
+    def topic(self, index: Index) -> PageTopic | None:
+        """Return the topic of an index, None for a page."""
+        row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
+        return row.topics[index.row()] if row is not None and index.row() < len(row.topics) else None
+
+    def show_pages(self, listed: Sequence[ListedPage]) -> None:
+        """Show exactly these pages, which come in the order of their ids."""
+        wanted = {each.page.id: each for each in listed}
+        for place in reversed(range(len(self._rows))):
+            if self._rows[place].id not in wanted:
+                self._remove_page(place)
+        for each in listed:
+            row = self._by_id.get(each.page.id)
+            if row is None:
+                self._append_page(each)
+            elif row.listed is not each and row.listed != each:
+                row.listed = each
+                self._tell(self.createIndex(row.place, 0, 0), self.createIndex(row.place, DISCONNECT, 0))
+                self._show_topics(row, each.page.topics)
+
+    def _append_page(self, listed: ListedPage) -> None:
+        row = PageRow(listed, [*listed.page.topics], len(self._rows))
+        self.beginInsertRows(_ROOT, row.place, row.place)
+        self._rows.append(row)
+        self._by_id[row.id] = row
+        self.endInsertRows()
+
+    def _remove_page(self, place: int) -> None:
+        self.beginRemoveRows(_ROOT, place, place)
+        row = self._rows.pop(place)
+        del self._by_id[row.id]
+        for number, each in enumerate(self._rows):
+            each.place = number
+        self.endRemoveRows()
+
+    def _show_topics(self, row: PageRow, topics: Sequence[PageTopic]) -> None:
+        before = row.topics
+        if [_key(each) for each in before] == [_key(each) for each in topics]:
+            changed = [place for place, each in enumerate(topics) if each != before[place]]
+            row.topics = [*topics]
+            if changed:
+                self._tell_topics(row, changed[0], changed[-1])
+            return
+        parent = self.createIndex(row.place, 0, 0)
+        wanted = {_key(each) for each in topics}
+        for place in reversed(range(len(before))):
+            if _key(before[place]) not in wanted:
+                self.beginRemoveRows(parent, place, place)
+                del before[place]
+                self.endRemoveRows()
+        for place, each in enumerate(topics):
+            if place >= len(before) or _key(before[place]) != _key(each):
+                self.beginInsertRows(parent, place, place)
+                before.insert(place, each)
+                self.endInsertRows()
+        if len(before) > len(topics):  # the order of topics that stay has changed
+            self.beginRemoveRows(parent, len(topics), len(before) - 1)
+            del before[len(topics) :]
+            self.endRemoveRows()
+        row.topics = [*topics]
+        self._tell_topics(row, 0, len(topics) - 1)
+
+    def _tell_topics(self, row: PageRow, first: int, last: int) -> None:
+        if first <= last:
+            id_ = row.id + 1
+            self._tell(self.createIndex(first, 0, id_), self.createIndex(last, DISCONNECT, id_))
+
+    def _tell(self, first: QModelIndex, last: QModelIndex) -> None:
+        self.dataChanged.emit(first, last, [Qt.ItemDataRole.DisplayRole])
+
+
+def _key(topic: PageTopic) -> _TopicKey:
+    return topic.topic, topic.is_published
+
+
+def sorted_topics(listed: ListedPage) -> ListedPage:
+    """Return the page with its topics in the order of their names, what it reads first."""
+    topics = tuple(sorted(listed.page.topics, key=lambda each: (each.is_published, each.topic)))
+    return dataclasses.replace(listed, page=dataclasses.replace(listed.page, topics=topics))

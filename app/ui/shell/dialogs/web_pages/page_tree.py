@@ -1,0 +1,392 @@
+"""How connected pages look: a row for each page with a button that disconnects it, and one for each topic."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import (
+    QEvent,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPoint,
+    QRect,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import (
+    QFocusEvent,
+    QFont,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+    QPainter,
+    QPen,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import (
+    QFrame,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTreeView,
+    QWidget,
+)
+
+from app.core.network.web_page_list import ListedPage
+from app.core.network.web_words import page_name
+from app.ui.shell.dialogs.web_pages.page_model import (
+    BANDWIDTH,
+    DISCONNECT,
+    DROPPED,
+    PAGE,
+    RATE,
+    PageTreeModel,
+)
+from app.ui.shell.dialogs.web_pages.page_words import (
+    does_words,
+    dropped_words,
+    host_of,
+    limit_words,
+    page_icon,
+    since_words,
+    where_words,
+)
+from app.ui.text import plain
+from app.ui.text.numbers import bandwidth_words, rate_words
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.menus import Menu
+from app.ui.widgets.table.cells import head_font
+from nep.i18n import _
+
+if TYPE_CHECKING:
+    from nep.programs.web.context import PageTopic
+
+Index = QModelIndex | QPersistentModelIndex
+PAGE_HIGH, TOPIC_HIGH = 28, 23
+_EDGE, _PADDING, _ICON, _GAP = 8, 6, 15, 6
+_WIDTHS = {RATE: 66, BANDWIDTH: 88, DROPPED: 78, DISCONNECT: 34}
+_STRUCK = "textDisabled"
+
+
+class _PageHeader(QHeaderView):
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(Qt.Orientation.Horizontal, parent)
+        self._theme = theme
+        self.setSectionsClickable(False)
+        self.setStretchLastSection(False)
+        self.setMinimumSectionSize(24)
+
+    def sizeHint(self) -> QSize:
+        return QSize(super().sizeHint().width(), round(self._theme.scaled(TOPIC_HIGH)) + 2)
+
+    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
+        theme = self._theme
+        painter.save()
+        painter.fillRect(rect, theme.colour("raised"))
+        painter.setPen(theme.colour("border"))
+        painter.drawLine(rect.bottomLeft(), rect.bottomRight())
+        text = str(self.model().headerData(section, Qt.Orientation.Horizontal))
+        box = QRectF(rect).adjusted(_EDGE if section == PAGE else _PADDING, 0, -_PADDING, 0)
+        align = paint.LEFT if section == PAGE else paint.RIGHT
+        paint.words(painter, box, text, head_font(theme), theme.colour("textTertiary"), align)
+        painter.restore()
+
+
+class _RowHeights(QStyledItemDelegate):
+    def __init__(self, theme: Theme, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.measure(theme)
+
+    def measure(self, theme: Theme) -> None:
+        self._page, self._topic = (QSize(40, round(theme.scaled(high))) for high in (PAGE_HIGH, TOPIC_HIGH))
+
+    def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
+        return self._topic if index.internalId() else self._page
+
+
+class PageTree(QTreeView):
+    """The tree of pages. `disconnect_wanted` with the id of a page, `copied` with text that was copied."""
+
+    disconnect_wanted = Signal(int)
+    copied = Signal(str)
+
+    def __init__(self, theme: Theme, model: PageTreeModel) -> None:
+        super().__init__()
+        self.theme, self._pages = theme, model
+        self._keyboard = False
+        self._hovered = QPersistentModelIndex()
+        self._over_button = False
+        self.setModel(model)
+        self._heights = _RowHeights(theme, self)
+        self.setItemDelegate(self._heights)
+        self.setHeader(_PageHeader(theme, self))
+        self.header().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.setAccessibleName(_("Connected pages"))
+        self.setProperty("raised", "true")
+        self.setProperty("ownFocus", True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setIndentation(0)
+        self.setRootIsDecorated(False)
+        self.setVerticalScrollMode(QTreeView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setEditTriggers(QTreeView.EditTrigger.NoEditTriggers)
+        self.setExpandsOnDoubleClick(False)
+        self.setAllColumnsShowFocus(True)
+        self.setMouseTracking(True)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.customContextMenuRequested.connect(self._show_menu)
+        model.rowsInserted.connect(self._expand_new)
+        theme.changed.connect(self._measure)
+
+    # ---- what a person does
+
+    def current_page(self) -> ListedPage | None:
+        """Return the page of the current row."""
+        row = self._pages.page_row(self.currentIndex())
+        return None if row is None else row.listed
+
+    def disconnect_current(self) -> None:
+        """Ask to disconnect the page of the current row."""
+        listed = self.current_page()
+        if listed is not None and listed.gone_s is None:
+            self.disconnect_wanted.emit(listed.page.id)
+
+    def copy_current(self) -> None:
+        """Copy the name of the current topic, or the address of the current page."""
+        topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
+        if topic is not None:
+            self.copied.emit(topic.topic)
+        elif listed is not None:
+            self.copied.emit(listed.page.origin or host_of(listed.page.address))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self._keyboard = True
+        if event.key() == Qt.Key.Key_Delete:
+            self.disconnect_current()
+        elif event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_current()
+        elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
+            self._toggle(self.currentIndex())
+        elif event.key() == Qt.Key.Key_Escape:
+            event.ignore()  # closes the sheet
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        self._keyboard = event.reason() != Qt.FocusReason.MouseFocusReason
+        super().focusInEvent(event)
+        if self._keyboard and not self.currentIndex().isValid():
+            self.setCurrentIndex(self._pages.index(0, 0))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._keyboard = False
+        index = self.indexAt(event.position().toPoint())
+        if event.button() != Qt.MouseButton.LeftButton or not index.isValid():
+            super().mousePressEvent(event)
+            return
+        self.setFocus(Qt.FocusReason.MouseFocusReason)
+        if not self._is_on_button(event.position().toPoint()):
+            self.setCurrentIndex(index.siblingAtColumn(PAGE))
+            if event.position().x() < _EDGE + self.theme.scaled(_ICON) + _GAP:
+                self._toggle(index)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        at = event.position().toPoint()
+        row = self._pages.page_row(self.indexAt(at))
+        if event.button() == Qt.MouseButton.LeftButton and row is not None and self._is_on_button(at):
+            self.disconnect_wanted.emit(row.id)
+            return
+        super().mouseReleaseEvent(event)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if not self._is_on_button(event.position().toPoint()):
+            self._toggle(self.indexAt(event.position().toPoint()))
+
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() in {QEvent.Type.MouseMove, QEvent.Type.HoverMove}:
+            self._hover(event.position().toPoint())  # type: ignore[attr-defined]
+        elif event.type() in {QEvent.Type.Leave, QEvent.Type.HoverLeave}:
+            self._hover(QPoint(-1, -1))
+        return super().viewportEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._measure()
+
+    # ---- inside
+
+    def _expand_new(self, parent: QModelIndex, first: int, last: int) -> None:
+        for row in range(first, last + 1) if not parent.isValid() else ():
+            self.expand(self._pages.index(row, 0))
+        if parent.isValid() and self._pages.rowCount(parent) == last - first + 1:
+            self.expand(parent)  # Qt does not keep a page without topics expanded
+
+    def _toggle(self, index: QModelIndex) -> None:
+        page = index.siblingAtColumn(PAGE)
+        if page.isValid() and not index.parent().isValid():
+            self.setExpanded(page, not self.isExpanded(page))
+
+    def _is_on_button(self, at: QPoint) -> bool:
+        index = self.indexAt(at)
+        row = self._pages.page_row(index)
+        is_page = row is not None and self._pages.topic(index) is None and row.listed.gone_s is None
+        return is_page and index.column() == DISCONNECT
+
+    def _hover(self, at: QPoint) -> None:
+        index, over = QPersistentModelIndex(self.indexAt(at).siblingAtColumn(PAGE)), self._is_on_button(at)
+        if (index, over) != (self._hovered, self._over_button):
+            self._hovered, self._over_button = index, over
+            self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if over else "")
+            self.viewport().update()
+
+    def _show_menu(self, at: QPoint) -> None:
+        index = self.indexAt(at)
+        if not index.isValid():
+            return
+        self.setCurrentIndex(index.siblingAtColumn(PAGE))
+        menu = Menu(self.theme, self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        words = _("Copy the topic's name") if self._pages.topic(index) is not None else _("Copy the address")
+        menu.addAction(words, self.copy_current)
+        leave = menu.addAction(_("Disconnect"), self.disconnect_current)
+        listed = self.current_page()
+        leave.setEnabled(listed is not None and listed.gone_s is None)
+        menu.popup(self.viewport().mapToGlobal(at))
+
+    def _measure(self) -> None:
+        scaled, header = self.theme.scaled, self.header()
+        metrics = {column: round(scaled(wide)) for column, wide in _WIDTHS.items()}
+        for column in (RATE, BANDWIDTH, DROPPED):
+            title = str(self._pages.headerData(column, Qt.Orientation.Horizontal))
+            words = paint.width_of(head_font(self.theme), title)
+            metrics[column] = max(metrics[column], round(words) + 2 * _PADDING + 1)
+        for column, wide in metrics.items():
+            header.resizeSection(column, wide)
+        header.resizeSection(PAGE, max(80, self.viewport().width() - sum(metrics.values())))
+        self._heights.measure(self.theme)
+
+    # ---- painting
+
+    def drawBranches(self, _painter: QPainter, _rect: QRect, _index: Index) -> None:
+        return
+
+    def drawRow(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        row, topic = self._pages.page_row(index), self._pages.topic(index)
+        if row is None:
+            return
+        rect = QRectF(option.rect)
+        rect.setLeft(0)
+        rect.setWidth(self.viewport().width())
+        first = index.sibling(index.row(), PAGE)
+        chosen, theme = first == self.currentIndex().siblingAtColumn(PAGE), self.theme
+        painter.save()
+        if chosen:
+            painter.fillRect(rect, theme.colour("selected"))
+            painter.fillRect(QRectF(0, rect.top(), 2, rect.height()), theme.colour("accent"))
+        elif self._hovered == first and self._hovered.isValid():
+            painter.fillRect(rect, theme.colour("hover"))
+        if topic is None:
+            if row.place:
+                paint.hairline(painter, rect, Qt.Edge.TopEdge, theme.colour("border"))
+            self._paint_page(painter, rect, row.listed, first)
+        else:
+            self._paint_topic(painter, rect, row.topics[index.row()], is_gone=row.listed.gone_s is not None)
+        if chosen and self._keyboard and self.hasFocus():
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(theme.colour("focus"), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), 4, 4)
+        painter.restore()
+
+    def _icon(self, painter: QPainter, left: float, rect: QRectF, name: str, role: str) -> float:
+        side = self.theme.scaled(_ICON)
+        square = QRectF(left, rect.center().y() - side / 2, side, side)
+        paint_icon(painter, square, name, self.theme.colour(role))
+        return left + side + _GAP
+
+    def _cell(self, column: int, rect: QRectF) -> QRectF:
+        left = self.columnViewportPosition(column)
+        return QRectF(left + _PADDING, rect.top(), self.columnWidth(column) - 2 * _PADDING, rect.height())
+
+    def _font(self, kind: str, *, bold: bool = False, struck: bool = False) -> QFont:
+        font = self.theme.font(kind)
+        if bold:
+            font.setWeight(QFont.Weight.DemiBold)
+        font.setStrikeOut(struck)
+        return font
+
+    def _paint_page(self, painter: QPainter, rect: QRectF, listed: ListedPage, index: Index) -> None:
+        theme, is_gone = self.theme, listed.gone_s is not None
+        left = float(_EDGE)
+        if self._pages.rowCount(index):
+            chevron = "chevron-down" if self.isExpanded(index) else "chevron-right"
+            self._icon(painter, left, rect, chevron, "textSecondary")
+        left += theme.scaled(_ICON) + _GAP
+        left = self._icon(
+            painter, left, rect, page_icon(listed.page), _STRUCK if is_gone else "textSecondary"
+        )
+        small = self._font("small")
+        since = since_words(listed)
+        button = self._cell(DISCONNECT, rect)
+        end = button.left() - _PADDING
+        room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
+        room.setRight(end)
+        paint.words(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
+        name, font = page_name(listed.page), self._font("body", bold=True, struck=is_gone)
+        words = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
+        paint.words(painter, words, name, font, theme.colour(_STRUCK if is_gone else "text"))
+        words.setLeft(words.left() + paint.width_of(font, name) + 8)
+        if words.width() > theme.scaled(40):
+            role = _STRUCK if is_gone else "textSecondary"
+            paint.words(painter, words, where_words(listed.page), self._font("body"), theme.colour(role))
+        if not is_gone:
+            is_over = self._over_button and self._hovered == index
+            side = theme.scaled(_ICON)
+            square = QRectF(button.right() - side, rect.center().y() - side / 2, side, side)
+            if is_over:
+                paint.box(
+                    painter, square.adjusted(-4, -4, 4, 4), theme.radius("key"), theme.colour("pressed")
+                )
+            paint_icon(painter, square, "x", theme.colour("text" if is_over else "textSecondary"))
+
+    def _paint_topic(self, painter: QPainter, rect: QRectF, topic: PageTopic, *, is_gone: bool) -> None:
+        theme = self.theme
+        role = _STRUCK if is_gone else "text"
+        left = _EDGE + 2 * (theme.scaled(_ICON) + _GAP)
+        icon = "arrow-up-from-line" if topic.is_published else "arrow-down-to-line"
+        left = self._icon(painter, left, rect, icon, _STRUCK if is_gone else "textSecondary")
+        body, small = self._font("body"), self._font("small")
+        verbs = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
+        quiet = theme.colour(_STRUCK if is_gone else "textSecondary")
+        paint.words(
+            painter, QRectF(left, rect.top(), verbs + 2, rect.height()), does_words(topic), body, quiet
+        )
+        left += verbs + 10
+        limit = limit_words(topic)
+        wide = paint.width_of(small, limit) + 2 if limit else 0.0
+        end = self._cell(PAGE, rect).right()
+        paint.words(
+            painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
+            theme.colour(_STRUCK if is_gone else "textTertiary"), paint.RIGHT,
+        )  # fmt: skip
+        name = QRectF(left, rect.top(), max(20.0, end - wide - left - _GAP), rect.height())
+        paint.words(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
+        if is_gone:
+            return
+        for column, text in ((RATE, rate_words(topic.rate)), (BANDWIDTH, bandwidth_words(topic.bytes_per_s))):
+            paint.words(painter, self._cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
+        self._paint_dropped(painter, self._cell(DROPPED, rect), topic, body)
+
+    def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
+        theme, words = self.theme, dropped_words(topic)
+        is_bad = topic.dropped_count > 0
+        paint.words(painter, cell, words, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
+        if is_bad:
+            side = theme.scaled(13)
+            left = cell.right() - paint.width_of(font, words) - side - 5
+            square = QRectF(left, cell.center().y() - side / 2, side, side)
+            paint_icon(painter, square, "triangle-alert", theme.colour("warn"))

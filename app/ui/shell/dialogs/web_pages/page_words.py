@@ -1,0 +1,86 @@
+"""Words of the table of connected pages."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import TYPE_CHECKING
+
+from app.core.network.web_page_list import ListedPage, dropped_share
+from app.core.network.web_words import page_name, share_words
+from app.ui.text.dates import clock_words
+from app.ui.text.numbers import bandwidth_words, rate_words
+from nep.i18n import _, number
+
+if TYPE_CHECKING:
+    from nep.programs.web.context import ConnectedPage, PageTopic
+
+_TABLETS = ("ipad", "tablet", "android")
+_PHONES = ("iphone", "phone", "mobile")
+_BROWSERS = ("chrome", "chromium", "safari", "firefox", "edge", "opera", "webview", "browser")
+
+
+def page_icon(page: ConnectedPage) -> str:
+    """Return the icon of a tablet, a phone, a computer's browser, or a program."""
+    client = page.client.casefold()
+    if any(word in client for word in _PHONES):
+        return "smartphone"
+    if any(word in client for word in _TABLETS):
+        return "tablet"
+    is_browser = any(word in client for word in _BROWSERS)
+    return "monitor" if page.origin or is_browser else "terminal"
+
+
+def where_words(page: ConnectedPage) -> str:
+    """Say "192.168.1.30, Chrome"."""
+    client = page.client if page.client != page_name(page) else ""
+    return ", ".join(filter(None, (host_of(page.address), client)))
+
+
+def host_of(address: str) -> str:
+    """Return the host of "192.168.1.30:50412" or "::1:50412"."""
+    host, colon, port = address.rpartition(":")
+    return host if colon and port.isdigit() else address
+
+
+def since_words(listed: ListedPage) -> str:
+    """Say "since 8:32", or "gone 4 s"."""
+    if listed.gone_s is not None:
+        return _("gone {seconds} s").format(seconds=int(listed.gone_s))
+    then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
+    return _("since {time}").format(time=clock_words(then))
+
+
+def does_words(topic: PageTopic) -> str:
+    """Say whether a page reads or publishes."""
+    return _("publishes") if topic.is_published else _("reads")
+
+
+def limit_words(topic: PageTopic) -> str:
+    """Say "at most 15/s"; blank without a limit."""
+    limit = topic.at_most_per_s
+    return _("at most {rate}/s").format(rate=number(limit, ".3g")) if limit else ""
+
+
+def dropped_words(topic: PageTopic) -> str:
+    """Say which share was dropped: "0", or "0.3 %"."""
+    if topic.dropped_count <= 0:
+        return "0"
+    return share_words(dropped_share(topic.sent_count, topic.dropped_count))
+
+
+def page_sentence(listed: ListedPage) -> str:
+    """Say what a screen reader reads for a page."""
+    return ", ".join((page_name(listed.page), where_words(listed.page), since_words(listed)))
+
+
+def topic_sentence(topic: PageTopic) -> str:
+    """Say what a screen reader reads for a topic of a page."""
+    rate = rate_words(topic.rate)
+    words = (
+        f"{does_words(topic)} {topic.topic}",
+        limit_words(topic),
+        f"{rate}/s" if rate else "",
+        bandwidth_words(topic.bytes_per_s),
+        _("{share} dropped").format(share=dropped_words(topic)) if topic.dropped_count else "",
+    )
+    return ", ".join(filter(None, words))

@@ -1,0 +1,115 @@
+"""A QR code that opens the test page on a tablet, black on white in both themes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from nep.i18n import _
+from nep.system.lazy_import import lazy_module
+
+if TYPE_CHECKING:
+    import segno
+else:  # loaded with the first code
+    segno = lazy_module("segno")
+
+SIDE = 140
+QUIET_ZONE = 4
+"""Empty modules on each side, as ISO/IEC 18004 requires."""
+_PADDING = 12
+
+
+def modules_of(text: str) -> tuple[bytes, ...]:
+    """Return the modules of a text's QR code, 1 for a dark one, without the quiet zone."""
+    return tuple(bytes(row) for row in segno.make_qr(text, error="m").matrix)
+
+
+class QrCode(QWidget):
+    """The code of a text, or words in an empty frame while there is none."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._text, self._words = "", ""
+        self._modules: tuple[bytes, ...] = ()
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        theme.changed.connect(self.updateGeometry)
+
+    @property
+    def text(self) -> str:
+        """What the code says; "" while there is none."""
+        return self._text
+
+    def show_code(self, text: str, address: str) -> None:
+        """Show the code of a text; ``address`` is the part of it that a screen reader says."""
+        if text == self._text:
+            return
+        try:
+            modules = modules_of(text)
+        except ImportError:
+            self.show_words(_("Install segno to see a code here: pip install segno"))
+            return
+        self._text, self._modules, self._words = text, modules, ""
+        self.setAccessibleName(
+            _("QR code that opens {address} on a tablet. It contains the token.").format(address=address)
+        )
+        self.update()
+
+    def show_words(self, words: str) -> None:
+        """Show why there is no code."""
+        if words != self._words:
+            self._text, self._modules, self._words = "", (), words
+            self.setAccessibleName(words)
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        side = round(self._theme.scaled(SIDE))
+        return QSize(side, side)
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        if self._modules:
+            self._paint_code(painter)
+        else:
+            self._paint_words(painter)
+        painter.end()
+
+    def _paint_code(self, painter: QPainter) -> None:
+        theme, whole = self._theme, QRectF(self.rect())
+        paint.box(painter, whole, theme.radius("panel"), Qt.GlobalColor.white, theme.colour("borderStrong"))  # type: ignore[arg-type]
+        ratio = painter.device().devicePixelRatioF()
+        count = len(self._modules) + 2 * QUIET_ZONE
+        side = (
+            max(1, math.floor(whole.width() * ratio / count)) / ratio
+        )  # whole pixels: cameras need sharp edges
+        left = round((whole.width() - side * len(self._modules)) / 2 * ratio) / ratio
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        for row, modules in enumerate(self._modules):
+            for column, is_dark in enumerate(modules):
+                if is_dark:
+                    square = QRectF(left + column * side, left + row * side, side, side)
+                    painter.fillRect(square, Qt.GlobalColor.black)
+
+    def _paint_words(self, painter: QPainter) -> None:
+        theme, whole = self._theme, QRectF(self.rect())
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        pen = QPen(theme.colour("controlBorder"), 1)
+        pen.setDashPattern([5, 4])
+        painter.setPen(pen)
+        painter.drawRoundedRect(
+            whole.adjusted(0.5, 0.5, -0.5, -0.5), theme.radius("panel"), theme.radius("panel")
+        )
+        painter.setFont(theme.font("small"))
+        painter.setPen(theme.colour("textSecondary"))
+        inside = whole.adjusted(_PADDING, _PADDING, -_PADDING, -_PADDING)
+        flags = int(Qt.AlignmentFlag.AlignCenter) | int(Qt.TextFlag.TextWordWrap)
+        painter.drawText(inside, flags, self._words)

@@ -1,0 +1,365 @@
+"""The sheet at the right of the window: switches the web server, and shows who is connected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from PySide6.QtCore import QPoint, QRect, QSize, Qt, QTimer, QUrl
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from app.core.network.web_pages import WebPages, WebProtocol
+from app.core.network.web_words import notices, page_name, terminal_command
+from app.ui.other_programs import open_outside
+from app.ui.panels.base import ShowToast
+from app.ui.shell.dialogs.overlay import BELOW_STOP, Overlay, stops_in
+from app.ui.shell.dialogs.web_pages.access_form import AccessForm
+from app.ui.shell.dialogs.web_pages.fields import RoleIcon
+from app.ui.shell.dialogs.web_pages.notice_strip import NoticeStrip
+from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel, sorted_topics
+from app.ui.shell.dialogs.web_pages.page_tree import PageTree
+from app.ui.shell.dialogs.web_pages.who_may import PermissionForm
+from app.ui.text.numbers import bandwidth_words, grouped
+from app.ui.theme.theme import Theme
+from app.ui.widgets import (
+    Button,
+    Chip,
+    ElidedLabel,
+    IconButton,
+    Segments,
+    Separator,
+    Switch,
+    label,
+    paint,
+    set_role,
+)
+from app.ui.widgets.flow_layout import Flow
+from nep.i18n import _, ngettext
+
+WIDE = 640
+REFRESH_MS = 300
+_SIDE, _TABLE_SIDE, _SCROLL_BAR, _EDGE, _BELOW_BARS = 19, 12, 10, 6, 46
+_MIN_TABLE_HEIGHT = 150
+
+
+class WebPagesSheet(Overlay):
+    """Changes apply at once. It stays open, without a scrim, while a person works in the window."""
+
+    top = _BELOW_BARS
+    docks_right = True
+
+    def __init__(
+        self,
+        theme: Theme,
+        window: QWidget,
+        web: WebPages,
+        robots: Callable[[], tuple[str, ...]],
+        say: ShowToast,
+        open_url: Callable[[QUrl], bool] = open_outside,
+    ) -> None:
+        """``robots`` returns the names of connected robots; ``open_url`` opens a page in the browser."""
+        super().__init__(theme, window, _("Web pages and tablets"))
+        self._web, self._say, self._open_url = web, say, open_url
+        self._dismissed: set[tuple[str, ...]] = set()
+        self.access = AccessForm(theme, web)
+        self.permissions = PermissionForm(theme, web, robots)
+        self._make_head()
+        self._make_table()
+        self._make_foot()
+        self._lay_out()
+        self._connect()
+        self._timer = QTimer(self)
+        self._timer.setInterval(REFRESH_MS)
+        self._timer.timeout.connect(self.refresh)
+        self.closed.connect(self._timer.stop)
+
+    # ---- its parts
+
+    def _make_head(self) -> None:
+        theme = self.theme
+        self.count = Chip(theme)
+        options = [("rosbridge", "rosbridge", None), ("foxglove", "Foxglove", None)]
+        self.tabs = Segments(theme, options, "rosbridge", check=True, name=_("Protocol"))
+        self.switch = Switch(theme, "")
+        self.state = label("", "body", role="textTertiary", wrap=True)
+        self.other_port = Button(theme, "", size="small")
+
+    def _make_table(self) -> None:
+        self.heading = label(_("Connected pages"), "title")
+        self.sums = label("", "body", role="textTertiary")
+        self.model = PageTreeModel(self)
+        self.table = PageTree(self.theme, self.model)
+        self.table.setMinimumHeight(_MIN_TABLE_HEIGHT)
+        self.empty = label("", "body", role="textSecondary", wrap=True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.empty.setMinimumHeight(_MIN_TABLE_HEIGHT // 2)
+        self.notice = NoticeStrip(self.theme)
+
+    def _make_foot(self) -> None:
+        theme = self.theme
+        self.command = ElidedLabel("code", "text", least=round(theme.scaled(90)))
+        self.command.mode = Qt.TextElideMode.ElideRight
+        self.copy_command = IconButton(theme, "copy", _("Copy the command"), size=26)
+        self.copy_page = Button(theme, "", "copy")
+        self.test_page = Button(theme, _("Open the test page"), "external-link", kind="primary")
+
+    def _lay_out(self) -> None:
+        self._inside = QWidget()
+        self._inside.setProperty("bare", "true")
+        column = QVBoxLayout(self._inside)
+        column.setContentsMargins(0, 2, 0, 6)
+        column.setSpacing(0)
+        column.addLayout(self._form())
+        column.addSpacing(12)
+        column.addWidget(Separator(self.theme))
+        column.addSpacing(8)
+        column.addLayout(self._table_part(), 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.viewport().setAutoFillBackground(False)
+        self._area.setWidget(self._inside)
+        notice = QHBoxLayout()
+        notice.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
+        notice.addWidget(self.notice)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(1, 10, 1, 8)
+        whole.setSpacing(8)
+        whole.addLayout(self._head_row())
+        whole.addWidget(self._area, 1)
+        whole.addLayout(notice)
+        whole.addWidget(Separator(self.theme))
+        whole.addLayout(self._foot_row())
+
+    def _head_row(self) -> QHBoxLayout:
+        title = QWidget()
+        row = Flow(title, gap=10)
+        row.addWidget(RoleIcon(self.theme, "globe", side=20))
+        row.addWidget(label(_("Web pages and tablets"), "heading", wrap=True))
+        row.addWidget(self.count)
+        head = self.head(title)
+        head.setContentsMargins(_SIDE, 0, 10, 0)
+        return head
+
+    def _form(self) -> QVBoxLayout:
+        switches = Flow(gap=12)
+        switches.addWidget(self.switch)
+        switches.addWidget(self.state)
+        switches.addWidget(self.other_port)
+        switches.push()
+        switches.addWidget(self.tabs)
+        form = QVBoxLayout()
+        form.setContentsMargins(_SIDE, 0, _SIDE, 0)
+        form.setSpacing(10)
+        form.addLayout(switches)
+        form.addWidget(self.access)
+        form.addWidget(self.permissions)
+        return form
+
+    def _table_part(self) -> QVBoxLayout:
+        heading = QHBoxLayout()
+        heading.setContentsMargins(_SIDE - _TABLE_SIDE, 0, _SIDE - _TABLE_SIDE, 0)
+        heading.setSpacing(8)
+        heading.addWidget(self.heading)
+        heading.addWidget(self.sums, 1)
+        part = QVBoxLayout()
+        part.setContentsMargins(_TABLE_SIDE, 0, _TABLE_SIDE, 0)
+        part.setSpacing(4)
+        part.addLayout(heading)
+        part.addWidget(self.table, 1)
+        part.addWidget(self.empty, 1)
+        self.empty.setContentsMargins(_SIDE - _TABLE_SIDE, 4, 0, 0)
+        return part
+
+    def _foot_row(self) -> QHBoxLayout:
+        foot = QHBoxLayout()
+        foot.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
+        foot.setSpacing(8)
+        foot.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
+        foot.addWidget(self.command, 1)
+        foot.addWidget(self.copy_command)
+        foot.addWidget(self.copy_page)
+        foot.addWidget(self.test_page)
+        return foot
+
+    def _connect(self) -> None:
+        access, table = self.access, self.table
+        self.tabs.changed.connect(lambda _tab: self.refresh())
+        self.switch.clicked.connect(lambda on: self._do(partial(self._web.serve, self._tab, on=on)))
+        self.other_port.clicked.connect(lambda: self._do(self._web.use_free_port))
+        access.copy_address.connect(self._copy_address)
+        access.copy_token.connect(lambda: self._copy(self._web.token, _("Copied the token")))
+        access.new_token_wanted.connect(self._replace_token)
+        access.open_to.chosen.connect(lambda host: self._do(partial(self._web.open_to, host)))
+        self.permissions.robots.changed.connect(self.refresh)
+        self.permissions.origins.settled.connect(self.refresh)
+        table.disconnect_wanted.connect(self._disconnect)
+        table.copied.connect(lambda text: self._copy(text, _("Copied {text}").format(text=text)))
+        self.notice.helped.connect(self._help)
+        self.notice.dismissed.connect(self._dismiss)
+        self.copy_command.clicked.connect(
+            lambda: self._copy(terminal_command(self._web), _("Copied the command"))
+        )
+        self.copy_page.clicked.connect(self._copy_page)
+        self.test_page.clicked.connect(lambda: self._open_url(QUrl(self._web.local_page_url)))
+
+    # ---- where it lies
+
+    def first(self) -> QWidget:
+        return self.switch
+
+    def wanted_size(self, room: QSize) -> QSize:
+        least = self._inside.minimumSizeHint().width() + _SCROLL_BAR
+        return QSize(min(room.width(), max(round(self.theme.scaled(WIDE)), least)), room.height())
+
+    def _placed(self, top: int) -> QRect:
+        window = self.window_below()
+        bottom = window.height() - _EDGE
+        for bar in window.findChildren(QWidget, "statusBar"):
+            if bar.isVisible():
+                bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE)
+        for stop in stops_in(window):  # at the right of a bar, as the sheet is at the right below it
+            top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + BELOW_STOP)
+        size = self.wanted_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
+        return QRect(QPoint(window.width() - size.width() - _EDGE, top), size)
+
+    def place(self) -> None:
+        super().place()
+        self._scrim.hide()
+
+    def _focus_changed(self, _old: QWidget | None, _new: QWidget | None) -> None:
+        return  # a person works on in the window
+
+    def open(self) -> None:
+        """Open the sheet, which follows the server until it is closed."""
+        self.access.open_to.offer(self._web.addresses(), self._web.host)
+        if self._tab not in self._web.protocols and self._web.protocols:
+            self.tabs.set_value(next(iter(self._web.protocols)))
+        self.refresh()
+        self._timer.start()
+        super().open()
+        self._scrim.hide()
+
+    # ---- what it shows
+
+    @property
+    def _tab(self) -> WebProtocol:
+        return "foxglove" if self.tabs.value == "foxglove" else "rosbridge"
+
+    def refresh(self) -> None:
+        """Show the server's state and its pages."""
+        web, is_foxglove = self._web, self._tab == "foxglove"
+        web.refresh()
+        self._show_switch()
+        self.access.show_state(is_foxglove=is_foxglove)
+        self.permissions.show_state(is_foxglove=is_foxglove)
+        self._show_pages()
+        self.notice.show_notices(notices(web, self._dismissed))
+        self.command.setText(terminal_command(web))
+        self.copy_page.set_word(_("Copy the link") if is_foxglove else _("Copy a starter page"))
+        paint.show_when(self.test_page, not is_foxglove)
+        self.test_page.setEnabled(web.state == "on")
+
+    def _show_switch(self) -> None:
+        web, is_foxglove = self._web, self._tab == "foxglove"
+        words = _("Let Foxglove and Lichtblick connect") if is_foxglove else _("Let web pages connect")
+        if words != self.switch.text():
+            self.switch.say(words)
+            self.switch.updateGeometry()
+        self.switch.setChecked(self._tab in web.protocols)
+        for protocol in ("rosbridge", "foxglove"):
+            self.tabs.set_dot(protocol, protocol in web.protocols and web.state == "on")
+        quiet = "" if is_foxglove else _("Off at each start")
+        said = web.sentence or (_("Starting…") if web.state == "starting" else quiet)
+        set_role(self.state, "error" if web.sentence else "textTertiary")
+        if said != self.state.text():
+            self.state.setText(said)
+            paint.show_when(self.state, bool(said))
+            self.switch.setAccessibleDescription(said)
+        if web.free_port:
+            self.other_port.set_word(_("Use {port}").format(port=web.free_port))
+        paint.show_when(self.other_port, bool(web.free_port))
+
+    def _show_pages(self) -> None:
+        web = self._web
+        listed, count = web.listed, len(web.connected)
+        self.model.show_pages([sorted_topics(each) for each in listed])
+        words = ngettext("{count} connected", "{count} connected", count).format(count=grouped(count))
+        self.count.set(words if count else "", "ok")
+        sums = _("{count}, {bandwidth} in all").format(
+            count=grouped(count), bandwidth=bandwidth_words(web.bytes_per_s)
+        )
+        self.sums.setText(sums if count else "")
+        paint.show_when(self.table, bool(listed))
+        paint.show_when(self.empty, not listed)
+        if web.state == "on":
+            words = (
+                _("No pages yet. Scan the code with a tablet, or open the test page.")
+                if self.access.qr.text
+                else _("No pages yet. Open the test page, or a page that connects to the address above.")
+            )
+        else:
+            words = _("Let web pages connect to see them here.")
+        self.empty.setText(words)
+
+    # ---- what a person does
+
+    def _do(self, change: Callable[[], object]) -> None:
+        change()
+        self.refresh()
+
+    def _copy(self, text: str, words: str) -> None:
+        QGuiApplication.clipboard().setText(text)
+        self._say(words)
+
+    def _copy_address(self) -> None:
+        self._copy(self._web.url, _("Copied the address"))
+
+    def _copy_page(self) -> None:
+        if self._tab == "foxglove":
+            self._copy(self._web.full_url, _("Copied the link"))
+        else:
+            self._copy(
+                self._web.full_url, _("Copied a starter page. Paste it into a file such as page.html.")
+            )
+
+    def _replace_token(self) -> None:
+        web, before = self._web, self._web.token
+        count = web.new_token()
+        self.refresh()
+        words = ngettext(
+            "New token. {count} page was disconnected.", "New token. {count} pages were disconnected.", count
+        )
+
+        def undo() -> None:
+            if web.token and web.host:
+                self._do(partial(web.set_token, before))
+
+        self._say(words.format(count=grouped(count)) if count else _("New token"), _("Undo"), undo)
+
+    def _disconnect(self, page_id: int) -> None:
+        page = next((each for each in self._web.connected if each.id == page_id), None)
+        if page is None:
+            return
+        self._web.disconnect(page_id)
+        self.refresh()
+        self._say(_("Disconnected {page}").format(page=page_name(page)))
+
+    def _help(self) -> None:
+        notice = self.notice.notice
+        if notice is None:
+            return
+        if notice.next_step == "choose robots":
+            self.tabs.set_value("rosbridge")
+            self._area.ensureWidgetVisible(self.permissions.robots)
+            self.permissions.robots.open_list()
+        elif notice.next_step == "allow origin":
+            self._web.add_origin(notice.value)
+        self.refresh()
+
+    def _dismiss(self) -> None:
+        if self.notice.notice is not None:
+            self._dismissed.add(self.notice.notice.key)
+            self.refresh()

@@ -1,0 +1,222 @@
+"""Which origins may connect, and which robots pages may move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app.core.network.web_pages import WebPages
+from app.ui.shell.dialogs.web_pages.access_form import LABEL_WIDE
+from app.ui.shell.dialogs.web_pages.fields import RoleIcon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import Button, label, paint, set_role
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.inputs.check_box import CheckBox
+from app.ui.widgets.inputs.token_field import Token, TokenField
+from nep.errors import NepError
+from nep.i18n import _, listed
+
+_FIELD_HIGH = 31
+EXAMPLE = "http://192.168.1.20:8080"
+
+
+class OriginField(TokenField):
+    """Allowed origins as tokens. Text that is none stays as typed and gets the edge of a wrong value."""
+
+    def __init__(self, theme: Theme, web: WebPages) -> None:
+        super().__init__(theme, _("Origins"), EXAMPLE, _("Add an origin"))
+        self._web = web
+        self.is_wrong = False
+
+    def show_origins(self, origins: Sequence[str]) -> None:
+        """Show these as tokens; what is being typed stays."""
+        if [each.entry for each in self.tokens] == [*origins]:
+            return
+        for token in self.tokens:
+            self._drop(token)
+        for origin in origins:
+            self._add_token(Token(self._theme, origin))
+        self._arrange()
+
+    def _edited(self, text: str) -> None:
+        self._mark(wrong=False)
+        if text.strip() and text[-1] in " ,":
+            self._end_typing()
+        self.changed.emit()
+
+    def _end_typing(self) -> None:
+        wrong = []
+        for word in self.edit.text().replace(",", " ").split():
+            try:
+                self._web.add_origin(word)
+            except NepError:
+                wrong.append(word)
+        self.edit.setText(" ".join(wrong))
+        self.show_origins(self._web.origins)
+        self._mark(wrong=bool(wrong))
+        self.settled.emit()
+
+    def _remove(self, token: Token) -> None:
+        self._web.set_origins([each.entry for each in self.tokens if each is not token])
+        super()._remove(token)
+
+    def _mark(self, *, wrong: bool) -> None:
+        self.is_wrong = wrong
+        self.set_wrong(wrong)
+
+
+class _Box(QWidget):
+    """A row that only shows something."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        painter, theme = QPainter(self), self._theme
+        fill, edge = theme.colour("sunken"), theme.colour("borderStrong")
+        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, edge)
+        painter.end()
+
+
+class RobotChoice(QWidget):
+    """Names of the robots that pages may move, and check boxes to choose them; `changed` by a person."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme, web: WebPages, robots: Callable[[], tuple[str, ...]]) -> None:
+        """``robots`` returns the names of connected robots."""
+        super().__init__()
+        self._theme, self._web, self._robots = theme, web, robots
+        self.words = label("", "body", wrap=True)
+        self.icon = RoleIcon(theme, "bot")
+        self.choose = Button(theme, _("Choose robots"), size="small")
+        self.choose.setCheckable(True)
+        self.none = label(_("No robots are connected."), "small", role="textTertiary", wrap=True)
+        self.boxes: dict[str, CheckBox] = {}
+        self.list = QWidget()
+        self._flow = Flow(self.list, gap=16, row_gap=2)
+        self._flow.setContentsMargins(2, 4, 2, 0)
+        self._flow.addWidget(self.none)
+        line = _Box(theme)
+        row = QHBoxLayout(line)
+        row.setContentsMargins(10, 2, 3, 2)
+        row.setSpacing(8)
+        row.addWidget(self.icon)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.choose)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(line)
+        column.addWidget(self.list)
+        self.list.hide()
+        self.choose.clicked.connect(self._open)
+        self.show_state()
+
+    def open_list(self) -> None:
+        """Show the check boxes and give the first one the keyboard."""
+        self.choose.setChecked(True)
+        self._open(True)
+
+    def show_state(self) -> None:
+        """Show who may be moved, and offer connected and allowed robots."""
+        names = self._web.robots
+        said = listed(list(names)) if names else _("none")
+        words = _("May command robots: {robots}").format(robots=said)
+        if words != self.words.text():
+            self.words.setText(words)
+        role = "warn" if names else "text"
+        set_role(self.words, role)
+        self.icon.set("triangle-alert" if names else "bot", role if names else "textSecondary")
+        if self.choose.isChecked():
+            self._show_boxes()
+
+    def _open(self, is_open: bool) -> None:
+        self.choose.set_word(_("Done") if is_open else _("Choose robots"))
+        self.list.setVisible(is_open)
+        if is_open:
+            self._show_boxes()
+            first = next(iter(self.boxes.values()), None)
+            if first is not None:
+                first.setFocus()
+
+    def _show_boxes(self) -> None:
+        wanted = sorted({*self._robots(), *self._web.robots}, key=str.casefold)
+        for name in [each for each in self.boxes if each not in wanted]:
+            box = self.boxes.pop(name)
+            self._flow.removeWidget(box)
+            box.deleteLater()
+        for name in wanted:
+            if name not in self.boxes:
+                box = self.boxes[name] = CheckBox(self._theme, name)
+                box.clicked.connect(self._take)
+                self._flow.addWidget(box)
+                box.show()
+            self.boxes[name].setChecked(name in self._web.robots)
+        self.none.setVisible(not wanted)
+
+    def _take(self) -> None:
+        self._web.set_robots([name for name, box in self.boxes.items() if box.isChecked()])
+        self.show_state()
+        self.changed.emit()
+
+
+class PermissionForm(QWidget):
+    """The second part of the form: origins and robots, each with a sentence below."""
+
+    def __init__(self, theme: Theme, web: WebPages, robots: Callable[[], tuple[str, ...]]) -> None:
+        super().__init__()
+        self._theme, self._web = theme, web
+        self._titles: list[QLabel] = []
+        self.origins = OriginField(theme, web)
+        self.origins_state = label("", "small", wrap=True)
+        self.robots = RobotChoice(theme, web, robots)
+        self.robots_state = label("", "small", role="textTertiary", wrap=True)
+        self._robots_label = label(_("Robots"), "body", role="textSecondary")
+        self._grid = grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(5)
+        grid.setColumnStretch(1, 1)
+        self._add_row(0, label(_("Origins"), "body", role="textSecondary"), self.origins, self.origins_state)
+        grid.setRowMinimumHeight(2, 3)
+        self._add_row(3, self._robots_label, self.robots, self.robots_state)
+        self.origins.changed.connect(self.show_state)
+        self.origins.settled.connect(self.show_state)
+        theme.changed.connect(self._measure)
+        self._measure()
+
+    def _add_row(self, place: int, title: QLabel, field: QWidget, said: QLabel) -> None:
+        self._titles = [*self._titles, title]
+        self._grid.addWidget(title, place, 0, Qt.AlignmentFlag.AlignTop)
+        self._grid.addWidget(field, place, 1)
+        self._grid.addWidget(said, place + 1, 1)
+
+    def _measure(self) -> None:
+        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
+        for title in self._titles:  # beside the first line of a field that grows
+            title.setMinimumHeight(round(self._theme.scaled(_FIELD_HIGH)))
+
+    def show_state(self, *, is_foxglove: bool | None = None) -> None:
+        """Show what is allowed; on the Foxglove tab no robots, which its clients can't command."""
+        self.origins.show_origins(self._web.origins)
+        set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
+        self.origins_state.setText(
+            _("An origin looks like {example}.").format(example=EXAMPLE)
+            if self.origins.is_wrong
+            else _("Pages from other origins are refused. Programs need only the token.")
+        )
+        self.robots.show_state()
+        if is_foxglove is None:
+            return
+        for widget in (self._robots_label, self.robots):
+            widget.setVisible(not is_foxglove)
+        self.robots_state.setText(
+            _("Foxglove and Lichtblick only read topics. They can't publish or move a robot.")
+            if is_foxglove
+            else _("Pages can read topics and publish their own. Moving a robot needs its name here.")
+        )

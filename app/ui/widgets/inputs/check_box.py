@@ -1,0 +1,44 @@
+"""One of several names that can be chosen."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize
+from PySide6.QtGui import QPainter
+
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
+
+SIDE, GAP, LEAST_HEIGHT = 18, 8, 26
+
+
+class CheckBox(PaintedButton):
+    """A box with a check mark while it is chosen, and a word beside it."""
+
+    shortens = True
+
+    def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
+        super().__init__(theme, text, checkable=True)
+        self.setChecked(on)
+
+    def sizeHint(self) -> QSize:
+        font = self._theme.font("body")
+        width = self._theme.scaled(SIDE) + GAP + paint.width_of(font, self.text()) + 4
+        return QSize(round(width) + 1, max(LEAST_HEIGHT, round(paint.height_of(font)) + 6))
+
+    def minimumSizeHint(self) -> QSize:
+        wanted = self.sizeHint()
+        return QSize(min(round(self._theme.scaled(72)), wanted.width()), wanted.height())
+
+    def paint_button(self, painter: QPainter, rect: QRectF) -> None:
+        theme, side = self._theme, self._theme.scaled(SIDE)
+        square = QRectF(1, rect.center().y() - side / 2, side, side)
+        if self.isChecked():
+            paint.box(painter, square, theme.radius("key"), theme.colour("accent"))
+            paint_icon(painter, square.adjusted(2, 2, -2, -2), "check", theme.colour("onAccent"))
+        else:
+            fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.dark else "panel")
+            paint.box(painter, square, theme.radius("key"), fill, theme.colour("controlBorder"))
+        ink = theme.colour("text" if self.isEnabled() else "textDisabled")
+        paint.words(painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), ink)

@@ -1,0 +1,206 @@
+"""A field whose finished entries are tokens, each of which a press removes; what is typed comes last."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from app.core.recording.choice import NOT
+from app.ui.theme.icons import paint_icon
+from app.ui.theme.theme import Theme
+from app.ui.widgets import paint
+from app.ui.widgets.buttons import PaintedButton
+from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.keyboard import is_plain
+from app.ui.widgets.menus import EditMenu
+from nep.i18n import _
+
+HIGH, PAD, GAP, CROSS, LEAST = 22, 7, 5, 10, 40
+MOST_LETTERS = 400
+
+
+class Token(PaintedButton):
+    """One finished entry, with "not" before it if it is left out; a press, or Delete, removes it."""
+
+    def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
+        super().__init__(theme)
+        self.entry, self.is_left_out = entry, is_left_out
+        words = _("Remove “not {pattern}”") if is_left_out else _("Remove “{pattern}”")
+        self.say(entry, words.format(pattern=entry))
+
+    def sizeHint(self) -> QSize:
+        theme = self._theme
+        wide = 2 * PAD + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS)
+        if self.is_left_out:
+            wide += paint.width_of(theme.font("small"), _(NOT)) + GAP
+        return QSize(round(wide) + 1, round(theme.scaled(HIGH)))
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and is_plain(event):
+            self.click()
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        whole = QRectF(self.rect())
+        fill = "hover" if self.is_highlighted else "sunken" if self.is_left_out else "accentTint"
+        paint.box(painter, whole, theme.radius("small"), theme.colour(fill))
+        role = "textDisabled" if not self.isEnabled() else "text" if self.is_left_out else "accentText"
+        ink = theme.colour(role)
+        rest = whole.adjusted(PAD, 0, -PAD, 0)
+        if self.is_left_out:
+            font = theme.font("small")
+            paint.words(painter, rest, _(NOT), font, theme.colour("textSecondary"))
+            rest.setLeft(rest.left() + paint.width_of(font, _(NOT)) + GAP)
+        side = theme.scaled(CROSS)
+        square = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
+        paint_icon(painter, square, "x", ink)
+        rest.setRight(square.left() - GAP + 1)
+        paint.words(painter, rest, self.entry, theme.font("code"), ink)
+        painter.end()
+
+
+class _Typed(QLineEdit):
+    """What is being typed; Enter makes a token of it, Backspace before its first letter takes one away."""
+
+    ended = Signal()
+    back = Signal()
+    focused = Signal()
+
+    def sizeHint(self) -> QSize:
+        """As much as its words need: it stands behind the last token as long as there is room."""
+        words = self.text() or self.placeholderText()
+        wide = self.fontMetrics().horizontalAdvance(words) + 2 * PAD
+        return QSize(max(LEAST, wide), super().sizeHint().height())
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(LEAST, super().minimumSizeHint().height())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        plain = is_plain(event)
+        if plain and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
+            self.ended.emit()
+        elif plain and event.key() == Qt.Key.Key_Backspace and not self.text():
+            self.back.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self.focused.emit()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() != Qt.FocusReason.PopupFocusReason:
+            self.ended.emit()
+        self.focused.emit()
+
+
+class TokenField(QWidget):
+    """Base of fields of tokens: subclasses decide when typed text is finished.
+
+    `changed` when entries or the typed text change; `settled` when entries change and no text is unfinished.
+    """
+
+    changed = Signal()
+    settled = Signal()
+
+    def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
+        """``example`` stands in the empty field, ``add`` behind its tokens."""
+        super().__init__()
+        self._add_words = add
+        self._theme, self._example, self._is_wrong = theme, example, False
+        self._tokens: list[Token] = []
+        self.edit = _Typed(self)
+        self.edit.setAccessibleName(name)
+        self.edit.setPlaceholderText(example)
+        self.edit.setMaxLength(MOST_LETTERS)
+        self.edit.setProperty("bare", "true")
+        self.edit.setProperty("ownFocus", True)
+        EditMenu(theme, self.edit)
+        self.edit.textEdited.connect(self._edited)
+        self.edit.textChanged.connect(self.edit.updateGeometry)
+        self.edit.ended.connect(self._end_typing)
+        self.edit.back.connect(self._remove_last)
+        self.edit.focused.connect(self.update)
+        self.setFocusProxy(self.edit)
+        self._flow = Flow(self, gap=GAP, row_gap=4)
+        self._flow.setContentsMargins(PAD, 5, PAD, 5)
+        self._flow.add_elastic(self.edit, greedy=True)
+
+    @property
+    def tokens(self) -> Sequence[Token]:
+        """Finished entries, in their order."""
+        return tuple(self._tokens)
+
+    def set_wrong(self, is_wrong: bool) -> None:
+        """Give it the edge of a wrong value, or take it away."""
+        self._is_wrong = is_wrong
+        self.update()
+
+    # ---- what a person does
+
+    def _edited(self, text: str) -> None:
+        """Handle typed text."""
+
+    def _end_typing(self) -> None:
+        """Finish what is typed: Enter was pressed, or the focus left."""
+
+    def _remove_last(self) -> None:
+        if self._tokens:
+            self._remove(self._tokens[-1])
+
+    def _remove(self, token: Token) -> None:
+        self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
+        self._drop(token)
+        self.changed.emit()
+        self.settled.emit()
+
+    # ---- inside
+
+    def _add_token(self, token: Token) -> None:
+        token.clicked.connect(lambda _on=False: self._remove(token))
+        self._tokens.append(token)
+
+    def _drop(self, token: Token) -> None:
+        self._tokens.remove(token)
+        token.hide()
+        self._flow.removeWidget(token)
+        token.deleteLater()
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """The tokens, then what is typed; Tab goes the same way."""
+        self._flow.removeWidget(self.edit)
+        before: QWidget | None = None
+        for token in self._tokens:
+            self._flow.removeWidget(token)
+            self._flow.addWidget(token)
+            token.show()
+            if before is not None:
+                QWidget.setTabOrder(before, token)
+            before = token
+        self._flow.add_elastic(self.edit, greedy=True)
+        if before is not None:
+            QWidget.setTabOrder(before, self.edit)
+        self.edit.setPlaceholderText(self._add_words if self._tokens else self._example)
+        self.updateGeometry()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.edit.setFocus(Qt.FocusReason.MouseFocusReason)
+        event.accept()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:
+        theme, painter = self._theme, QPainter(self)
+        has_focus = self.edit.hasFocus()
+        edge = "error" if self._is_wrong else "accent" if has_focus else "controlBorder"
+        fill, width = theme.colour("sunken" if theme.dark else "panel"), 2.0 if has_focus else 1.0
+        paint.box(painter, QRectF(self.rect()), theme.radius("control"), fill, theme.colour(edge), width)
+        painter.end()

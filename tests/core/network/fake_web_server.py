@@ -1,0 +1,72 @@
+"""A web server without sockets, and pages for it: what Studio asks of `nep.programs.web.WebServer`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from nep.programs.web.access import Access
+from nep.programs.web.context import ConnectedPage, PageTopic, Refusal
+from nep.programs.web.server import WebSettings
+
+
+def page(
+    page_id: int, *topics: PageTopic, title: str = "", origin: str = "http://lab.example"
+) -> ConnectedPage:
+    """Return a page at 192.168.1.30, in Chrome."""
+    return ConnectedPage(
+        page_id,
+        f"web_lab.example_{page_id}",
+        f"192.168.1.30:{50_000 + page_id}",
+        origin,
+        1_700_000_000.0,
+        "Chrome",
+        title=title or f"page{page_id}.html",
+        topics=topics,
+    )
+
+
+class FakeWebServer:
+    """Notes what it is told; `pages` and `refusals` are a test's to set."""
+
+    def __init__(self, settings: WebSettings | None = None) -> None:
+        self.settings = settings if settings is not None else WebSettings()
+        self.port = self.settings.port or 9090
+        self.access: Access = self.settings.access
+        self.allow_moving: Collection[str] = self.settings.allow_moving
+        self.foxglove = self.settings.foxglove
+        self.pages: tuple[ConnectedPage, ...] = ()
+        self.refusals: tuple[Refusal, ...] = ()
+        self.has_ended = False
+
+    def set_access(self, access: Access) -> int:
+        is_new, self.access = access.token != self.access.token, access
+        gone = len(self.pages) if is_new else 0
+        if is_new:
+            self.pages = ()
+        return gone
+
+    def set_allow_moving(self, names: Collection[str]) -> None:
+        self.allow_moving = frozenset(names)
+
+    def set_foxglove(self, channels: object) -> int:
+        self.foxglove = channels  # type: ignore[assignment]
+        return 0
+
+    def disconnect(self, page_id: int) -> None:
+        self.pages = tuple(each for each in self.pages if each.id != page_id)
+
+    def wait(self, _timeout_s: float) -> bool:
+        return self.has_ended
+
+    def close(self) -> None:
+        self.has_ended = True
+
+    def change_topic(self, page_id: int, **figures: float) -> None:
+        """Give the first topic of a page other figures."""
+        self.pages = tuple(
+            replace(each, topics=(replace(each.topics[0], **figures), *each.topics[1:]))  # type: ignore[arg-type]
+            if each.id == page_id
+            else each
+            for each in self.pages
+        )

@@ -1,0 +1,202 @@
+"""Studio's web server: switches, settings that apply at once, and what is said about it."""
+
+from __future__ import annotations
+
+import queue
+import socket
+from collections.abc import Iterator
+
+import pytest
+
+from app.core.network.web_page_list import GONE_SHOWN_S, PageList
+from app.core.network.web_pages import WebPages, WebServerStarted
+from app.core.network.web_words import notices, page_name, share_words, terminal_command, web_status
+from nep.errors import NepError
+from nep.masters.master import master_address
+from nep.programs.web.context import PageTopic, Refusal
+from nep.system.addresses import OwnAddress
+from tests.core.network.fake_web_server import FakeWebServer, page
+
+WIFI = OwnAddress("192.168.1.20", "wlan0")
+
+
+class Studio:
+    """`WebPages` with fake servers; `wait` applies the result of a start."""
+
+    def __init__(self) -> None:
+        self.servers: list[FakeWebServer] = []
+        self.events: queue.Queue[WebServerStarted] = queue.Queue()
+        self.now = 100.0
+        self.web = WebPages(
+            master_address(), self.events.put, start=self._start, addresses=lambda: (WIFI,),
+            clock=lambda: self.now,
+        )  # fmt: skip
+
+    def _start(self, settings) -> FakeWebServer:
+        self.servers.append(FakeWebServer(settings))
+        return self.servers[-1]
+
+    def wait(self) -> FakeWebServer:
+        self.web.started(self.events.get(timeout=30))
+        return self.servers[-1]
+
+    def switch_on(self) -> FakeWebServer:
+        self.web.serve("rosbridge", on=True)
+        return self.wait()
+
+
+@pytest.fixture
+def studio() -> Iterator[Studio]:
+    made = Studio()
+    yield made
+    made.web.close()
+
+
+def test_settings_of_a_running_server_change_without_a_restart(studio: Studio) -> None:
+    web, server = studio.web, studio.switch_on()
+    web.add_origin("http://lab.example:80/")
+    web.set_robots(["Turtle", "Turtle"])
+    web.serve("foxglove", on=True)
+    assert server.access.origins == {"http://lab.example"}
+    assert server.allow_moving == {"Turtle"}
+    assert server.foxglove is not None
+    assert studio.servers == [server]
+    with pytest.raises(NepError):
+        web.add_origin("lab")
+    web.set_origins(())
+    assert server.access.origins == frozenset()
+
+
+def test_settings_changed_during_the_start_reach_the_server(studio: Studio) -> None:
+    studio.web.serve("rosbridge", on=True)
+    studio.web.set_robots(["Turtle"])
+    assert studio.wait().allow_moving == {"Turtle"}
+
+
+def test_server_ends_with_its_last_protocol(studio: Studio) -> None:
+    server = studio.switch_on()
+    studio.web.serve("foxglove", on=True)
+    studio.web.serve("rosbridge", on=False)
+    assert (studio.web.state, server.has_ended) == ("on", False)
+    studio.web.serve("foxglove", on=False)
+    studio.web.close()
+    assert (studio.web.state, server.has_ended) == ("off", True)
+
+
+def test_another_address_restarts_the_server_with_a_token(studio: Studio) -> None:
+    first = studio.switch_on()
+    studio.web.open_to(WIFI.host)
+    second = studio.wait()
+    assert first.has_ended
+    assert second.settings.listen == (WIFI.host,)
+    assert second.access.token == studio.web.token != ""
+    assert studio.web.page_url == f"http://192.168.1.20:9090/?token={studio.web.token}"
+    assert studio.web.local_page_url == f"http://127.0.0.1:9090/?token={studio.web.token}"
+
+
+def test_new_token_disconnects_pages_and_the_old_one_can_be_restored(studio: Studio) -> None:
+    studio.web.open_to(WIFI.host)
+    server = studio.switch_on()
+    server.pages = (page(1), page(2))
+    before = studio.web.token
+    assert studio.web.new_token() == 2
+    assert server.access.token == studio.web.token != before
+    studio.web.set_token(before)
+    assert server.access.token == before
+
+
+def test_taken_port_names_its_program_and_a_free_port(studio: Studio) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        web = WebPages(master_address(), studio.events.put, addresses=tuple)
+        web.port = taken.getsockname()[1]
+        web.serve("rosbridge", on=True)
+        web.started(studio.events.get(timeout=30))
+        assert (web.state, web.protocols) == ("off", frozenset())
+        assert str(web.port) in web.sentence
+        assert web.free_port > web.port
+        web.close()
+
+
+def test_server_that_ends_by_itself_is_detected(studio: Studio) -> None:
+    server = studio.switch_on()
+    server.has_ended = True
+    studio.web.check()
+    assert (studio.web.state, studio.web.protocols) == ("off", frozenset())
+    assert studio.web.sentence
+
+
+def test_page_that_left_stays_listed_for_a_while(studio: Studio) -> None:
+    server = studio.switch_on()
+    server.pages = (page(1), page(2))
+    studio.web.refresh()
+    server.disconnect(1)
+    studio.now += 4
+    studio.web.refresh()
+    studio.now += 4
+    studio.web.refresh()
+    assert [(each.page.id, each.gone_s) for each in studio.web.listed] == [(1, 4.0), (2, None)]
+    assert [each.id for each in studio.web.connected] == [2]
+    studio.now += GONE_SHOWN_S
+    studio.web.refresh()
+    assert [each.page.id for each in studio.web.listed] == [2]
+
+
+def test_page_is_slow_while_it_drops_messages() -> None:
+    pages = PageList()
+    for now, dropped in ((0.0, 0), (1.0, 3), (5.0, 3)):
+        pages.update([page(1, PageTopic("/camera", False, sent_count=997, dropped_count=dropped))], now)
+    assert [(each.topic, share_words(each.share)) for each in pages.slow()] == [("/camera", "0.3 %")]
+    pages.update([page(1, PageTopic("/camera", False, sent_count=2_000, dropped_count=3))], 20.0)
+    assert list(pages.slow()) == []
+
+
+def test_notices_offer_what_helps_until_it_is_allowed_or_dismissed(studio: Studio) -> None:
+    server = studio.switch_on()
+    origin = "http://192.168.1.77:5173"
+    server.refusals = (
+        Refusal(1.0, origin, "refused", origin, "origin"),
+        Refusal(2.0, "192.168.1.78", "wrong", kind="token"),
+        Refusal(3.0, origin, "refused", kind="robot", robot="Turtle"),
+        Refusal(4.0, origin, "refused", origin, "origin"),
+    )
+    found = notices(studio.web)
+    assert [(each.next_step, each.value) for each in found] == [
+        ("allow origin", origin), ("choose robots", "Turtle"), ("", ""),
+    ]  # fmt: skip
+    assert len(notices(studio.web, {found[2].key})) == 2
+    studio.web.add_origin(origin)
+    studio.web.set_robots(["Turtle"])
+    assert notices(studio.web) == found[2:]
+
+
+def test_command_for_a_terminal_has_the_present_settings(studio: Studio) -> None:
+    web = studio.web
+    assert terminal_command(web, "linux") == "nep web"
+    web.open_to(WIFI.host)
+    web.port = 9091
+    web.add_origin("http://lab.example")
+    web.set_robots(["Big Turtle"])
+    web.protocols = frozenset({"rosbridge", "foxglove"})
+    assert terminal_command(web, "linux") == (
+        "nep web --port 9091 --listen 192.168.1.20 --origin http://lab.example "
+        "--allow-moving 'Big Turtle' --foxglove"
+    )
+    assert '--allow-moving "Big Turtle"' in terminal_command(web, "win32")
+
+
+def test_status_warns_while_other_computers_can_connect(studio: Studio) -> None:
+    assert web_status(studio.web, "")[1] == ""
+    studio.switch_on()
+    assert web_status(studio.web, "")[2] is None
+    studio.web.open_to(WIFI.host)
+    studio.wait().pages = (page(1),)
+    studio.web.refresh()
+    icon, words, status = web_status(studio.web, "Wi-Fi 192.168.1.20")
+    assert (icon, status) == ("globe", "warn")
+    assert "192.168.1.20" in words
+
+
+def test_program_without_a_title_is_called_by_its_library() -> None:
+    named = page(1)
+    program = page(2, title="web_lab.example_2", origin="")
+    assert (page_name(named), page_name(program)) == ("page1.html", "Chrome")
