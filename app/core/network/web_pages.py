@@ -16,12 +16,13 @@ from nep.system.addresses import OwnAddress, own_addresses
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from nep.programs.web import access, context, foxglove_page, server
+    from nep.programs.web import access, context, foxglove_page, served_pages, server
     from nep.recordings.formats import channels
 else:  # loaded with the first start of a server
     access = lazy_module("nep.programs.web.access")
     context = lazy_module("nep.programs.web.context")
     server = lazy_module("nep.programs.web.server")
+    served_pages = lazy_module("nep.programs.web.served_pages")
     channels = lazy_module("nep.recordings.formats.channels")
 
 DEFAULT_PORT = 9090
@@ -55,8 +56,14 @@ class RunningServer(Protocol):
     def set_foxglove(self, channels: foxglove_page.ChannelFormat | None) -> int:
         """Accept clients of Foxglove's protocol, or with None disconnect them and accept no more."""
 
-    def disconnect(self, page_id: int) -> None:
-        """Disconnect a page."""
+    def set_rosbridge(self, on: bool) -> int:
+        """Accept clients of rosbridge, or disconnect them and accept no more."""
+
+    def keep_out(self, page_id: int) -> None:
+        """Disconnect a page and refuse it when it connects again."""
+
+    def let_in(self, page_id: int) -> None:
+        """Let a page connect again that was kept out."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for the server's end; return False after ``timeout_s`` seconds."""
@@ -90,7 +97,8 @@ class WebPages:
 
     `host` is the address of this computer that other computers connect to, or "". `origins` are allowed
     origins of pages from other computers. `robots` are the names of robots that pages may move. `protocols`
-    are those that are switched on; all share one port, the origins and the token. A running server follows
+    are those that are switched on; all share one port, the origins and the token. `kept_out` are pages that
+    were disconnected here, by their ids; they are refused when they connect again. A running server follows
     changes at once; only another `host` or `port` restarts it. Settings are not saved.
     """
 
@@ -115,6 +123,7 @@ class WebPages:
         self.origins: tuple[str, ...] = ()
         self.robots: tuple[str, ...] = ()
         self.protocols: frozenset[WebProtocol] = frozenset()
+        self.kept_out: dict[int, context.ConnectedPage] = {}
         self.state: WebState = "off"
         self.sentence, self.free_port = "", 0
         self._failed: frozenset[WebProtocol] = frozenset()
@@ -199,6 +208,7 @@ class WebPages:
         self._number += 1
         self.state, self.sentence, self.free_port = "off", "", 0
         self.protocols = frozenset()
+        self.kept_out.clear()
         self._list.clear(self._clock())
         ended, self._server = self._server, None
         self._in_thread(lambda: ended.close() if ended is not None else None)
@@ -249,10 +259,21 @@ class WebPages:
         self.robots = tuple(dict.fromkeys(names))
         self._push()
 
-    def disconnect(self, page_id: int) -> None:
-        """Disconnect a page; it can reconnect."""
+    def keep_out(self, page: context.ConnectedPage) -> None:
+        """Disconnect a page, and refuse it until `let_in` or the end of the server."""
         if self._server is not None:
-            self._server.disconnect(page_id)
+            self._server.keep_out(page.id)
+            self.kept_out[page.id] = page
+
+    def let_in(self, page_id: int) -> None:
+        """Let a page connect again that was kept out."""
+        self.kept_out.pop(page_id, None)
+        if self._server is not None:
+            self._server.let_in(page_id)
+
+    def starter_page(self) -> str:
+        """Return the HTML of a page to start from, which connects to this server."""
+        return served_pages.starter_page(self.full_url)
 
     def _push(self) -> int:
         if self._server is None:
@@ -260,6 +281,7 @@ class WebPages:
         wanted = channels.LiveChannels() if "foxglove" in self.protocols else None
         self._server.set_allow_moving(self.robots)
         self._server.set_foxglove(wanted)
+        self._server.set_rosbridge("rosbridge" in self.protocols)
         return self._server.set_access(access.Access(frozenset(self.origins), self.token))
 
     # ---- following the server
@@ -285,6 +307,7 @@ class WebPages:
         """Detect a server that ended by itself, and take a snapshot. Called once a second."""
         if self._server is not None and self._server.wait(0):
             self._server, self.state, self.protocols = None, "off", frozenset()
+            self.kept_out.clear()
             self.sentence = _("The web server ended because of an error. The log has the details.")
         self.refresh()
 
@@ -311,6 +334,7 @@ class WebPages:
                 allow_moving=robots,
                 master=self.master,
                 foxglove=channels.LiveChannels() if "foxglove" in protocols else None,
+                rosbridge="rosbridge" in protocols,
             )
             try:
                 running = self._start(settings)

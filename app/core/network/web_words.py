@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nep.programs.web.context import ConnectedPage, Refusal
 
 _WIRELESS = ("wl", "wi-fi", "wifi")
-NextStep = Literal["", "allow origin", "choose robots"]
+NextStep = Literal["", "allow origin", "choose robots", "let in"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,12 @@ def page_name(page: ConnectedPage) -> str:
     return page.title if is_named else page.client or page.origin or page.name
 
 
+def host_of(address: str) -> str:
+    """Return the host of "192.168.1.30:50412" or "::1:50412"."""
+    host, colon, port = address.rpartition(":")
+    return host if colon and port.isdigit() else address
+
+
 def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
     """Return the command that starts the same server without Studio."""
     words = ["nep", "web"]
@@ -107,11 +113,23 @@ def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple
 
 def _refused(web: WebPages) -> Iterator[WebNotice]:
     for refusal in reversed(web.refusals):
+        if refusal.kind == "kept out":
+            yield from _kept_out(web, refusal)
+            continue
         if refusal.origin and refusal.origin in web.origins:
             continue
         if refusal.kind == "robot" and refusal.robot in web.robots:
             continue
         yield _notice_of(refusal)
+
+
+def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
+    for page in web.kept_out.values():
+        if (page.origin or host_of(page.address)) == refusal.who:
+            sentence = _("{page} was refused at {time}, because it was disconnected here.").format(
+                page=page_name(page), time=_clock_words(refusal.time_s)
+            )
+            yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))
 
 
 def _notice_of(refusal: Refusal) -> WebNotice:

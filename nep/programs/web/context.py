@@ -19,7 +19,7 @@ from nep.programs.web.send_queue import SendQueue
 __all__ = ["ConnectedPage", "PageContext", "PageTopic", "Protocol", "Refusal", "RefusalKind", "WebCounts"]
 
 Protocol = Literal["rosbridge", "foxglove"]
-RefusalKind = Literal["origin", "token", "robot", "limit", "other"]
+RefusalKind = Literal["origin", "token", "robot", "limit", "kept out", "other"]
 _ROBOT_REFUSAL_INTERVAL_S = 10.0
 _MAX_REMEMBERED_ROBOTS = 50
 

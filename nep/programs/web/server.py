@@ -56,6 +56,7 @@ _END_TIMEOUT_S = 1.0
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
+_MAX_KEPT_OUT = 100
 LANGUAGE = "web"
 """Language of pages' nodes in the graph, by which others recognize them."""
 _MAX_LOCKED = 16
@@ -78,6 +79,8 @@ class WebSettings:
     transport: str = "zeromq"
     foxglove: ChannelFormat | None = None
     """Encodes topics for clients of Foxglove's WebSocket protocol; None: serve none."""
+    rosbridge: bool = True
+    """Whether clients of rosbridge, which are all without Foxglove's subprotocol, are served."""
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -96,6 +99,12 @@ class _Rejection(NamedTuple):
     status: HTTPStatus
     kind: RefusalKind
     sentence: str
+
+
+class _Visitor(NamedTuple):
+    host: str
+    origin: str
+    user_agent: str
 
 
 class WebServer:
@@ -120,6 +129,7 @@ class WebServer:
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All connections, also those without a handshake."""
         self._locked = 0
+        self._kept_out: dict[int, _Visitor] = {}
         self._refusals_lock = threading.Lock()
         self._refusals: tuple[Refusal, ...] = ()
         self._auth = AuthCheck(settings.access.token)
@@ -162,6 +172,25 @@ class WebServer:
         """Close the connection of a page; it may connect again. Thread-safe, returns at once."""
         self._disconnect(lambda page, _access: page.id == page_id, "disconnected by the user of the server")
 
+    def keep_out(self, page_id: int) -> None:
+        """Disconnect a page, and refuse it when it connects again, until `let_in`. Thread-safe.
+
+        A page is recognized by its address, origin and User-Agent; others with the same that are connected
+        already stay.
+        """
+        page = next((each for each in self._pages.copy() if each.id == page_id), None)
+        if page is not None:
+            with self._lock:
+                self._kept_out[page_id] = _visitor(page.connection, page.connection.request)
+                while len(self._kept_out) > _MAX_KEPT_OUT:
+                    del self._kept_out[next(iter(self._kept_out))]
+            self.disconnect(page_id)
+
+    def let_in(self, page_id: int) -> None:
+        """Let a page that `keep_out` disconnected connect again. Thread-safe."""
+        with self._lock:
+            self._kept_out.pop(page_id, None)
+
     def set_access(self, access: Access) -> int:
         """Change who may connect, at once; return the number of pages that are disconnected.
 
@@ -198,6 +227,16 @@ class WebServer:
                 return 0
             return self._disconnect(
                 lambda page, _access: page.protocol == "foxglove", "Foxglove's protocol was switched off"
+            )
+
+    def set_rosbridge(self, on: bool) -> int:
+        """Serve rosbridge clients, or none; return the number of pages that are disconnected. Thread-safe."""
+        with self._lock:
+            self.settings = replace(self.settings, rosbridge=on)
+            if on:
+                return 0
+            return self._disconnect(
+                lambda page, _access: page.protocol == "rosbridge", "rosbridge was switched off"
             )
 
     def _disconnect(self, is_chosen: Callable[[Page | FoxglovePage, Access], bool], reason: str) -> int:
@@ -357,6 +396,10 @@ class WebServer:
             refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("there are too many connections"))
         elif said := access.origin_refusal(origin, _own_origin(connection)):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
+        elif _visitor(connection, request) in self._kept_out.copy().values():
+            refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
+        elif not (self.settings.rosbridge or _offers_foxglove(request)):
+            refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is switched off"))
         else:
             refusal = self._token_refusal(connection, request, access)
         if refusal is None:
@@ -477,6 +520,8 @@ class WebServer:
     def _may_stay(self, connection: ServerConnection, known: Access) -> bool:
         """Whether the current rules admit a page that was let in by `known`."""
         access = self.settings.access
+        if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
+            return False
         is_refused = access.origin_refusal(_origin_of(connection), _own_origin(connection))
         return not is_refused and (not access.token or access.token == known.token)
 
@@ -537,6 +582,16 @@ def node_name(origin: str | None, address: str) -> str:
 
 def _is_handshake(request: Request) -> bool:
     return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
+
+
+def _offers_foxglove(request: Request) -> bool:
+    offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
+    return any(each.strip() in SUBPROTOCOLS for each in offered)
+
+
+def _visitor(connection: ServerConnection, request: Request | None) -> _Visitor:
+    headers = {} if request is None else request.headers
+    return _Visitor(_host_of(connection), headers.get("Origin", ""), headers.get("User-Agent", ""))
 
 
 def _own_origin(connection: ServerConnection) -> str:

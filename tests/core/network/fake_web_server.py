@@ -37,6 +37,8 @@ class FakeWebServer:
         self.foxglove = self.settings.foxglove
         self.pages: tuple[ConnectedPage, ...] = ()
         self.refusals: tuple[Refusal, ...] = ()
+        self.rosbridge = self.settings.rosbridge
+        self.kept_out: set[int] = set()
         self.has_ended = False
 
     def set_access(self, access: Access) -> int:
@@ -53,7 +55,19 @@ class FakeWebServer:
         self.foxglove = channels  # type: ignore[assignment]
         return 0
 
-    def disconnect(self, page_id: int) -> None:
+    def set_rosbridge(self, on: bool) -> int:
+        self.rosbridge = on
+        return 0
+
+    def let_in(self, page_id: int) -> None:
+        self.kept_out.discard(page_id)
+
+    def keep_out(self, page_id: int) -> None:
+        self.kept_out.add(page_id)
+        self.leave(page_id)
+
+    def leave(self, page_id: int) -> None:
+        """Let a page close its connection."""
         self.pages = tuple(each for each in self.pages if each.id != page_id)
 
     def wait(self, _timeout_s: float) -> bool:

@@ -77,7 +77,7 @@ def test_server_ends_with_its_last_protocol(studio: Studio) -> None:
     server = studio.switch_on()
     studio.web.serve("foxglove", on=True)
     studio.web.serve("rosbridge", on=False)
-    assert (studio.web.state, server.has_ended) == ("on", False)
+    assert (studio.web.state, server.has_ended, server.rosbridge) == ("on", False, False)
     studio.web.serve("foxglove", on=False)
     studio.web.close()
     assert (studio.web.state, server.has_ended) == ("off", True)
@@ -129,7 +129,7 @@ def test_page_that_left_stays_listed_for_a_while(studio: Studio) -> None:
     server = studio.switch_on()
     server.pages = (page(1), page(2))
     studio.web.refresh()
-    server.disconnect(1)
+    server.leave(1)
     studio.now += 4
     studio.web.refresh()
     studio.now += 4
@@ -167,6 +167,20 @@ def test_notices_offer_what_helps_until_it_is_allowed_or_dismissed(studio: Studi
     studio.web.add_origin(origin)
     studio.web.set_robots(["Turtle"])
     assert notices(studio.web) == found[2:]
+
+
+def test_page_that_was_disconnected_here_can_be_let_in_again(studio: Studio) -> None:
+    server = studio.switch_on()
+    first = page(1)
+    server.pages = (first,)
+    studio.web.keep_out(first)
+    assert (server.pages, server.kept_out) == ((), {1})
+    assert notices(studio.web) == ()
+    server.refusals = (Refusal(5.0, first.origin, "disconnected", kind="kept out"),)
+    (notice,) = notices(studio.web)
+    assert (notice.next_step, notice.value) == ("let in", "1")
+    studio.web.let_in(1)
+    assert (server.kept_out, notices(studio.web)) == (set(), ())
 
 
 def test_command_for_a_terminal_has_the_present_settings(studio: Studio) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 import nep
 from nep.errors import NepError
@@ -157,3 +158,31 @@ def test_page_is_recognizable_as_a_web_page_in_the_graph(
     eventually(lambda: "web" in {each.language for each in node.graph().nodes.values()})
     names = {each.name for each in node.graph().nodes.values() if each.language == "web"}
     assert names == {each.name for each in server.pages}
+
+
+def test_page_that_is_kept_out_is_refused_until_it_is_let_in(server: WebServer, open_page: Open) -> None:
+    own = f"http://127.0.0.1:{server.port}"
+    first, twin, other = open_page(origin=own), open_page(origin=own), open_page()
+    eventually(lambda: len(server.pages) == 3)
+    page_id = server.pages[0].id
+    server.keep_out(page_id)
+    assert not is_open(first.connection)
+    assert is_open(twin.connection)
+    assert is_open(other.connection)
+    assert refused_to_connect(server, origin=own)
+    assert server.refusals[-1].kind == "kept out"
+    server.let_in(page_id)
+    assert is_open(open_page(origin=own).connection)
+
+
+def test_rosbridge_can_be_switched_off_while_foxglove_is_served(server: WebServer, open_page: Open) -> None:
+    page = open_page()
+    server.set_foxglove(LiveChannels())
+    eventually(lambda: len(server.pages) == 1)
+    assert server.set_rosbridge(False) == 1
+    assert not is_open(page.connection)
+    assert refused_to_connect(server)
+    with connect(server.url, subprotocols=[Subprotocol("foxglove.sdk.v1")]) as viewer:
+        assert viewer.subprotocol == "foxglove.sdk.v1"
+    server.set_rosbridge(True)
+    assert is_open(open_page().connection)

@@ -140,7 +140,7 @@ def test_figures_change_in_place_and_keep_selection_and_expansion(desk: Desk) ->
 
 def test_page_that_left_stays_struck_through_without_a_button(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
-    server.disconnect(1)
+    server.leave(1)
     sheet.refresh()
     row = sheet.model.page_row(sheet.model.index(0, 0))
     assert row is not None
@@ -154,7 +154,11 @@ def test_button_of_a_row_disconnects_its_page(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
     rect = sheet.table.visualRect(sheet.model.index(1, DISCONNECT))
     QTest.mouseClick(sheet.table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
-    assert [each.id for each in server.pages] == [1]
+    assert ([each.id for each in server.pages], server.kept_out) == ([1], {2})
+    _words, undo = desk.said[-1]
+    assert undo is not None
+    undo()
+    assert server.kept_out == set()
 
 
 def test_many_pages_are_refreshed_within_a_frame_of_work(desk: Desk) -> None:
@@ -260,7 +264,11 @@ def test_each_tab_has_its_own_switch(desk: Desk) -> None:
     sheet.switch.click()
     assert server.foxglove is not None
     sheet.copy_page.click()
-    assert QGuiApplication.clipboard().text() == desk.web.full_url
+    assert desk.web.full_url in QGuiApplication.clipboard().text()
+    sheet.tabs.set_value("rosbridge")
+    sheet.copy_page.click()
+    assert "<html" in QGuiApplication.clipboard().text()
+    assert desk.web.full_url in QGuiApplication.clipboard().text() == desk.web.full_url
 
 
 def test_taken_port_offers_a_free_one(qtbot, theme: Theme, master: Master, events: queue.Queue) -> None:

@@ -10,7 +10,11 @@ from app.ui.widgets import Button, IconButton, label, paint
 from app.ui.widgets.cards import AlertBox
 from nep.i18n import _, lazy, ngettext
 
-_BUTTONS = {"allow origin": lazy("Allow it"), "choose robots": lazy("Choose robots")}
+_BUTTONS = {
+    "allow origin": lazy("Allow it"),
+    "choose robots": lazy("Choose robots"),
+    "let in": lazy("Let it connect"),
+}
 
 
 class NoticeStrip(AlertBox):

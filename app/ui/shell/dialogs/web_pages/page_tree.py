@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import page_name
+from app.core.network.web_words import host_of, page_name
 from app.ui.shell.dialogs.web_pages.page_model import (
     BANDWIDTH,
     DISCONNECT,
@@ -47,7 +47,6 @@ from app.ui.shell.dialogs.web_pages.page_model import (
 from app.ui.shell.dialogs.web_pages.page_words import (
     does_words,
     dropped_words,
-    host_of,
     limit_words,
     page_icon,
     since_words,

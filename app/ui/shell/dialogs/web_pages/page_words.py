@@ -6,7 +6,7 @@ import datetime as dt
 from typing import TYPE_CHECKING
 
 from app.core.network.web_page_list import ListedPage, dropped_share
-from app.core.network.web_words import page_name, share_words
+from app.core.network.web_words import host_of, page_name, share_words
 from app.ui.text.dates import clock_words
 from app.ui.text.numbers import bandwidth_words, rate_words
 from nep.i18n import _, number
@@ -34,12 +34,6 @@ def where_words(page: ConnectedPage) -> str:
     """Say "192.168.1.30, Chrome"."""
     client = page.client if page.client != page_name(page) else ""
     return ", ".join(filter(None, (host_of(page.address), client)))
-
-
-def host_of(address: str) -> str:
-    """Return the host of "192.168.1.30:50412" or "::1:50412"."""
-    host, colon, port = address.rpartition(":")
-    return host if colon and port.isdigit() else address
 
 
 def since_words(listed: ListedPage) -> str:

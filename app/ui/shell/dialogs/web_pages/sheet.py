@@ -321,9 +321,8 @@ class WebPagesSheet(Overlay):
         if self._tab == "foxglove":
             self._copy(self._web.full_url, _("Copied the link"))
         else:
-            self._copy(
-                self._web.full_url, _("Copied a starter page. Paste it into a file such as page.html.")
-            )
+            words = _("Copied a starter page. Paste it into a file such as page.html.")
+            self._copy(self._web.starter_page(), words)
 
     def _replace_token(self) -> None:
         web, before = self._web, self._web.token
@@ -343,9 +342,14 @@ class WebPagesSheet(Overlay):
         page = next((each for each in self._web.connected if each.id == page_id), None)
         if page is None:
             return
-        self._web.disconnect(page_id)
+        self._web.keep_out(page)
         self.refresh()
-        self._say(_("Disconnected {page}").format(page=page_name(page)))
+        words = _("Disconnected {page}. It is refused when it connects again.")
+        self._say(
+            words.format(page=page_name(page)),
+            _("Undo"),
+            lambda: self._do(partial(self._web.let_in, page_id)),
+        )
 
     def _help(self) -> None:
         notice = self.notice.notice
@@ -357,6 +361,8 @@ class WebPagesSheet(Overlay):
             self.permissions.robots.open_list()
         elif notice.next_step == "allow origin":
             self._web.add_origin(notice.value)
+        elif notice.next_step == "let in":
+            self._web.let_in(int(notice.value))
         self.refresh()
 
     def _dismiss(self) -> None:
