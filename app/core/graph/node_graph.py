@@ -13,12 +13,13 @@ from app.core.network.graph_changes import PROGRAM
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import NODE_NAME
 from app.core.network.topics import Topic, key_of
+from app.core.network.web_words import PageNode
 from app.core.networks.kinds import kind_named
 from nep.protocol.graph_view import ServiceInfo
 from nep.protocol.topic_pattern import is_pattern, matches
 
 GroupBy = Literal["computer", "robot", "nothing"]
-NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "original", "group"]
+NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "original", "page", "group"]
 LineKind = Literal["topic", "service"]
 
 OWN = "/nep/"
@@ -29,9 +30,17 @@ BRIDGE_TO = "-to-"
 """A bridge's nodes are called "bridge-NAME-to-BACKEND"."""
 
 
+WEB_LANGUAGE = "web"
+"""Language of the nodes of web pages; as in `nep.programs.web.server`, which loads slowly."""
+WEB_GROUP = "web:"
+
+
 @dataclass(frozen=True, slots=True)
 class GraphFacts:
-    """What is known of all networks; ``services`` are the native one's, ``robots`` the names of robots."""
+    """What is known of all networks; ``services`` are the native one's, ``robots`` the names of robots.
+
+    ``pages`` are the pages of Studio's own web server by the names of their nodes.
+    """
 
     nodes: Sequence[NodeEntry] = ()
     topics: Sequence[Topic] = ()
@@ -39,6 +48,7 @@ class GraphFacts:
     robots: Sequence[str] = ()
     host: str = field(default_factory=platform.node)
     """This computer's name."""
+    pages: Mapping[str, PageNode] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +94,7 @@ class DrawnNode:
     is_quiet: bool = False
     members: int = 1
     quiet: int = 0
+    page: PageNode | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +196,10 @@ def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
     for entry in sorted(facts.nodes, key=lambda each: (each.since_ns, each.id)):
         key = f"{entry.network}|{entry.host}|{entry.name}"
         taken[key] += 1
+        page = facts.pages.get(entry.name) if _is_page(entry) else None
         made[entry.key] = DrawnNode(
             key if taken[key] == 1 else f"{key}|{taken[key]}",
-            _name_of(entry),
+            _name_of(entry) if page is None else page.title,
             _group_of(entry, facts, choices.group_by),
             _kind_of(entry, facts),
             entry,
@@ -196,6 +208,7 @@ def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
             any(key_of(entry.network, topic) in pictures for topic in entry.publishes),
             entry.gone_s is not None,
             entry.key in choices.quiet and entry.gone_s is None,
+            page=page,
         )
     return dict(sorted(made.items(), key=lambda item: item[1].key))
 
@@ -205,6 +218,8 @@ def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
         return "bridge"
     if entry.is_original:
         return "original"
+    if _is_page(entry):
+        return "page"
     if entry.network:
         return "program"
     if entry.name == NODE_NAME:
@@ -214,8 +229,14 @@ def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
     return "robot" if entry.name in facts.robots else "program"
 
 
+def _is_page(entry: NodeEntry) -> bool:
+    return entry.language == WEB_LANGUAGE
+
+
 def _name_of(entry: NodeEntry) -> str:
-    """Its name; of a behaviour's program that of the behaviour."""
+    """Its name; of a behaviour's program that of the behaviour, of a page its address."""
+    if _is_page(entry):
+        return entry.name.removeprefix("web_")
     return entry.name.removeprefix(PROGRAM) or entry.name
 
 
@@ -229,9 +250,11 @@ def _joined_by(entry: NodeEntry) -> str:
 
 
 def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
-    """The key of its group: "host:lab-pc", "network:ros2", "robot:Pepper"; "" where there is none."""
+    """The key of its group: "host:lab-pc", "network:ros2", "robot:Pepper", "web:"; "" where there is none."""
     if group_by == "nothing":
         return ""
+    if _is_page(entry):
+        return WEB_GROUP
     if group_by == "robot":
         mine = [name for name in facts.robots if _belongs(entry, name)]
         return f"robot:{max(mine, key=len)}" if mine else "robot:"
@@ -257,7 +280,7 @@ def _groups(
         nodes = members[key]
         hidden = sum(_is_hidden(node, choices) for node in nodes)
         told = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
-        address = min(told, key=lambda each: (-told[each], each)) if told else ""
+        address = min(told, key=lambda each: (-told[each], each)) if told and key != WEB_GROUP else ""
         closed = choices.is_closed(key) or hidden == len(nodes)
         made.append(
             GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)
@@ -274,6 +297,8 @@ def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
     kind, _colon, name = group.partition(":")
     if kind == "network":
         return "waypoints"
+    if kind == "web":
+        return "globe"
     if kind == "robot":
         return "bot" if name else "box"
     return "bot" if name != facts.host and any(node.kind == "robot" for node in nodes) else "monitor"

@@ -39,6 +39,8 @@ class PageList:
         self._dropped: dict[tuple[int, str], int] = {}
         self._drops_at: dict[tuple[int, str], float] = {}
         self._now = 0.0
+        self.revision = 0
+        """Number of changes of who is connected."""
 
     @property
     def connected(self) -> tuple[ConnectedPage, ...]:
@@ -62,6 +64,8 @@ class PageList:
         """Apply a snapshot of connected pages; ``now`` is a monotonic time."""
         self._now = now
         there = {page.id for page in pages}
+        if there != self._pages.keys() - self._left_at.keys():
+            self.revision += 1
         for id_ in self._pages:
             if id_ not in there:
                 self._left_at.setdefault(id_, now)

@@ -167,6 +167,11 @@ class WebPages:
         return self._list.connected
 
     @property
+    def revision(self) -> int:
+        """Number of changes of `connected`."""
+        return self._list.revision
+
+    @property
     def listed(self) -> tuple[ListedPage, ...]:
         """The same, with pages that left a short time ago."""
         return self._list.listed

@@ -19,7 +19,18 @@ if TYPE_CHECKING:
     from nep.programs.web.context import ConnectedPage, Refusal
 
 _WIRELESS = ("wl", "wi-fi", "wifi")
+_TABLETS = ("ipad", "tablet", "android")
+_PHONES = ("iphone", "phone", "mobile")
 NextStep = Literal["", "allow origin", "choose robots", "let in"]
+
+
+@dataclass(frozen=True, slots=True)
+class PageNode:
+    """What the graph shows of a page: its title, "192.168.1.30, Chrome", and its icon."""
+
+    title: str
+    where: str
+    icon: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +93,29 @@ def host_of(address: str) -> str:
     """Return the host of "192.168.1.30:50412" or "::1:50412"."""
     host, colon, port = address.rpartition(":")
     return host if colon and port.isdigit() else address
+
+
+def where_words(page: ConnectedPage) -> str:
+    """Say "192.168.1.30, Chrome"."""
+    client = page.client if page.client != page_name(page) else ""
+    return ", ".join(filter(None, (host_of(page.address), client)))
+
+
+def page_icon(page: ConnectedPage) -> str:
+    """Return the icon of a tablet, a phone, a computer's browser, or a program."""
+    client = page.client.casefold()
+    if any(word in client for word in _PHONES):
+        return "smartphone"
+    if any(word in client for word in _TABLETS):
+        return "tablet"
+    return "monitor" if page.origin else "terminal"
+
+
+def page_nodes(web: WebPages) -> dict[str, PageNode]:
+    """Return what the graph shows of connected pages, by the names of their nodes."""
+    return {
+        page.name: PageNode(page_name(page), where_words(page), page_icon(page)) for page in web.connected
+    }
 
 
 def terminal_command(web: WebPages, platform: str = sys.platform) -> str:

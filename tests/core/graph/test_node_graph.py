@@ -4,9 +4,17 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.graph.node_graph import GraphChoices, GraphFacts, NodeGraph, node_graph
+from app.core.graph.node_graph import (
+    WEB_GROUP,
+    GraphChoices,
+    GraphFacts,
+    GroupBy,
+    NodeGraph,
+    node_graph,
+)
 from app.core.network.nodes import Nodes
 from app.core.network.topics import Topics
+from app.core.network.web_words import PageNode
 from nep.protocol.graph_view import (
     BRIDGES_TOPIC,
     ClientInfo,
@@ -194,6 +202,20 @@ def test_who_hears_all_topics_that_match_is_at_their_lines() -> None:
     wide = PatternInfo("/Pepper/*", "json", (SubscriberInfo(9, "5", 1, 0),))
     found = lines(node_graph(facts(patterns=(wide,)), GraphChoices()))
     assert found["/Pepper/odom", "/Pepper/touch"] == ("pepper_driver", "RIZE+blackboard")
+
+
+@pytest.mark.parametrize("group_by", ["computer", "robot"])
+def test_web_pages_have_a_group_and_the_titles_that_the_server_knows(group_by: GroupBy) -> None:
+    pages = (
+        replace(node("7", "web_lab:8080_50001"), language="web"),
+        replace(node("8", "web_lab:8080_50002"), language="web"),
+    )
+    known = {"web_lab:8080_50001": PageNode("buttons.html", "192.168.1.52, Safari", "tablet")}
+    graph = node_graph(replace(facts((*NODES, *pages)), pages=known), GraphChoices(group_by=group_by))
+    drawn = [(each.name, each.page) for each in graph.nodes if each.kind == "page"]
+    assert drawn == [("buttons.html", known["web_lab:8080_50001"]), ("lab:8080_50002", None)]
+    (group,) = [each for each in graph.groups if each.key == WEB_GROUP]
+    assert (group.icon, group.members) == ("globe", 2)
 
 
 def test_nothing_is_nothing() -> None:

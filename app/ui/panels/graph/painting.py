@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
 from app.core.graph.walk import GraphChoice
 from app.ui.panels.graph.scene import JOIN, GraphScene, GroupItem, LineItem, NodeItem
-from app.ui.panels.graph.words import node_icon, percent_words, quiet_words
+from app.ui.panels.graph.words import group_note, node_icon, percent_words, quiet_words
 from app.ui.theme.icons import paint_icon
 from app.ui.widgets import paint
 
@@ -97,7 +97,7 @@ class _Painting:
         used = paint.width_of(self.scene.title_font, item.name) + 8
         if area.width() - used > 40:
             area.setLeft(left + used)
-            paint.words(painter, area, group.address, self.scene.small_font, theme.colour("textTertiary"))
+            paint.words(painter, area, group_note(group), self.scene.small_font, theme.colour("textTertiary"))
         if item.quiet is not None:
             pen = QPen(theme.colour("controlBorder"), 1, Qt.PenStyle.DashLine)
             painter.setPen(pen)

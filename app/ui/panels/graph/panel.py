@@ -30,6 +30,7 @@ from app.core.graph.node_graph import (
 )
 from app.core.graph.walk import GraphChoice
 from app.core.network.topics import split_key
+from app.core.network.web_words import page_nodes
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
@@ -199,7 +200,8 @@ class GraphPanel(PanelWidget):
         view = session.graph
         graph = (view.epoch, view.revision) if view is not None else None
         counts = (session.nodes.revision, session.topics.revision, session.networks.revision)
-        return (graph, counts, session.fleet.revision, session.master.kind, self._choices)
+        pages = session.web_pages.revision
+        return (graph, counts, pages, session.fleet.revision, session.master.kind, self._choices)
 
     def _graph_facts(self) -> GraphFacts:
         session = self.session
@@ -209,6 +211,7 @@ class GraphPanel(PanelWidget):
             session.graph.services if session.graph is not None else {},
             [link.name for link in session.fleet.links],
             self._host,
+            page_nodes(session.web_pages),
         )
 
     def _look_who_is_quiet(self) -> None:

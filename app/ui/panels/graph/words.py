@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import BRIDGE_TO, DrawnNode, GraphGroup, GraphLine
+from app.core.graph.node_graph import BRIDGE_TO, WEB_GROUP, DrawnNode, GraphGroup, GraphLine
 from app.core.network.topics import Topic, key_of, split_key
 from app.core.networks.kinds import kind_named
 from app.ui.text.nodes import cpu_words, generation_words
@@ -27,6 +27,7 @@ ICONS = {
     "original": "plug",
     "group": "boxes",
     "program": "box",
+    "page": "globe",
 }
 
 FindTopic = Callable[[str], "Topic | None"]
@@ -43,6 +44,8 @@ class LineFigures:
 
 def node_icon(node: DrawnNode) -> str:
     """The icon of a node's kind."""
+    if node.page is not None:
+        return node.page.icon
     return "camera" if node.has_pictures and node.kind == "program" else ICONS[node.kind]
 
 
@@ -62,6 +65,8 @@ def node_line(node: DrawnNode) -> str:
         return _members(node.members, node.quiet)
     if entry.gone_s is not None:
         return _("gone {seconds} s").format(seconds=int(entry.gone_s))
+    if node.kind == "page":
+        return node.page.where if node.page is not None else _("web page")
     if node.kind == "original":
         return generation_words(entry)
     cpu = cpu_words(entry.cpu_ratio)
@@ -92,12 +97,19 @@ def quiet_words(group: GraphGroup) -> str:
     )
 
 
+def group_note(group: GraphGroup) -> str:
+    """What stands behind a group's name: the address of its computer, or the number of web pages."""
+    return grouped(group.members) if group.key == WEB_GROUP else group.address
+
+
 def group_name(key: str, host: str) -> str:
     """What a group is called by its key; ``host`` is this computer."""
     kind, _colon, name = key.partition(":")
     if kind == "network":
         known = kind_named(name)
         return known.words if known is not None else name
+    if kind == "web":
+        return _("Web pages")
     if kind == "robot":
         return name or _("No robot")
     return _("This computer") if name == host else name or _("Unknown computer")

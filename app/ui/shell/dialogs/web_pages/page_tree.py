@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import host_of, page_name
+from app.core.network.web_words import host_of, page_icon, page_name, where_words
 from app.ui.shell.dialogs.web_pages.page_model import (
     BANDWIDTH,
     DISCONNECT,
@@ -48,9 +48,7 @@ from app.ui.shell.dialogs.web_pages.page_words import (
     does_words,
     dropped_words,
     limit_words,
-    page_icon,
     since_words,
-    where_words,
 )
 from app.ui.text import plain
 from app.ui.text.numbers import bandwidth_words, rate_words

@@ -6,34 +6,13 @@ import datetime as dt
 from typing import TYPE_CHECKING
 
 from app.core.network.web_page_list import ListedPage, dropped_share
-from app.core.network.web_words import host_of, page_name, share_words
+from app.core.network.web_words import page_name, share_words, where_words
 from app.ui.text.dates import clock_words
 from app.ui.text.numbers import bandwidth_words, rate_words
 from nep.i18n import _, number
 
 if TYPE_CHECKING:
-    from nep.programs.web.context import ConnectedPage, PageTopic
-
-_TABLETS = ("ipad", "tablet", "android")
-_PHONES = ("iphone", "phone", "mobile")
-_BROWSERS = ("chrome", "chromium", "safari", "firefox", "edge", "opera", "webview", "browser")
-
-
-def page_icon(page: ConnectedPage) -> str:
-    """Return the icon of a tablet, a phone, a computer's browser, or a program."""
-    client = page.client.casefold()
-    if any(word in client for word in _PHONES):
-        return "smartphone"
-    if any(word in client for word in _TABLETS):
-        return "tablet"
-    is_browser = any(word in client for word in _BROWSERS)
-    return "monitor" if page.origin or is_browser else "terminal"
-
-
-def where_words(page: ConnectedPage) -> str:
-    """Say "192.168.1.30, Chrome"."""
-    client = page.client if page.client != page_name(page) else ""
-    return ", ".join(filter(None, (host_of(page.address), client)))
+    from nep.programs.web.context import PageTopic
 
 
 def since_words(listed: ListedPage) -> str:
