@@ -159,7 +159,7 @@ def _refused(web: WebPages) -> Iterator[WebNotice]:
 
 def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
-        if (page.origin or host_of(page.address)) == refusal.who:
+        if refusal.who in {page.origin, host_of(page.address)}:
             sentence = _("{page} was refused at {time}, because it was disconnected here.").format(
                 page=page_name(page), time=_clock_words(refusal.time_s)
             )

@@ -118,6 +118,7 @@ OPENED = [
             "help.about",
             "help.report",
             "network.others",
+            "network.web",
             "layout.keep",
         ),
     ),

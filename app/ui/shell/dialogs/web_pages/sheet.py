@@ -40,7 +40,7 @@ from nep.i18n import _, ngettext
 WIDE = 640
 REFRESH_MS = 300
 _SIDE, _TABLE_SIDE, _SCROLL_BAR, _EDGE, _BELOW_BARS = 19, 12, 10, 6, 46
-_MIN_TABLE_HEIGHT = 150
+_MIN_TABLE_HEIGHT = 120
 
 
 class WebPagesSheet(Overlay):
@@ -173,12 +173,11 @@ class WebPagesSheet(Overlay):
         self.empty.setContentsMargins(_SIDE - _TABLE_SIDE, 4, 0, 0)
         return part
 
-    def _foot_row(self) -> QHBoxLayout:
-        foot = QHBoxLayout()
+    def _foot_row(self) -> Flow:
+        foot = Flow(gap=8)
         foot.setContentsMargins(_SIDE, 0, _SIDE - 7, 0)
-        foot.setSpacing(8)
         foot.addWidget(label(_("In a terminal:"), "small", role="textSecondary"))
-        foot.addWidget(self.command, 1)
+        foot.add_elastic(self.command, greedy=True)
         foot.addWidget(self.copy_command)
         foot.addWidget(self.copy_page)
         foot.addWidget(self.test_page)
