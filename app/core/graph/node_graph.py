@@ -143,6 +143,7 @@ class NodeGraph:
     topics_there: int = 0
     services_there: int = 0
     quiet_hidden: int = 0
+    pages_there: int = 0
 
     def node(self, key: str) -> DrawnNode | None:
         """The box of that key, or None."""
@@ -178,6 +179,7 @@ def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
         sum(len(line.topics) for line in lines),
         sum(len(line.topics) for line in services),
         sum(_is_hidden(node, choices) for node in boxes.values()),
+        sum(node.kind == "page" and not node.is_gone for node in boxes.values()),
     )
 
 

@@ -16,7 +16,7 @@ from nep.system.addresses import OwnAddress, own_addresses
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
-    from nep.programs.web import access, context, foxglove_page, served_pages, server
+    from nep.programs.web import access, context, served_pages, server
     from nep.recordings.formats import channels
 else:  # loaded with the first start of a server
     access = lazy_module("nep.programs.web.access")
@@ -53,7 +53,7 @@ class RunningServer(Protocol):
     def set_allow_moving(self, names: Collection[str]) -> None:
         """Replace the names of robots that pages may move."""
 
-    def set_foxglove(self, channels: foxglove_page.ChannelFormat | None) -> int:
+    def set_foxglove(self, channels: channels.LiveChannels | None) -> int:
         """Accept clients of Foxglove's protocol, or with None disconnect them and accept no more."""
 
     def set_rosbridge(self, on: bool) -> int:

@@ -215,7 +215,7 @@ def test_web_pages_have_a_group_and_the_titles_that_the_server_knows(group_by: G
     drawn = [(each.name, each.page) for each in graph.nodes if each.kind == "page"]
     assert drawn == [("buttons.html", known["web_lab:8080_50001"]), ("lab:8080_50002", None)]
     (group,) = [each for each in graph.groups if each.key == WEB_GROUP]
-    assert (group.icon, group.members) == ("globe", 2)
+    assert (group.icon, group.members, graph.pages_there) == ("globe", 2, 2)
 
 
 def test_nothing_is_nothing() -> None:

@@ -40,6 +40,7 @@ from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.graph.words import (
     LineFigures,
+    counts_words,
     group_name,
     known_figure,
     line_figures,
@@ -285,22 +286,9 @@ class GraphPanel(PanelWidget):
         self.empty.set_actions([doctor])
 
     def _say_counts(self, graph: NodeGraph) -> None:
-        there = graph.nodes_there
-        if not there:
-            self.count.setText("")
-            return
-        shown = there - graph.quiet_hidden
-        nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", there)
-        if shown == there:
-            nodes = ngettext("{count} node", "{count} nodes", there)
-        parts = [nodes.format(shown=grouped(shown), count=grouped(there))]
-        topics = ngettext("{count} topic", "{count} topics", graph.topics_there)
-        parts.append(topics.format(count=grouped(graph.topics_there)))
-        if graph.services_there:
-            services = ngettext("{count} service", "{count} services", graph.services_there)
-            parts.append(services.format(count=grouped(graph.services_there)))
-        self.count.setText(", ".join(parts))
-        self.tools.say_quiet(graph.quiet_hidden, self._choices.hides_quiet)
+        self.count.setText(counts_words(graph))
+        if graph.nodes_there:
+            self.tools.say_quiet(graph.quiet_hidden, self._choices.hides_quiet)
 
     def _say_note(self, layout: GraphLayout) -> None:
         """What is not drawn as it should be; the line is not there when all is well."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import BRIDGE_TO, WEB_GROUP, DrawnNode, GraphGroup, GraphLine
+from app.core.graph.node_graph import BRIDGE_TO, WEB_GROUP, DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.core.network.topics import Topic, key_of, split_key
 from app.core.networks.kinds import kind_named
 from app.ui.text.nodes import cpu_words, generation_words
@@ -95,6 +95,27 @@ def quiet_words(group: GraphGroup) -> str:
     return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet).format(
         count=grouped(group.quiet)
     )
+
+
+def counts_words(graph: NodeGraph) -> str:
+    """Say "7 of 9 nodes, 3 of them web pages, 13 topics"; blank without nodes."""
+    there = graph.nodes_there
+    if not there:
+        return ""
+    shown = there - graph.quiet_hidden
+    nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", there)
+    if shown == there:
+        nodes = ngettext("{count} node", "{count} nodes", there)
+    parts = [nodes.format(shown=grouped(shown), count=grouped(there))]
+    if graph.pages_there:
+        pages = ngettext("{count} of them a web page", "{count} of them web pages", graph.pages_there)
+        parts.append(pages.format(count=grouped(graph.pages_there)))
+    topics = ngettext("{count} topic", "{count} topics", graph.topics_there)
+    parts.append(topics.format(count=grouped(graph.topics_there)))
+    if graph.services_there:
+        services = ngettext("{count} service", "{count} services", graph.services_there)
+        parts.append(services.format(count=grouped(graph.services_there)))
+    return ", ".join(parts)
 
 
 def group_note(group: GraphGroup) -> str:
