@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QPoint, Qt, QUrl
+from PySide6.QtCore import QPoint, QRectF, Qt, QUrl
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QWidget
@@ -17,7 +17,6 @@ from websockets.sync.client import connect
 
 from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages import WebPagesSheet
-from app.ui.shell.dialogs.web_pages.page_model import DISCONNECT
 from app.ui.shell.dialogs.web_pages.qr_code import QUIET_ZONE, modules_of
 from app.ui.theme.theme import Theme
 from nep.masters.master import Master
@@ -152,8 +151,9 @@ def test_page_that_left_stays_struck_through_without_a_button(desk: Desk) -> Non
 
 def test_button_of_a_row_disconnects_its_page(desk: Desk) -> None:
     server, sheet = with_pages(desk), desk.sheet
-    rect = sheet.table.visualRect(sheet.model.index(1, DISCONNECT))
-    QTest.mouseClick(sheet.table.viewport(), Qt.MouseButton.LeftButton, pos=rect.center())
+    row = QRectF(sheet.table.visualRect(sheet.model.index(1, 0)))
+    button = sheet.table.cell("disconnect", row).center().toPoint()
+    QTest.mouseClick(sheet.table.viewport(), Qt.MouseButton.LeftButton, pos=button)
     assert ([each.id for each in server.pages], server.kept_out) == ([1], {2})
     _words, undo = desk.said[-1]
     assert undo is not None
@@ -330,3 +330,25 @@ def test_it_lies_at_the_right_edge_below_stop(qtbot, theme: Theme, window) -> No
     assert sheet.findChildren(QLabel)
     QTest.keyClick(sheet.switch, Qt.Key.Key_Escape)
     assert not sheet.isVisible()
+
+
+def test_status_bar_says_who_can_connect_and_opens_the_sheet(window) -> None:
+    window.show()
+    window.commands.run("layout.developer")
+    web = window.session.web_pages
+    server = FakeWebServer()
+    web._server, web.state, web.host = server, "on", WIFI.host
+    server.pages = (page(1), page(2))
+    web.refresh()
+    window._show_facts()
+    (item,) = [each for each in window.status.items() if WIFI.host in each.text]
+    assert "2" in item.text
+    QTest.mouseClick(item, Qt.MouseButton.LeftButton)
+    (sheet,) = window.findChildren(WebPagesSheet)
+    assert sheet.isVisible()
+    assert sheet.count.text != ""
+    server.pages = ()
+    web.host = ""
+    web.refresh()
+    window._show_facts()
+    assert [each for each in window.status.items() if WIFI.host in each.text] == []

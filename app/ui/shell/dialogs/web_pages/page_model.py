@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from nep.programs.web.context import PageTopic
 
 Index = QModelIndex | QPersistentModelIndex
-PAGE, RATE, BANDWIDTH, DROPPED, DISCONNECT = range(5)
-"""Columns."""
-COLUMNS = 5
 _ROOT = QModelIndex()
 _TopicKey = tuple[str, bool]
 
@@ -40,7 +37,10 @@ class PageRow:
 
 
 class PageTreeModel(QAbstractItemModel):
-    """Pages, each with its topics below it. Rows keep their index while others come and go."""
+    """Pages, each with its topics below it. Rows keep their index while others come and go.
+
+    There is one column: for thousands of topics Qt would ask for the size of each cell.
+    """
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -56,10 +56,10 @@ class PageTreeModel(QAbstractItemModel):
         return len(row.topics) if row is not None and self.topic(parent) is None else 0
 
     def columnCount(self, _parent: Index = _ROOT) -> int:
-        return COLUMNS
+        return 1
 
     def index(self, row: int, column: int, parent: Index = _ROOT) -> QModelIndex:
-        if not 0 <= row < self.rowCount(parent) or not 0 <= column < COLUMNS:
+        if not 0 <= row < self.rowCount(parent) or column:
             return QModelIndex()
         if not parent.isValid():
             return self.createIndex(row, column, 0)
@@ -71,7 +71,7 @@ class PageTreeModel(QAbstractItemModel):
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         row, topic = self.page_row(index), self.topic(index)
-        if row is None or index.column() != PAGE:
+        if row is None:
             return None
         if role == Qt.ItemDataRole.DisplayRole:
             return page_name(row.listed.page) if topic is None else topic.topic
@@ -82,9 +82,8 @@ class PageTreeModel(QAbstractItemModel):
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> object:
-        if orientation != Qt.Orientation.Horizontal or role != Qt.ItemDataRole.DisplayRole:
-            return None
-        return (_("Page and topics"), _("Rate /s"), _("Bandwidth"), _("Dropped"), "")[section]
+        is_title = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
+        return _("Page and topics") if is_title and section == 0 else None
 
     # -- what the sheet asks and says ------------------------------------------------------------------------
 
@@ -108,20 +107,23 @@ class PageTreeModel(QAbstractItemModel):
         for place in reversed(range(len(self._rows))):
             if self._rows[place].id not in wanted:
                 self._remove_page(place)
+        new = [each for each in listed if each.page.id not in self._by_id]
         for each in listed:
             row = self._by_id.get(each.page.id)
-            if row is None:
-                self._append_page(each)
-            elif row.listed is not each and row.listed != each:
+            if row is not None and row.listed != each:
                 row.listed = each
-                self._tell(self.createIndex(row.place, 0, 0), self.createIndex(row.place, DISCONNECT, 0))
+                self._tell(self.createIndex(row.place, 0, 0), self.createIndex(row.place, 0, 0))
                 self._show_topics(row, each.page.topics)
+        if new:
+            self._append_pages(new)
 
-    def _append_page(self, listed: ListedPage) -> None:
-        row = PageRow(listed, [*listed.page.topics], len(self._rows))
-        self.beginInsertRows(_ROOT, row.place, row.place)
-        self._rows.append(row)
-        self._by_id[row.id] = row
+    def _append_pages(self, listed: Sequence[ListedPage]) -> None:
+        first = len(self._rows)
+        self.beginInsertRows(_ROOT, first, first + len(listed) - 1)
+        for each in listed:
+            row = PageRow(each, [*each.page.topics], len(self._rows))
+            self._rows.append(row)
+            self._by_id[row.id] = row
         self.endInsertRows()
 
     def _remove_page(self, place: int) -> None:
@@ -162,7 +164,7 @@ class PageTreeModel(QAbstractItemModel):
     def _tell_topics(self, row: PageRow, first: int, last: int) -> None:
         if first <= last:
             id_ = row.id + 1
-            self._tell(self.createIndex(first, 0, id_), self.createIndex(last, DISCONNECT, id_))
+            self._tell(self.createIndex(first, 0, id_), self.createIndex(last, 0, id_))
 
     def _tell(self, first: QModelIndex, last: QModelIndex) -> None:
         self.dataChanged.emit(first, last, [Qt.ItemDataRole.DisplayRole])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
 
 from PySide6.QtCore import (
     QEvent,
@@ -36,14 +37,7 @@ from PySide6.QtWidgets import (
 
 from app.core.network.web_page_list import ListedPage
 from app.core.network.web_words import host_of, page_icon, page_name, where_words
-from app.ui.shell.dialogs.web_pages.page_model import (
-    BANDWIDTH,
-    DISCONNECT,
-    DROPPED,
-    PAGE,
-    RATE,
-    PageTreeModel,
-)
+from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel
 from app.ui.shell.dialogs.web_pages.page_words import (
     does_words,
     dropped_words,
@@ -65,32 +59,41 @@ if TYPE_CHECKING:
 Index = QModelIndex | QPersistentModelIndex
 PAGE_HIGH, TOPIC_HIGH = 28, 23
 _EDGE, _PADDING, _ICON, _GAP = 8, 6, 15, 6
-_WIDTHS = {RATE: 66, BANDWIDTH: 88, DROPPED: 78, DISCONNECT: 34}
+PageColumn = Literal["rate", "bandwidth", "dropped", "disconnect"]
+_WIDTHS: dict[PageColumn, int] = {"rate": 66, "bandwidth": 88, "dropped": 78, "disconnect": 34}
 _STRUCK = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
-    def __init__(self, theme: Theme, parent: QWidget) -> None:
-        super().__init__(Qt.Orientation.Horizontal, parent)
-        self._theme = theme
+    """Titles of the columns, which `PageTree` places."""
+
+    def __init__(self, theme: Theme, tree: PageTree) -> None:
+        super().__init__(Qt.Orientation.Horizontal, tree)
+        self._theme, self._tree = theme, tree
         self.setSectionsClickable(False)
-        self.setStretchLastSection(False)
-        self.setMinimumSectionSize(24)
+        self.setStretchLastSection(True)
 
     def sizeHint(self) -> QSize:
         return QSize(super().sizeHint().width(), round(self._theme.scaled(TOPIC_HIGH)) + 2)
 
-    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
-        theme = self._theme
+    def paintSection(self, painter: QPainter, rect: QRect, _section: int) -> None:
+        theme, font = self._theme, head_font(self._theme)
+        ink = theme.colour("textTertiary")
         painter.save()
         painter.fillRect(rect, theme.colour("raised"))
         painter.setPen(theme.colour("border"))
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
-        text = str(self.model().headerData(section, Qt.Orientation.Horizontal))
-        box = QRectF(rect).adjusted(_EDGE if section == PAGE else _PADDING, 0, -_PADDING, 0)
-        align = paint.LEFT if section == PAGE else paint.RIGHT
-        paint.words(painter, box, text, head_font(theme), theme.colour("textTertiary"), align)
+        box = QRectF(rect)
+        for column, title in column_titles().items():
+            paint.words(painter, self._tree.cell(column, box), title, font, ink, paint.RIGHT)
+        box.setRight(self._tree.cell("rate", box).left())
+        paint.words(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, ink)
         painter.restore()
+
+
+def column_titles() -> dict[PageColumn, str]:
+    """Return the titles of the columns at the right."""
+    return {"rate": _("Rate /s"), "bandwidth": _("Bandwidth"), "dropped": _("Dropped")}
 
 
 class _RowHeights(QStyledItemDelegate):
@@ -115,13 +118,13 @@ class PageTree(QTreeView):
         super().__init__()
         self.theme, self._pages = theme, model
         self._keyboard = False
+        self._widths = dict(_WIDTHS)
         self._hovered = QPersistentModelIndex()
         self._over_button = False
         self.setModel(model)
         self._heights = _RowHeights(theme, self)
         self.setItemDelegate(self._heights)
         self.setHeader(_PageHeader(theme, self))
-        self.header().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.setAccessibleName(_("Connected pages"))
         self.setProperty("raised", "true")
         self.setProperty("ownFocus", True)
@@ -132,7 +135,6 @@ class PageTree(QTreeView):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setEditTriggers(QTreeView.EditTrigger.NoEditTriggers)
         self.setExpandsOnDoubleClick(False)
-        self.setAllColumnsShowFocus(True)
         self.setMouseTracking(True)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._show_menu)
@@ -187,7 +189,7 @@ class PageTree(QTreeView):
             return
         self.setFocus(Qt.FocusReason.MouseFocusReason)
         if not self._is_on_button(event.position().toPoint()):
-            self.setCurrentIndex(index.siblingAtColumn(PAGE))
+            self.setCurrentIndex(index)
             if event.position().x() < _EDGE + self.theme.scaled(_ICON) + _GAP:
                 self._toggle(index)
 
@@ -214,6 +216,14 @@ class PageTree(QTreeView):
         super().resizeEvent(event)
         self._measure()
 
+    def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
+        # Rows keep their height. Qt would ask for the size of each cell that changed: 300 ms for 5000 topics.
+        rect = self.visualRect(first).united(self.visualRect(last))
+        if not rect.isEmpty():
+            rect.setLeft(0)
+            rect.setRight(self.viewport().width())
+            self.viewport().update(rect)
+
     # ---- inside
 
     def _expand_new(self, parent: QModelIndex, first: int, last: int) -> None:
@@ -223,18 +233,17 @@ class PageTree(QTreeView):
             self.expand(parent)  # Qt does not keep a page without topics expanded
 
     def _toggle(self, index: QModelIndex) -> None:
-        page = index.siblingAtColumn(PAGE)
-        if page.isValid() and not index.parent().isValid():
-            self.setExpanded(page, not self.isExpanded(page))
+        if index.isValid() and not index.parent().isValid():
+            self.setExpanded(index, not self.isExpanded(index))
 
     def _is_on_button(self, at: QPoint) -> bool:
         index = self.indexAt(at)
         row = self._pages.page_row(index)
         is_page = row is not None and self._pages.topic(index) is None and row.listed.gone_s is None
-        return is_page and index.column() == DISCONNECT
+        return is_page and at.x() >= self.cell("disconnect", QRectF()).left() - _PADDING
 
     def _hover(self, at: QPoint) -> None:
-        index, over = QPersistentModelIndex(self.indexAt(at).siblingAtColumn(PAGE)), self._is_on_button(at)
+        index, over = QPersistentModelIndex(self.indexAt(at)), self._is_on_button(at)
         if (index, over) != (self._hovered, self._over_button):
             self._hovered, self._over_button = index, over
             self.viewport().setToolTip(plain.tip(_("Disconnect (Delete)")) if over else "")
@@ -244,7 +253,7 @@ class PageTree(QTreeView):
         index = self.indexAt(at)
         if not index.isValid():
             return
-        self.setCurrentIndex(index.siblingAtColumn(PAGE))
+        self.setCurrentIndex(index)
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         words = _("Copy the topic's name") if self._pages.topic(index) is not None else _("Copy the address")
@@ -255,15 +264,10 @@ class PageTree(QTreeView):
         menu.popup(self.viewport().mapToGlobal(at))
 
     def _measure(self) -> None:
-        scaled, header = self.theme.scaled, self.header()
-        metrics = {column: round(scaled(wide)) for column, wide in _WIDTHS.items()}
-        for column in (RATE, BANDWIDTH, DROPPED):
-            title = str(self._pages.headerData(column, Qt.Orientation.Horizontal))
-            words = paint.width_of(head_font(self.theme), title)
-            metrics[column] = max(metrics[column], round(words) + 2 * _PADDING + 1)
-        for column, wide in metrics.items():
-            header.resizeSection(column, wide)
-        header.resizeSection(PAGE, max(80, self.viewport().width() - sum(metrics.values())))
+        titles, font = column_titles(), head_font(self.theme)
+        for column, wide in _WIDTHS.items():
+            words = paint.width_of(font, titles.get(column, "")) + 2 * _PADDING + 1
+            self._widths[column] = max(round(self.theme.scaled(wide)), round(words))
         self._heights.measure(self.theme)
 
     # ---- painting
@@ -278,18 +282,17 @@ class PageTree(QTreeView):
         rect = QRectF(option.rect)
         rect.setLeft(0)
         rect.setWidth(self.viewport().width())
-        first = index.sibling(index.row(), PAGE)
-        chosen, theme = first == self.currentIndex().siblingAtColumn(PAGE), self.theme
+        chosen, theme = index == self.currentIndex(), self.theme
         painter.save()
         if chosen:
             painter.fillRect(rect, theme.colour("selected"))
             painter.fillRect(QRectF(0, rect.top(), 2, rect.height()), theme.colour("accent"))
-        elif self._hovered == first and self._hovered.isValid():
+        elif self._hovered == index and self._hovered.isValid():
             painter.fillRect(rect, theme.colour("hover"))
         if topic is None:
             if row.place:
                 paint.hairline(painter, rect, Qt.Edge.TopEdge, theme.colour("border"))
-            self._paint_page(painter, rect, row.listed, first)
+            self._paint_page(painter, rect, row.listed, index)
         else:
             self._paint_topic(painter, rect, row.topics[index.row()], is_gone=row.listed.gone_s is not None)
         if chosen and self._keyboard and self.hasFocus():
@@ -305,9 +308,15 @@ class PageTree(QTreeView):
         paint_icon(painter, square, name, self.theme.colour(role))
         return left + side + _GAP
 
-    def _cell(self, column: int, rect: QRectF) -> QRectF:
-        left = self.columnViewportPosition(column)
-        return QRectF(left + _PADDING, rect.top(), self.columnWidth(column) - 2 * _PADDING, rect.height())
+    def cell(self, column: PageColumn, rect: QRectF) -> QRectF:
+        """Return the inside of a column's cell in a row, whose place is ``rect``."""
+        right = float(self.viewport().width())
+        for name in reversed(_WIDTHS):
+            if name == column:
+                break
+            right -= self._widths[name]
+        left = right - self._widths[column]
+        return QRectF(left + _PADDING, rect.top(), right - left - 2 * _PADDING, rect.height())
 
     def _font(self, kind: str, *, bold: bool = False, struck: bool = False) -> QFont:
         font = self.theme.font(kind)
@@ -328,7 +337,7 @@ class PageTree(QTreeView):
         )
         small = self._font("small")
         since = since_words(listed)
-        button = self._cell(DISCONNECT, rect)
+        button = self.cell("disconnect", rect)
         end = button.left() - _PADDING
         room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
         room.setRight(end)
@@ -365,7 +374,7 @@ class PageTree(QTreeView):
         left += verbs + 10
         limit = limit_words(topic)
         wide = paint.width_of(small, limit) + 2 if limit else 0.0
-        end = self._cell(PAGE, rect).right()
+        end = self.cell("rate", rect).left() - 2 * _PADDING
         paint.words(
             painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
             theme.colour(_STRUCK if is_gone else "textTertiary"), paint.RIGHT,
@@ -374,9 +383,13 @@ class PageTree(QTreeView):
         paint.words(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
         if is_gone:
             return
-        for column, text in ((RATE, rate_words(topic.rate)), (BANDWIDTH, bandwidth_words(topic.bytes_per_s))):
-            paint.words(painter, self._cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
-        self._paint_dropped(painter, self._cell(DROPPED, rect), topic, body)
+        figures: dict[PageColumn, str] = {
+            "rate": rate_words(topic.rate),
+            "bandwidth": bandwidth_words(topic.bytes_per_s),
+        }
+        for column, text in figures.items():
+            paint.words(painter, self.cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
+        self._paint_dropped(painter, self.cell("dropped", rect), topic, body)
 
     def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
         theme, words = self.theme, dropped_words(topic)
