@@ -30,7 +30,7 @@ class _Segment(PaintedButton):
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
         self._icon, self._check = icon, check
-        self._bare = self._dot = False
+        self._bare = self._dot = self.has_dot = False
         self._height, self._padding, self._kind = _HEIGHTS[size]
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
@@ -47,7 +47,6 @@ class _Segment(PaintedButton):
             self._dot = shown
             words = _("{choice}, on") if shown else "{choice}"
             self.setAccessibleName(words.format(choice=self.text()))
-            self.updateGeometry()
             self.update()
 
     def shown_word(self) -> str:
@@ -69,7 +68,7 @@ class _Segment(PaintedButton):
         return round(self._theme.scaled(16))
 
     def _icons_width(self) -> int:
-        shown = int(self._icon is not None) + int(self._check) + int(self._dot) / 2
+        shown = int(self._icon is not None) + int(self._check) + int(self.has_dot) / 2
         return round((self._side() + GAP) * shown) - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
@@ -117,10 +116,12 @@ class Segments(QWidget):
         size: Literal["small", "normal", "form"] = "normal",
         name: str = "",
         wraps: bool = False,
+        dots: bool = False,
     ) -> None:
         """Options are (value, label, icon or None); ``check`` puts a check mark before the chosen one.
 
-        With ``wraps`` they stand in several rows where there is too little room.
+        With ``wraps`` they stand in several rows where there is too little room. With ``dots`` they have room
+        for the dots of `set_dot`.
         """
         super().__init__()
         self._theme = theme
@@ -137,6 +138,7 @@ class Segments(QWidget):
         self._segments: dict[str, _Segment] = {}
         for key, words, icon in options:
             segment = _Segment(theme, words, icon, size, check)
+            segment.has_dot = dots
             row.addWidget(segment)
             self._segments[key] = segment
             segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))

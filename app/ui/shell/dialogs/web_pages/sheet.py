@@ -80,7 +80,7 @@ class WebPagesSheet(Overlay):
         theme = self.theme
         self.count = Chip(theme)
         options = [("rosbridge", "rosbridge", None), ("foxglove", "Foxglove", None)]
-        self.tabs = Segments(theme, options, "rosbridge", check=True, name=_("Protocol"))
+        self.tabs = Segments(theme, options, "rosbridge", check=True, name=_("Protocol"), dots=True)
         self.switch = Switch(theme, "")
         self.state = label("", "body", role="textTertiary", wrap=True)
         self.other_port = Button(theme, "", size="small")
