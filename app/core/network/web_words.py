@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from nep.programs.web.context import ConnectedPage, Refusal
 
 _WIRELESS = ("wl", "wi-fi", "wifi")
-_TABLETS = ("ipad", "tablet", "android")
-_PHONES = ("iphone", "phone", "mobile")
 NextStep = Literal["", "allow origin", "choose robots", "let in"]
 
 
@@ -89,25 +87,16 @@ def page_name(page: ConnectedPage) -> str:
     return page.title if is_named else page.client or page.origin or page.name
 
 
-def host_of(address: str) -> str:
-    """Return the host of "192.168.1.30:50412" or "::1:50412"."""
-    host, colon, port = address.rpartition(":")
-    return host if colon and port.isdigit() else address
-
-
 def where_words(page: ConnectedPage) -> str:
     """Say "192.168.1.30, Chrome"."""
     client = page.client if page.client != page_name(page) else ""
-    return ", ".join(filter(None, (host_of(page.address), client)))
+    return ", ".join(filter(None, (page.address, client)))
 
 
 def page_icon(page: ConnectedPage) -> str:
     """Return the icon of a tablet, a phone, a computer's browser, or a program."""
-    client = page.client.casefold()
-    if any(word in client for word in _PHONES):
-        return "smartphone"
-    if any(word in client for word in _TABLETS):
-        return "tablet"
+    if page.device:
+        return "smartphone" if page.device == "phone" else "tablet"
     return "monitor" if page.origin else "terminal"
 
 
@@ -159,7 +148,7 @@ def _refused(web: WebPages) -> Iterator[WebNotice]:
 
 def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
-        if refusal.who in {page.origin, host_of(page.address)}:
+        if refusal.who in {page.origin, page.address}:
             sentence = _("{page} was refused at {time}, because it was disconnected here.").format(
                 page=page_name(page), time=_clock_words(refusal.time_s)
             )

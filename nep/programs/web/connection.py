@@ -16,7 +16,7 @@ from nep.nodes.node import Node
 from nep.programs.web.context import ConnectedPage, PageTopic, Protocol, WebCounts
 from nep.programs.web.outgoing import Frame
 from nep.programs.web.send_queue import Queued, SendQueue
-from nep.programs.web.visitors import client_name, page_title
+from nep.programs.web.visitors import client_name, device_kind, page_title
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ class PageConnection:
             title=page_title(path, referer, origin) or self.name,
             topics=self._topic_list,
             dropped_count=self._dropped,
+            device=device_kind(user_agent),
         )
 
     @property

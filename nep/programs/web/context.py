@@ -15,6 +15,7 @@ from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.operations import LEVELS, Level, OperationId
 from nep.programs.web.outgoing import EncodingOptions, operation_frames
 from nep.programs.web.send_queue import SendQueue
+from nep.programs.web.visitors import Device
 
 __all__ = ["ConnectedPage", "PageContext", "PageTopic", "Protocol", "Refusal", "RefusalKind", "WebCounts"]
 
@@ -66,6 +67,8 @@ class ConnectedPage:
     title: str = ""
     topics: tuple[PageTopic, ...] = ()
     dropped_count: int = 0
+    device: Device = ""
+    """Kind of device as far as the User-Agent tells; tablets often claim to be computers."""
 
     @property
     def subscribed(self) -> tuple[str, ...]:

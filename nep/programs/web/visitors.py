@@ -1,14 +1,16 @@
-"""Names for connected pages: client program and title, from the headers of the handshake. Pure."""
+"""Names for connected pages: client, kind of device and title, from the headers of the handshake. Pure."""
 
 from __future__ import annotations
 
 import re
+from typing import Literal
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from nep.text import escaped
 
-__all__ = ["MAX_SHOWN_LENGTH", "client_name", "page_title"]
+__all__ = ["MAX_SHOWN_LENGTH", "Device", "client_name", "device_kind", "page_title"]
 
+Device = Literal["", "phone", "tablet"]
 MAX_SHOWN_LENGTH = 60
 _MAX_READ_LENGTH = 2_000
 _CLIENTS = (
@@ -44,6 +46,14 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
             return name
     product = _PRODUCT.match(given)
     return "" if product is None or product[0] == "Mozilla" else product[0][:MAX_SHOWN_LENGTH]
+
+
+def device_kind(user_agent: str) -> Device:
+    """Return the kind of device that a User-Agent names; "" for a computer or an unknown device."""
+    given = user_agent[:_MAX_READ_LENGTH]
+    if "iPhone" in given or ("Android" in given and "Mobile" in given):
+        return "phone"
+    return "tablet" if any(mark in given for mark in ("iPad", "Android", "Tablet")) else ""
 
 
 def page_title(path: str, referer: str, origin: str) -> str:

@@ -17,7 +17,7 @@ def page(
     return ConnectedPage(
         page_id,
         f"web_lab.example_{page_id}",
-        f"192.168.1.30:{50_000 + page_id}",
+        "192.168.1.30",
         origin,
         1_700_000_000.0,
         "Chrome",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nep.programs.web.rates import RateMeter
-from nep.programs.web.visitors import client_name
+from nep.programs.web.visitors import client_name, device_kind
 
 
 def test_rate_is_the_average_of_the_last_two_seconds() -> None:
@@ -41,3 +41,27 @@ def test_rate_is_the_average_of_the_last_two_seconds() -> None:
 )  # fmt: skip
 def test_client_is_named_after_its_user_agent(user_agent: str, name: str) -> None:
     assert client_name(user_agent) == name
+
+
+@pytest.mark.parametrize(
+    ("user_agent", "device"),
+    [
+        (
+            "Mozilla/5.0 (iPad; CPU OS 17_0 like Mac OS X) AppleWebKit/605.1.15 Version/17.0 Safari/604.1",
+            "tablet",
+        ),
+        (
+            "Mozilla/5.0 (iPhone; CPU iPhone OS 17_0 like Mac OS X) Version/17.0 Mobile/15E148 Safari/604.1",
+            "phone",
+        ),
+        (
+            "Mozilla/5.0 (Linux; Android 14; SM-X200) AppleWebKit/537.36 Chrome/140.0.0.0 Safari/537.36",
+            "tablet",
+        ),
+        ("Mozilla/5.0 (Linux; Android 14; Pixel 8) Chrome/140.0.0.0 Mobile Safari/537.36", "phone"),
+        ("Mozilla/5.0 (X11; Linux x86_64) Chrome/140.0.0.0 Safari/537.36", ""),
+        ("", ""),
+    ],
+)
+def test_user_agent_tells_the_kind_of_device(user_agent: str, device: str) -> None:
+    assert device_kind(user_agent) == device

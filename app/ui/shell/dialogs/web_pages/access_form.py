@@ -172,8 +172,8 @@ class AccessForm(QWidget):
         self.reach.setText(words.format(address=host))
         self.works_with.setText(
             _(
-                "In Foxglove or Lichtblick: Open connection, Foxglove WebSocket. Address, token and origins "
-                "are the same as for rosbridge."
+                "In Foxglove or Lichtblick: Open connection, Foxglove WebSocket. Address, token, origins and "
+                "robots are the same as for rosbridge."
             )
             if is_foxglove
             else _("Works with roslib, roslibpy and pages of your own.")

@@ -36,7 +36,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import host_of, page_icon, page_name, where_words
+from app.core.network.web_words import page_icon, page_name, where_words
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel
 from app.ui.shell.dialogs.web_pages.page_words import (
     does_words,
@@ -160,7 +160,7 @@ class PageTree(QTreeView):
         if topic is not None:
             self.copied.emit(topic.topic)
         elif listed is not None:
-            self.copied.emit(listed.page.origin or host_of(listed.page.address))
+            self.copied.emit(listed.page.origin or listed.page.address)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         self._keyboard = True

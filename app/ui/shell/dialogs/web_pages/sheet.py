@@ -253,7 +253,7 @@ class WebPagesSheet(Overlay):
         web.refresh()
         self._show_switch()
         self.access.show_state(is_foxglove=is_foxglove)
-        self.permissions.show_state(is_foxglove=is_foxglove)
+        self.permissions.show_state()
         self._show_pages()
         self.notice.show_notices(notices(web, self._dismissed))
         self.command.setText(terminal_command(web))
@@ -355,7 +355,6 @@ class WebPagesSheet(Overlay):
         if notice is None:
             return
         if notice.next_step == "choose robots":
-            self.tabs.set_value("rosbridge")
             self._area.ensureWidgetVisible(self.permissions.robots)
             self.permissions.robots.open_list()
         elif notice.next_step == "allow origin":

@@ -175,8 +175,8 @@ class PermissionForm(QWidget):
         self.origins = OriginField(theme, web)
         self.origins_state = label("", "small", wrap=True)
         self.robots = RobotChoice(theme, web, robots)
-        self.robots_state = label("", "small", role="textTertiary", wrap=True)
-        self._robots_label = label(_("Robots"), "body", role="textSecondary")
+        said = _("Pages can read topics and publish their own. Moving a robot needs its name here.")
+        self.robots_state = label(said, "small", role="textTertiary", wrap=True)
         self._grid = grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(10)
@@ -184,7 +184,7 @@ class PermissionForm(QWidget):
         grid.setColumnStretch(1, 1)
         self._add_row(0, label(_("Origins"), "body", role="textSecondary"), self.origins, self.origins_state)
         grid.setRowMinimumHeight(2, 3)
-        self._add_row(3, self._robots_label, self.robots, self.robots_state)
+        self._add_row(3, label(_("Robots"), "body", role="textSecondary"), self.robots, self.robots_state)
         self.origins.changed.connect(self.show_state)
         self.origins.settled.connect(self.show_state)
         theme.changed.connect(self._measure)
@@ -201,8 +201,8 @@ class PermissionForm(QWidget):
         for title in self._titles:  # beside the first line of a field that grows
             title.setMinimumHeight(round(self._theme.scaled(_FIELD_HIGH)))
 
-    def show_state(self, *, is_foxglove: bool | None = None) -> None:
-        """Show what is allowed; on the Foxglove tab no robots, which its clients can't command."""
+    def show_state(self) -> None:
+        """Show what is allowed."""
         self.origins.show_origins(self._web.origins)
         set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
         self.origins_state.setText(
@@ -211,12 +211,3 @@ class PermissionForm(QWidget):
             else _("Pages from other origins are refused. Programs need only the token.")
         )
         self.robots.show_state()
-        if is_foxglove is None:
-            return
-        for widget in (self._robots_label, self.robots):
-            widget.setVisible(not is_foxglove)
-        self.robots_state.setText(
-            _("Foxglove and Lichtblick only read topics. They can't publish or move a robot.")
-            if is_foxglove
-            else _("Pages can read topics and publish their own. Moving a robot needs its name here.")
-        )
