@@ -149,7 +149,7 @@ def _refused(web: WebPages) -> Iterator[WebNotice]:
 def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
         if refusal.who in {page.origin, page.address}:
-            sentence = _("{page} was refused at {time}, because it was disconnected here.").format(
+            sentence = _("{page} tried to connect again at {time} and was refused.").format(
                 page=page_name(page), time=_clock_words(refusal.time_s)
             )
             yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))

@@ -171,10 +171,7 @@ class AccessForm(QWidget):
             )
         self.reach.setText(words.format(address=host))
         self.works_with.setText(
-            _(
-                "In Foxglove or Lichtblick: Open connection, Foxglove WebSocket. Address, token, origins and "
-                "robots are the same as for rosbridge."
-            )
+            _("Port, token, origins and robots are the same as for rosbridge.")
             if is_foxglove
             else _("Works with roslib, roslibpy and pages of your own.")
         )
@@ -182,7 +179,9 @@ class AccessForm(QWidget):
     def _show_code(self, *, is_foxglove: bool) -> None:
         web = self._web
         if is_foxglove:
-            self.qr.show_words(_("Copy the link below and paste it in Foxglove or Lichtblick."))
+            self.qr.show_words(
+                _("Copy the link below. In Foxglove or Lichtblick: Open connection, Foxglove WebSocket.")
+            )
         elif not web.host:
             self.qr.show_words(_("Open it to a network to scan a code with a tablet."))
         elif web.state != "on" or "rosbridge" not in web.protocols:

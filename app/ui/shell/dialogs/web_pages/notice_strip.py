@@ -8,6 +8,7 @@ from app.core.network.web_words import WebNotice
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, label, paint
 from app.ui.widgets.cards import AlertBox
+from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, lazy, ngettext
 
 _BUTTONS = {
@@ -27,11 +28,13 @@ class NoticeStrip(AlertBox):
         super().__init__(theme)
         self.notice: WebNotice | None = None
         self.words = label("", "body", wrap=True)
-        self.more = label("", "small", role="textSecondary", wrap=True)
+        self.more = label("", "body", role="textSecondary")
         self.button = Button(theme, "", size="small")
         self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
-        self.text_column.addWidget(self.words)
-        self.text_column.addWidget(self.more)
+        line = Flow(gap=8, row_gap=2)
+        line.addWidget(self.words)
+        line.addWidget(self.more)
+        self.text_column.addLayout(line)
         self.button_row.addWidget(self.button)
         self.button_row.addWidget(self.close_button)
         self.button.clicked.connect(self.helped)
