@@ -117,6 +117,19 @@ def test_taken_port_names_its_program_and_a_free_port(studio: Studio) -> None:
         web.close()
 
 
+def test_start_without_the_libraries_says_what_to_install(studio: Studio) -> None:
+    def start(_settings: object) -> FakeWebServer:
+        raise NepError("the web server is not installed; install it with: pip install 'nep-studio[web]'")
+
+    web = WebPages(master_address(), studio.events.put, start=start, addresses=tuple)
+    web.serve("rosbridge", on=True)
+    web.started(studio.events.get(timeout=30))
+    assert (web.state, web.protocols, web.free_port) == ("off", frozenset(), 0)
+    assert web.sentence.startswith("The web server")
+    assert "pip install" in web.sentence
+    web.close()
+
+
 def test_server_that_ends_by_itself_is_detected(studio: Studio) -> None:
     server = studio.switch_on()
     server.has_ended = True

@@ -19,6 +19,7 @@ from app.core.network.web_pages import WebPages
 from app.ui.shell.dialogs.web_pages import WebPagesSheet
 from app.ui.shell.dialogs.web_pages.qr_code import QUIET_ZONE, modules_of
 from app.ui.theme.theme import Theme
+from app.ui.widgets.keyboard import tab_stops
 from nep.masters.master import Master
 from nep.programs.web.context import PageTopic, Refusal
 from nep.system.addresses import OwnAddress
@@ -26,6 +27,7 @@ from tests.core.network.fake_web_server import FakeWebServer, page
 from tests.pseudo import untranslated
 from tests.ui.clipping import clipped
 from tests.ui.panels.test_words import said_by
+from tests.ui.test_accessible import unsaid
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 WIFI = OwnAddress("192.168.1.20", "wlan0")
@@ -243,6 +245,23 @@ def test_robots_are_chosen_by_check_boxes_and_apply_at_once(desk: Desk) -> None:
     QTest.keyClick(choice.boxes["Turtle"], Qt.Key.Key_Space)
     assert server.allow_moving == {"Rover", "Turtle"}
     assert "Turtle" in choice.words.text()
+
+
+def test_tab_goes_as_one_reads(desk: Desk) -> None:
+    with_pages(desk)
+    desk.web.add_origin("http://lab.example")
+    desk.sheet.permissions.robots.open_list()
+    desk.sheet.refresh()
+    sheet, access, permissions = desk.sheet, desk.sheet.access, desk.sheet.permissions
+    (token,) = permissions.origins.tokens
+    read = [
+        access.address.line, access.token.copy, access.new_token, token, permissions.origins.edit,
+        permissions.robots.choose, permissions.robots.boxes["Turtle"], sheet.table, sheet.copy_page,
+    ]  # fmt: skip
+    stops = list(tab_stops(sheet, sheet.switch))
+    places = [stops.index(each) for each in read if each.isEnabled()]
+    assert places == sorted(places)
+    assert unsaid(desk.sheet) == []
 
 
 def test_refused_robot_leads_to_the_choice_of_robots(desk: Desk) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from functools import partial
 
@@ -35,6 +36,7 @@ from app.ui.widgets import (
     set_role,
 )
 from app.ui.widgets.flow_layout import Flow
+from app.ui.widgets.keyboard import stops_of
 from nep.i18n import _, ngettext
 
 WIDE = 640
@@ -62,6 +64,7 @@ class WebPagesSheet(Overlay):
         super().__init__(theme, window, _("Web pages and tablets"))
         self._web, self._say, self._open_url = web, say, open_url
         self._dismissed: set[tuple[str, ...]] = set()
+        self._tab_order: list[QWidget] = []
         self.access = AccessForm(theme, web)
         self.permissions = PermissionForm(theme, web, robots)
         self._make_head()
@@ -259,6 +262,7 @@ class WebPagesSheet(Overlay):
         self.command.setText(terminal_command(web))
         self.copy_page.set_word(_("Copy the link") if is_foxglove else _("Copy a starter page"))
         paint.show_when(self.test_page, not is_foxglove)
+        self._order_tabs()
         self.test_page.setEnabled(web.state == "on")
 
     def _show_switch(self) -> None:
@@ -302,6 +306,20 @@ class WebPagesSheet(Overlay):
         else:
             words = _("Let web pages connect to see them here.")
         self.empty.setText(words)
+
+    def _order_tabs(self) -> None:
+        # Tab goes as one reads; Qt would put what is made later behind everything else.
+        access, origins = self.access, self.permissions.origins
+        parts = (
+            self.switch, self.other_port, self.tabs, access.address, access.token, access.new_token,
+            access.open_to, *origins.tokens, origins.edit, self.permissions.robots, self.table, self.notice,
+            self.copy_command, self.copy_page, self.test_page,
+        )  # fmt: skip
+        stops = [stop for part in parts for stop in stops_of(part)]
+        if stops != self._tab_order:
+            self._tab_order = stops
+            for before, after in itertools.pairwise(stops):
+                QWidget.setTabOrder(before, after)
 
     # ---- what a person does
 
