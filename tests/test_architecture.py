@@ -38,12 +38,12 @@ QT = {"PySide6", "shiboken6", "PyQt6", "PyQt5"}
 SMALL_LINES = 60
 # Small modules that one other module alone imports, and what each earns its file by (docs/adr/0020-rooms.md).
 EARNED = {
-    "app.ui.shell.dialogs.web_pages.notice_strip": "a widget of the sheet as the others beside it are",
     "app.core.graph.dot": "pure, and tested alone",
     "app.core.robots.awaited": "pure, and tested alone",
     "app.core.robots.motion.bridged_commands": "pure, and tested alone",
     "nep.programs.alarms.losses": "pure, and tested alone",
     "nep.programs.blackboard.ages": "pure, and tested alone",
+    "nep.programs.web.kept_out": "state with a lock of its own",
     "nep.cli.doctor": "one of a list: the commands of nep",
     "nep.programs.doctor.look": "joins collecting and judging, which know nothing of each other",
     "app.ui.panels.inspector.pace": "pure, and tested alone",

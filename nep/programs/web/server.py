@@ -24,7 +24,8 @@ from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
 from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
-from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage
+from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
+from nep.programs.web.kept_out import KeptOut
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
 from nep.programs.web.served_pages import PageRequest, answer
@@ -56,7 +57,6 @@ _END_TIMEOUT_S = 1.0
 _JOIN_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
-_MAX_KEPT_OUT = 100
 LANGUAGE = "web"
 """Language of pages' nodes in the graph, by which others recognize them."""
 _MAX_LOCKED = 16
@@ -101,12 +101,6 @@ class _Rejection(NamedTuple):
     sentence: str
 
 
-class _Visitor(NamedTuple):
-    host: str
-    origin: str
-    user_agent: str
-
-
 class WebServer:
     """Serves from `start` until `close`; a context manager.
 
@@ -129,7 +123,7 @@ class WebServer:
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All connections, also those without a handshake."""
         self._locked = 0
-        self._kept_out: dict[int, _Visitor] = {}
+        self._kept_out = KeptOut()
         self._refusals_lock = threading.Lock()
         self._refusals: tuple[Refusal, ...] = ()
         self._auth = AuthCheck(settings.access.token)
@@ -180,16 +174,12 @@ class WebServer:
         """
         page = next((each for each in self._pages.copy() if each.id == page_id), None)
         if page is not None:
-            with self._lock:
-                self._kept_out[page_id] = _visitor(page.connection, page.connection.request)
-                while len(self._kept_out) > _MAX_KEPT_OUT:
-                    del self._kept_out[next(iter(self._kept_out))]
+            self._kept_out.add(page_id, page.connection)
             self.disconnect(page_id)
 
     def let_in(self, page_id: int) -> None:
         """Let a page that `keep_out` disconnected connect again. Thread-safe."""
-        with self._lock:
-            self._kept_out.pop(page_id, None)
+        self._kept_out.remove(page_id)
 
     def set_access(self, access: Access) -> int:
         """Change who may connect, at once; return the number of pages that are disconnected.
@@ -396,9 +386,9 @@ class WebServer:
             refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("there are too many connections"))
         elif said := access.origin_refusal(origin, _own_origin(connection)):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
-        elif _visitor(connection, request) in self._kept_out.copy().values():
+        elif self._kept_out.refuses(connection, request):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
-        elif not (self.settings.rosbridge or _offers_foxglove(request)):
+        elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is switched off"))
         else:
             refusal = self._token_refusal(connection, request, access)
@@ -582,16 +572,6 @@ def node_name(origin: str | None, address: str) -> str:
 
 def _is_handshake(request: Request) -> bool:
     return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
-
-
-def _offers_foxglove(request: Request) -> bool:
-    offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol")).split(",")
-    return any(each.strip() in SUBPROTOCOLS for each in offered)
-
-
-def _visitor(connection: ServerConnection, request: Request | None) -> _Visitor:
-    headers = {} if request is None else request.headers
-    return _Visitor(_host_of(connection), headers.get("Origin", ""), headers.get("User-Agent", ""))
 
 
 def _own_origin(connection: ServerConnection) -> str:

@@ -1,6 +1,6 @@
 """Foxglove's WebSocket protocol: connections of Foxglove and Lichtblick."""
 
 from nep.programs.web.foxglove.page import ChannelFormat, FoxglovePage
-from nep.programs.web.foxglove.protocol import SUBPROTOCOLS
+from nep.programs.web.foxglove.protocol import SUBPROTOCOLS, is_offered
 
-__all__ = ["SUBPROTOCOLS", "ChannelFormat", "FoxglovePage"]
+__all__ = ["SUBPROTOCOLS", "ChannelFormat", "FoxglovePage", "is_offered"]

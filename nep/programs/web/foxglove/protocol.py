@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ __all__ = [
     "ClientMessage",
     "ServiceRequest",
     "control_frame",
+    "is_offered",
     "items",
     "message_frame",
     "parse",
@@ -44,6 +45,11 @@ _RESPONSE = struct.Struct("<BIII")
 """Opcode 3, service id, call id, length of the encoding's name."""
 _CLIENT_MESSAGE = struct.Struct("<BI")
 _SERVICE_REQUEST = struct.Struct("<BIII")
+
+
+def is_offered(subprotocols: Iterable[str]) -> bool:
+    """Return whether a client offers Foxglove's protocol in its headers ``Sec-WebSocket-Protocol``."""
+    return any(each.strip() in SUBPROTOCOLS for each in ",".join(subprotocols).split(","))
 
 
 class ClientMessage(NamedTuple):

@@ -1,0 +1,52 @@
+"""Pages that the user of the server disconnected, and that are refused when they connect again."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request
+
+__all__ = ["KeptOut"]
+
+_MAX_PAGES = 100
+
+
+class _Visitor(NamedTuple):
+    host: str
+    origin: str
+    user_agent: str
+
+
+class KeptOut:
+    """Recognizes pages by their address, origin and User-Agent. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._visitors: dict[int, _Visitor] = {}
+
+    def add(self, page_id: int, connection: ServerConnection) -> None:
+        """Refuse a page from now on; of more than 100 pages the first one is forgotten."""
+        with self._lock:
+            self._visitors[page_id] = _visitor(connection, connection.request)
+            while len(self._visitors) > _MAX_PAGES:
+                del self._visitors[next(iter(self._visitors))]
+
+    def remove(self, page_id: int) -> None:
+        """Refuse a page no longer."""
+        with self._lock:
+            self._visitors.pop(page_id, None)
+
+    def refuses(self, connection: ServerConnection, request: Request) -> bool:
+        """Return whether a page that asks to connect was added."""
+        with self._lock:
+            return _visitor(connection, request) in self._visitors.values()
+
+
+def _visitor(connection: ServerConnection, request: Request | None) -> _Visitor:
+    address = connection.remote_address
+    headers = {} if request is None else request.headers
+    host = str(address[0]) if isinstance(address, tuple) else str(address)
+    return _Visitor(host, headers.get("Origin", ""), headers.get("User-Agent", ""))
