@@ -1,33 +1,30 @@
-"""NEP: messages between robots, programs and people.
+"""NEP: publish/subscribe messaging, services and shared state for robots and programs.
 
-import nep
+    import nep
 
-node = nep.node("python_sender")
-pub = node.new_pub("example", "json")
-pub.publish({"message": "hello"})
+    node = nep.node("python_sender")
+    pub = node.new_pub("example", "json")
+    pub.publish({"message": "hello"})
 
-Its public names are in `nep.public`, which is imported when any of them is first asked for.
+The public names are listed in `nep.public`, which is imported at the first access to any of them.
 """
 
 import importlib
 
 TYPE_CHECKING = False
-"""As `typing` has it, whose import would take ten times as long as this module."""
+"""Replaces `typing.TYPE_CHECKING`: importing `typing` takes ten times as long as this module."""
 
 if TYPE_CHECKING:
     from nep import geometry as geometry
     from nep import sensor as sensor
-    from nep.public import *  # noqa: F403 - the names are told once, there
+    from nep.public import *  # noqa: F403 - the list of public names is kept in nep.public only
     from nep.version import __version__ as __version__
 
 
 def _imported(name: str) -> object:
-    """What the package has under this name; all of it is imported when anything of it is first asked for.
-
-    So `import nep` takes a millisecond, and the command `nep`, which begins with it, can be told what Ctrl+C
-    does before it imports the rest. All at once: a program that has opened all the files that it may, or has
-    left its folder, must not find a part of nep missing an hour later. Raises `AttributeError`.
-    """
+    # Lazy import: `import nep` takes 1 ms, so that the `nep` command can install its Ctrl+C handler before
+    # the slow imports. All public names are imported together: a later import would fail in a program that
+    # has reached its open-file limit or changed its working directory.
     if name == "__version__":
         globals()[name] = importlib.import_module("nep.version").__version__
     elif name == "__all__" or not (name.startswith("_") or _is_submodule(name)):
@@ -38,14 +35,14 @@ def _imported(name: str) -> object:
         original = None if name.startswith("_") else importlib.import_module("nep.nodes.original")
         if original is not None and (
             hint := original.original_hint(name)
-        ):  # without an object, so that Python doesn't suggest a similar name
+        ):  # obj=None keeps Python from suggesting a similar name
             raise AttributeError(hint, name=name, obj=None)
         raise AttributeError(f"module 'nep' has no attribute '{name}'")
     return globals()[name]
 
 
 def _is_submodule(name: str) -> bool:
-    """Whether it is `nep.errors` or the like, which `import nep` alone has always given; it is imported."""
+    # `import nep` gives access to submodules such as `nep.errors`; importing them here keeps that.
     whole = f"nep.{name}"
     try:
         importlib.import_module(whole)
@@ -61,5 +58,5 @@ def __dir__() -> list[str]:
     return sorted(globals())
 
 
-if not TYPE_CHECKING:  # which would take any name for one of ours
+if not TYPE_CHECKING:  # type checkers would accept any name
     __getattr__ = _imported

@@ -1,4 +1,4 @@
-"""`python -m nep`: the same as the command `nep`."""
+"""Entry point of `python -m nep`, which is the `nep` command."""
 
 from __future__ import annotations
 

@@ -1,34 +1,34 @@
-"""The errors of nep. Attributes first; the sentence is made from them.
+"""Exceptions of nep. Each has its details as attributes; the message is formatted from them.
 
     NepError
-    ├── WaitTimeoutError        nothing came within a time limit
-    │   ├── ServiceTimeoutError     a server did not answer a call in time
-    │   └── NoServerError           a service had no server
-    ├── ServiceError            a server's callback raised
-    ├── ServerGoneError         a server ended while it was called
-    ├── ClosedError             the object was closed before
-    ├── ParameterError          a parameter cannot have a value, or there is none
-    ├── NoValueError            a blackboard has nothing of this key
-    ├── BadKeyError             a key that a blackboard cannot have
-    ├── BadValueError           a value that a blackboard cannot have
-    ├── BadTopicError           a topic name that the grammar refuses
-    ├── BadNameError            a node's name that the grammar refuses
-    ├── UnknownBackendError     no back end has this name
-    ├── BackendUnavailableError the back end's package is not installed
-    ├── PluginsMissingError     a plug-in package is empty (a frozen build that forgot it)
-    ├── MasterUnreachable       no master answers
-    ├── RequestRefusedError     the master, or a server, answered that it will not do it
-    ├── AddressInUseError       another program holds the address
-    ├── TooManyFilesError       this process may not open more files
-    ├── EncodeError             a payload cannot become bytes
-    ├── DecodeError             bytes cannot become a payload
-    │   └── WireError               parts that are no message of the native wire
-    ├── RecordingError          a recording cannot be written or read
-    └── RecordingsUnavailableError  what recordings need is not installed
+    ├── WaitTimeoutError        a time limit passed
+    │   ├── ServiceTimeoutError     a server did not reply in time
+    │   └── NoServerError           a service has no server
+    ├── ServiceError            the callback of a server raised an exception
+    ├── ServerGoneError         a server stopped during a call
+    ├── ClosedError             the object is closed
+    ├── ParameterError          invalid value of a parameter, or unknown parameter
+    ├── NoValueError            a blackboard has no (recent) value for a key
+    ├── BadKeyError             invalid key of a blackboard
+    ├── BadValueError           value that a blackboard can't store
+    ├── BadTopicError           invalid topic name
+    ├── BadNameError            invalid node name
+    ├── UnknownBackendError     unknown back end
+    ├── BackendUnavailableError a package that the back end needs is not installed
+    ├── PluginsMissingError     a plug-in package is empty (left out of a frozen program)
+    ├── MasterUnreachable       no master replies
+    ├── RequestRefusedError     the master or a server rejected a request
+    ├── AddressInUseError       another program uses the address
+    ├── TooManyFilesError       the process reached its open-file limit
+    ├── EncodeError             a payload can't be encoded
+    ├── DecodeError             received bytes can't be decoded
+    │   └── WireError               received frames violate the native wire format
+    ├── RecordingError          a recording can't be written or read
+    └── RecordingsUnavailableError  packages that recordings need are not installed
 
-Beside them `WrongTypeError`, for an argument that is refused at the call.
+`WrongTypeError` is raised for arguments of a wrong type; it is a `TypeError` and a `ValueError`.
 
-Every sentence is lower case, without full stop, with values in quotes and the next step after a semicolon.
+Messages are in lower case, without a full stop, quote values, and name the next step after a semicolon.
 """
 
 from __future__ import annotations
@@ -72,11 +72,11 @@ __all__ = [
 
 _MAX_WORD_LENGTH = 200
 _LONGEST = 500
-"""Letters of a reason that somebody else gave."""
+"""Maximum length of a reason received from another program."""
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """`did you mean 'zeromq'?` for the nearest known word, else `known are 'a', 'b'`."""
+    """Return `did you mean 'zeromq'?` for a similar known word, or `known are 'a', 'b'` without one."""
     near = nearest(word, known)
     if near is not None:
         return _("did you mean '{near}'?").format(near=near)
@@ -84,18 +84,29 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
 
 
 def nearest(word: str, known: Sequence[str]) -> str | None:
-    """The known word that is nearly this one."""
-    if len(word) > _MAX_WORD_LENGTH:  # comparing takes time with the square of the length
+    """Return the known word most similar to `word`, or None when no word is similar."""
+    if len(word) > _MAX_WORD_LENGTH:  # the cost of the comparison grows with the square of the length
         return None
     return next(iter(get_close_matches(word, known, n=1)), None)
 
 
 class NepError(Exception):
-    """The root of all errors that nep raises on purpose."""
+    """Base class of all exceptions that nep raises.
+
+    try:
+        node.new_pub("position")
+    except nep.NepError as error:
+        print(error)
+    """
 
 
 class WaitTimeoutError(NepError):
-    """`what` did not happen within `timeout_s` seconds."""
+    """A time limit passed before an event happened.
+
+    Attributes:
+        what: The expected event, for the message.
+        timeout_s: The time limit in seconds.
+    """
 
     def __init__(self, what: str, timeout_s: float) -> None:
         self.what: str = what
@@ -104,7 +115,12 @@ class WaitTimeoutError(NepError):
 
 
 class ServiceTimeoutError(WaitTimeoutError):
-    """The server of `service` did not answer within `timeout_s` seconds; it may still carry the call out."""
+    """The server did not reply in time. It may still be executing the call.
+
+    Attributes:
+        service: The name of the service.
+        timeout_s: The time limit in seconds.
+    """
 
     def __init__(self, service: str, timeout_s: float) -> None:
         self.service = service
@@ -112,9 +128,13 @@ class ServiceTimeoutError(WaitTimeoutError):
 
 
 class NoServerError(WaitTimeoutError):
-    """No server for `service` within `timeout_s` seconds; `known` are the services that have one.
+    """No server of the service was found in time.
 
-    `address` is where it was expected, "" when a master tells.
+    Attributes:
+        service: The name of the service.
+        timeout_s: The time limit in seconds.
+        known: Names of the services that have a server.
+        address: The expected fixed address, or "" for services registered at a master.
     """
 
     def __init__(self, service: str, timeout_s: float, known: Sequence[str] = (), address: str = "") -> None:
@@ -141,7 +161,13 @@ class NoServerError(WaitTimeoutError):
 
 
 class ParameterError(NepError, ValueError):
-    """The parameter `name` cannot be `value`, as a program writes it ("": none is meant), for `reason`."""
+    """A parameter does not exist, or can't have the requested value.
+
+    Attributes:
+        name: The name of the parameter.
+        value: The rejected value as Python source, or "" when no value is involved.
+        reason: The reason for the rejection.
+    """
 
     def __init__(self, name: str, value: str, reason: str) -> None:
         self.name = name
@@ -157,7 +183,12 @@ class ParameterError(NepError, ValueError):
 
 
 class NoValueError(NepError, KeyError):
-    """A blackboard has nothing of `key`, or nothing that is young enough; `known` are keys that it has."""
+    """A blackboard has no value for a key, or none that is recent enough. Also a `KeyError`.
+
+    Attributes:
+        key: The requested key.
+        known: Existing keys.
+    """
 
     def __init__(self, key: str, known: Sequence[str] = ()) -> None:
         self.key = key
@@ -173,11 +204,16 @@ class NoValueError(NepError, KeyError):
         )
 
     def __str__(self) -> str:
-        return str(self.args[0])  # and not in quotes, as a `KeyError` has it
+        return str(self.args[0])  # `KeyError` would show the message in quotes
 
 
 class BadKeyError(NepError, ValueError):
-    """`key` cannot be the key of a blackboard, for `reason`."""
+    """The key is invalid on a blackboard. Also a `ValueError`.
+
+    Attributes:
+        key: The rejected key.
+        reason: The reason for the rejection.
+    """
 
     def __init__(self, key: str, reason: str) -> None:
         self.key = key
@@ -188,7 +224,12 @@ class BadKeyError(NepError, ValueError):
 
 
 class BadValueError(NepError, ValueError):
-    """A blackboard cannot keep the value of `key`, for `reason`."""
+    """A blackboard can't store the value. Also a `ValueError`.
+
+    Attributes:
+        key: The key of the rejected value.
+        reason: The reason for the rejection.
+    """
 
     def __init__(self, key: str, reason: str) -> None:
         self.key = key
@@ -201,7 +242,13 @@ class BadValueError(NepError, ValueError):
 
 
 class ServiceError(NepError):
-    """The server of `service` raised an error of class `kind`; `reason` is its sentence."""
+    """The callback of a server raised an exception.
+
+    Attributes:
+        service: The name of the service.
+        kind: The class name of the server's exception.
+        reason: The message of the server's exception.
+    """
 
     def __init__(self, service: str, kind: str, reason: str) -> None:
         self.service = service
@@ -217,7 +264,11 @@ class ServiceError(NepError):
 
 
 class ServerGoneError(NepError):
-    """The server of `service` ended while a call was under way: nobody knows whether it was carried out."""
+    """The server stopped during a call. It is unknown whether the call was executed.
+
+    Attributes:
+        service: The name of the service.
+    """
 
     def __init__(self, service: str) -> None:
         self.service = service
@@ -230,9 +281,11 @@ class ServerGoneError(NepError):
 
 
 class ClosedError(NepError):
-    """The object `what` (such as "subscriber 'example'") was closed before.
+    """The object is closed.
 
-    `is_forked`: it belongs to the process that forked this one.
+    Attributes:
+        what: A description of the object, such as "subscriber 'example'".
+        is_forked: True in a forked child process, when the object belongs to the parent process.
     """
 
     def __init__(self, what: str, *, is_forked: bool = False) -> None:
@@ -250,7 +303,12 @@ class ClosedError(NepError):
 
 
 class BadTopicError(NepError, ValueError):
-    """`topic` breaks the grammar of topic names for `reason`."""
+    """The topic name is invalid. Also a `ValueError`.
+
+    Attributes:
+        topic: The rejected name.
+        reason: The rule that it breaks.
+    """
 
     def __init__(self, topic: str, reason: str) -> None:
         self.topic = topic
@@ -263,7 +321,12 @@ class BadTopicError(NepError, ValueError):
 
 
 class BadNameError(NepError, ValueError):
-    """`name` cannot be the name of a node, for `reason`."""
+    """The node name is invalid. Also a `ValueError`.
+
+    Attributes:
+        name: The rejected name.
+        reason: The rule that it breaks.
+    """
 
     def __init__(self, name: str, reason: str) -> None:
         self.name = name
@@ -276,7 +339,12 @@ class BadNameError(NepError, ValueError):
 
 
 class UnknownBackendError(NepError):
-    """No back end is called `name`; `known` are the names there are."""
+    """The requested back end does not exist.
+
+    Attributes:
+        name: The requested name.
+        known: Names of all back ends.
+    """
 
     def __init__(self, name: str, known: Sequence[str]) -> None:
         self.name = name
@@ -289,7 +357,12 @@ class UnknownBackendError(NepError):
 
 
 class BackendUnavailableError(NepError):
-    """The back end `name` needs something that is not installed; `needs` says how to get it."""
+    """A package that the back end needs is not installed.
+
+    Attributes:
+        name: The name of the back end.
+        needs: Instructions for the installation.
+    """
 
     def __init__(self, name: str, needs: str) -> None:
         self.name = name
@@ -298,7 +371,12 @@ class BackendUnavailableError(NepError):
 
 
 class PluginsMissingError(NepError):
-    """No module of `package` binds `attribute`: the package is empty or was not shipped."""
+    """No module of the plug-in package binds the attribute: the package is empty or was not shipped.
+
+    Attributes:
+        package: The dotted name of the package.
+        attribute: The name that plug-ins bind.
+    """
 
     def __init__(self, package: str, attribute: str) -> None:
         self.package = package
@@ -311,8 +389,14 @@ class PluginsMissingError(NepError):
         )
 
 
-class MasterUnreachable(NepError):  # noqa: N818 - the name that the specification of the wire gives it
-    """No master answered at `address` within `waited_s` seconds; not `is_known`: nobody knows that name."""
+class MasterUnreachable(NepError):  # noqa: N818 - the name is part of the wire specification
+    """No master replied, or the master's host name can't be resolved.
+
+    Attributes:
+        address: The address of the master.
+        waited_s: The time waited for a reply, in seconds.
+        is_known: False when the host name can't be resolved.
+    """
 
     def __init__(self, address: str, waited_s: float, *, is_known: bool = True) -> None:
         self.address = address
@@ -334,7 +418,11 @@ class MasterUnreachable(NepError):  # noqa: N818 - the name that the specificati
 
 
 class RequestRefusedError(NepError):
-    """The master, or a server, refused a request; `reason` is its sentence."""
+    """The master or a server rejected a request.
+
+    Attributes:
+        reason: The reason given in the reply.
+    """
 
     def __init__(self, reason: str) -> None:
         self.reason = escaped(shortened(reason, _LONGEST))
@@ -342,7 +430,11 @@ class RequestRefusedError(NepError):
 
 
 class AddressInUseError(NepError):
-    """`address` is held by another program, or is not an address of this computer; ":*" is any port of it."""
+    """The address is used by another program, or does not belong to this computer.
+
+    Attributes:
+        address: The address; "HOST:*" when no port of the host is free.
+    """
 
     def __init__(self, address: str, *, is_own: bool = True) -> None:
         self.address = address
@@ -368,7 +460,13 @@ class AddressInUseError(NepError):
 
 
 class TooManyFilesError(NepError):
-    """There is no room for `what`: this process has `opened` of `limit` files open (None: not known)."""
+    """The process has reached its limit of open files and sockets.
+
+    Attributes:
+        what: The object that could not be opened.
+        opened: The number of open files, or None if unknown.
+        limit: The limit of open files, or None if unknown.
+    """
 
     def __init__(self, what: str, opened: int | None, limit: int | None) -> None:
         self.what = what
@@ -384,9 +482,13 @@ class TooManyFilesError(NepError):
 
 
 class EncodeError(NepError, ValueError):
-    """A payload of Python type `kind` cannot become `codec` bytes, for `reason`.
+    """A payload can't be encoded as its message type. Also a `ValueError`.
 
-    `place` is where in the payload, for codecs that know; the reason names it, too.
+    Attributes:
+        codec: The name of the codec, such as "json".
+        kind: The Python type of the payload.
+        reason: The reason for the failure.
+        place: The path to the offending value, such as "pose.x", or "" if unknown.
     """
 
     def __init__(self, codec: str, kind: str, reason: str, place: str = "") -> None:
@@ -400,12 +502,18 @@ class EncodeError(NepError, ValueError):
 
 
 class DecodeError(NepError, ValueError):
-    """`size_bytes` bytes are no `codec` payload, for `reason`."""
+    """Received bytes can't be decoded. Also a `ValueError`.
+
+    Attributes:
+        codec: The name of the codec, such as "json".
+        size_bytes: The size of the received data.
+        reason: The reason for the failure.
+    """
 
     def __init__(self, codec: str, size_bytes: int, reason: str) -> None:
         self.codec = codec
         self.size_bytes = size_bytes
-        self.reason = reason = escaped(shortened(reason, _LONGEST))  # it may repeat what a stranger wrote
+        self.reason = reason = escaped(shortened(reason, _LONGEST))  # may quote untrusted input
         super().__init__(
             _("cannot decode {size_bytes} bytes as '{codec}'; {reason}").format(
                 size_bytes=size_bytes, codec=codec, reason=reason
@@ -414,9 +522,10 @@ class DecodeError(NepError, ValueError):
 
 
 class WireError(DecodeError):
-    """Parts or a request that violate the native wire's specification.
+    """Received frames or a request violate the specification of the native wire (docs/wire.md).
 
-    `code` is independent of language and version: see the table of codes in docs/wire.md.
+    Attributes:
+        code: The error code, which is independent of language and version; see the table in docs/wire.md.
     """
 
     def __init__(self, reason: str, size_bytes: int = 0, *, code: str = "malformed") -> None:
@@ -425,7 +534,12 @@ class WireError(DecodeError):
 
 
 class RecordingError(NepError):
-    """The recording at `path` cannot be used, for `reason`."""
+    """A recording can't be written or read.
+
+    Attributes:
+        path: The path of the file.
+        reason: The reason for the failure.
+    """
 
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
@@ -436,11 +550,15 @@ class RecordingError(NepError):
 
 
 class RecordingTooLargeError(RecordingError):
-    """Reading the recording at `path` would take more work than is allowed; `reason` says what."""
+    """Reading the recording would exceed a limit of size or work; `reason` names it."""
 
 
 class RecordingsUnavailableError(NepError):
-    """The packages that recordings need are not installed; `needs` says how to get them."""
+    """Packages that recordings need are not installed.
+
+    Attributes:
+        needs: Instructions for the installation.
+    """
 
     def __init__(self, needs: str) -> None:
         self.needs = needs
@@ -448,4 +566,4 @@ class RecordingsUnavailableError(NepError):
 
 
 class WrongTypeError(TypeError, ValueError):
-    """An argument of a wrong type: a `ValueError` as every wrong argument, and what Python calls it."""
+    """An argument has the wrong type. A `TypeError` and, like every invalid argument, a `ValueError`."""

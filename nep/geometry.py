@@ -1,6 +1,6 @@
-"""Where things are and how they move: typed messages with the fields that ROS gives them (docs/types.md).
+"""Geometry messages with the fields of ROS, for typed topics (docs/types.md).
 
-Metres, radians and seconds; x is ahead, y to the left, z up. Imported when it is first used.
+Units are metres, radians and seconds; x points forward, y to the left and z up (REP 103).
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ _NS = 1_000_000_000
 
 @dataclass
 class Time:
-    """A moment: seconds since 1970, and nanoseconds from 0 to 999999999."""
+    """Time stamp: seconds since 1970 (UTC) and nanoseconds (0 to 999999999)."""
 
     MSG_TYPE: ClassVar[str] = "builtin_interfaces/Time"
 
-    sec: int = field(default=0, metadata={"nep.other_name": "secs"})  # as ROS 1 calls them
+    sec: int = field(default=0, metadata={"nep.other_name": "secs"})  # ROS 1 uses other names
     nanosec: int = field(default=0, metadata={"nep.other_name": "nsecs"})
 
     @classmethod
     def now(cls) -> Self:
-        """The moment of this call, by the clock of this computer."""
+        """Return the current time of this computer's clock."""
         return cls.from_ns(time.time_ns())
 
     @classmethod
     def from_ns(cls, stamp_ns: int) -> Self:
-        """Of nanoseconds since 1970, as `Message.stamp_ns` has them."""
+        """Return the time stamp of nanoseconds since 1970, such as `Message.stamp_ns`."""
         return cls(*divmod(stamp_ns, _NS))
 
     def to_ns(self) -> int:
-        """Nanoseconds since 1970."""
+        """Return the nanoseconds since 1970."""
         return self.sec * _NS + self.nanosec
 
 
 @dataclass
 class Header:
-    """When something was measured, and in which frame of coordinates."""
+    """Time stamp and coordinate frame of a measurement."""
 
     MSG_TYPE: ClassVar[str] = "std_msgs/Header"
 
@@ -56,7 +56,7 @@ class Header:
 
 @dataclass
 class Vector3:
-    """A direction with a length."""
+    """Vector in three dimensions."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Vector3"
 
@@ -67,7 +67,7 @@ class Vector3:
 
 @dataclass
 class Point:
-    """A place."""
+    """Point in three dimensions, in metres."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Point"
 
@@ -78,7 +78,7 @@ class Point:
 
 @dataclass
 class Quaternion:
-    """A rotation. Without arguments: none."""
+    """Rotation as a unit quaternion. The default is the identity."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Quaternion"
 
@@ -89,7 +89,13 @@ class Quaternion:
 
     @classmethod
     def from_euler(cls, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Self:
-        """A rotation about the fixed axes x, y and z, one after the other, in radians."""
+        """Return the rotation about the fixed axes x, y and z, in this order.
+
+        Args:
+            roll: Rotation about x in radians.
+            pitch: Rotation about y in radians.
+            yaw: Rotation about z in radians.
+        """
         cr, sr = math.cos(roll / 2), math.sin(roll / 2)
         cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
         cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -101,10 +107,12 @@ class Quaternion:
         )
 
     def to_euler(self) -> tuple[float, float, float]:
-        """(roll, pitch, yaw) in radians, pitch from -pi/2 to pi/2; any length but 0 will do.
+        """Return (roll, pitch, yaw) in radians; pitch is from -pi/2 to pi/2.
 
-        Straight up or down roll and yaw turn about the same axis: roll is 0 there. Raises `ValueError` for a
-        length of 0, or what is no number.
+        The quaternion need not be normalized. At a pitch of ±pi/2 (gimbal lock) roll is 0.
+
+        Raises:
+            ValueError: The length is 0 or not finite.
         """
         length = math.hypot(self.x, self.y, self.z, self.w)
         if not 0.0 < length < math.inf:
@@ -125,7 +133,7 @@ class Quaternion:
 
 @dataclass
 class Pose:
-    """A place, and how what is there is turned."""
+    """Position and orientation."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Pose"
 
@@ -135,7 +143,7 @@ class Pose:
 
 @dataclass
 class PoseStamped:
-    """A pose, when it was, and in which frame of coordinates."""
+    """Pose with time stamp and coordinate frame."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/PoseStamped"
 
@@ -145,7 +153,7 @@ class PoseStamped:
 
 @dataclass
 class Twist:
-    """How fast something moves, in m/s, and turns, in rad/s."""
+    """Linear velocity in m/s and angular velocity in rad/s."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Twist"
 
@@ -155,7 +163,7 @@ class Twist:
 
 @dataclass
 class Transform:
-    """From one frame of coordinates to another."""
+    """Transform between two coordinate frames."""
 
     MSG_TYPE: ClassVar[str] = "geometry_msgs/Transform"
 

@@ -1,4 +1,4 @@
-"""The public names of nep, all of them and only once. `nep` imports this module at the first use of any."""
+"""Public names of nep. `nep` imports this module at the first access to any of them."""
 
 from nep.backends.connection import Configuration as Configuration
 from nep.backends.connection import Direct as Direct
@@ -66,13 +66,13 @@ from nep.protocol.graph_view import SubscriberInfo as SubscriberInfo
 from nep.protocol.graph_view import TopicInfo as TopicInfo
 
 node = Node
-"""A node; see `Node`. The paper's spelling."""
+"""Alias of `Node`, in the spelling of the NEP paper."""
 
 server = FixedServer
-"""A server at a fixed address; see `FixedServer`. The original module's spelling."""
+"""Alias of `FixedServer`, in the original module's spelling."""
 
 client = FixedClient
-"""A client of a server at a fixed address; see `FixedClient`. The original module's spelling."""
+"""Alias of `FixedClient`, in the original module's spelling."""
 
 master = Master
-"""A master; see `Master`."""
+"""Alias of `Master`."""

@@ -1,7 +1,7 @@
-"""What sensors measure, with the fields that ROS gives them, for typed messages (docs/types.md).
+"""Sensor messages with the fields of ROS, for typed topics (docs/types.md).
 
-SI units. Where ROS says that a value which is not measured is NaN, that can be given; over JSON it travels as
-`null` and is NaN again. `nep.sensor` is imported when it is first used.
+SI units. NaN stands for "not measured" where ROS defines it so; over JSON it is sent as `null`. `nep.sensor`
+is imported at its first use.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ __all__ = [
 
 
 def _matrix() -> list[float]:
-    """Three rows of three, all zero: not known."""
+    # 3 x 3 covariance, all zero: unknown
     return [0.0] * 9
 
 
 @dataclass
 class JointState:
-    """Of joints, by their names: where they are, how fast, and with which force. Lists may be left empty."""
+    """Positions, velocities and efforts of joints by name, as sensor_msgs/JointState. Lists may be empty."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/JointState"
 
@@ -43,7 +43,10 @@ class JointState:
 
 @dataclass
 class Imu:
-    """How something is turned, turns, and is accelerated. A covariance that begins with -1: not measured."""
+    """Orientation, angular velocity and linear acceleration, as sensor_msgs/Imu.
+
+    A covariance whose first element is -1 marks a value that is not measured.
+    """
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Imu"
 
@@ -58,7 +61,7 @@ class Imu:
 
 @dataclass
 class LaserScan:
-    """Distances in one plane, from `angle_min` to `angle_max`, against the clock."""
+    """Planar range scan from `angle_min` to `angle_max`, counterclockwise, as sensor_msgs/LaserScan."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/LaserScan"
 
@@ -76,7 +79,7 @@ class LaserScan:
 
 @dataclass
 class Range:
-    """One distance."""
+    """Single range measurement, as sensor_msgs/Range."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Range"
     ULTRASOUND: ClassVar[int] = 0
@@ -92,7 +95,10 @@ class Range:
 
 @dataclass
 class BatteryState:
-    """A battery. `percentage` is from 0 to 1; `current` is below 0 while it is emptied."""
+    """Battery state, as sensor_msgs/BatteryState.
+
+    `percentage` is from 0 to 1; `current` is negative while discharging.
+    """
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/BatteryState"
     POWER_SUPPLY_STATUS_UNKNOWN: ClassVar[int] = 0
@@ -121,7 +127,7 @@ class BatteryState:
 
 @dataclass
 class NavSatStatus:
-    """Whether satellites tell where it is, and those of which system."""
+    """Fix status and satellite systems in use, as sensor_msgs/NavSatStatus."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatStatus"
     STATUS_NO_FIX: ClassVar[int] = -1
@@ -139,7 +145,7 @@ class NavSatStatus:
 
 @dataclass
 class NavSatFix:
-    """A place on Earth: degrees of WGS 84, and metres above its ellipsoid."""
+    """Position in degrees of WGS 84, altitude in metres above its ellipsoid, as sensor_msgs/NavSatFix."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatFix"
     COVARIANCE_TYPE_UNKNOWN: ClassVar[int] = 0
@@ -158,7 +164,7 @@ class NavSatFix:
 
 @dataclass
 class Temperature:
-    """In degrees Celsius; a variance of 0 is not known."""
+    """Temperature in degrees Celsius, as sensor_msgs/Temperature; a variance of 0 is unknown."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Temperature"
 

@@ -1,7 +1,7 @@
-"""Text of somebody else: which letters a name may not have, and how to show a text that has them.
+"""Sanitize untrusted text for names and messages.
 
-A letter *controls* when it does something instead of being seen: it moves a cursor or clears a screen (C0,
-DEL, C1), turns the direction of what is written around it, begins a new line, hides, or is half a letter.
+A *control character* has an effect instead of a glyph: it moves the cursor or clears the screen (C0, DEL,
+C1), changes the text direction, starts a new line, is invisible, or is half a surrogate pair.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from nep.i18n import _
 __all__ = ["bounded_str", "control_in", "escaped", "harmless", "quotable", "shortened"]
 
 _QUOTED = 200
-"""So many letters of somebody's word are in a sentence."""
+"""Default maximum length of a quoted value."""
 
 _MAX_SHOWN_DEPTH = 8
-_MAX_INT_BITS = 1_000  # str() of a longer one takes time with the square of its digits, or raises ValueError
+_MAX_INT_BITS = 1_000  # str() of larger ints takes quadratic time, or raises ValueError
 
 _CONTROLS = (
     "\x00-\x1f\x7f-\x9f"  # C0, DEL and C1: cursor, colours, screen, title, clipboard
-    "\u061c\u200e\u200f\u202a-\u202e\u2066-\u206f"  # the direction of writing
-    "\u2028\u2029"  # a new line, a new paragraph
-    "\u200b\u2060-\u2065\ufeff\ufff9-\ufffb"  # nothing to be seen: two names would look the same
-    "\ud800-\udfff"  # half a letter: no encoding has a form for it
+    "\u061c\u200e\u200f\u202a-\u202e\u2066-\u206f"  # text direction
+    "\u2028\u2029"  # line and paragraph separators
+    "\u200b\u2060-\u2065\ufeff\ufff9-\ufffb"  # invisible: two different names would look the same
+    "\ud800-\udfff"  # lone surrogates can't be encoded
 )
 _CONTROL = re.compile(f"[{_CONTROLS}]")
 _CONTROL_IN_LINES = re.compile(f"(?![\n\t])[{_CONTROLS}]")
@@ -33,23 +33,27 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def control_in(text: str) -> str:
-    r"""The first letter of `text` that controls, as one can read it (`\x1b`); "" when there is none."""
+    r"""Return the first control character of `text`, escaped (`\x1b`), or "" if it has none."""
     found = _CONTROL.search(text)
     return "" if found is None else _readable(found)
 
 
 def escaped(text: str, *, lines: bool = False) -> str:
-    r"""`text` with each letter that controls written as `\x1b` or `\u202e`. Can always be encoded as UTF-8.
+    r"""Escape the control characters of untrusted text as `\x1b` or `\u202e`. The result is valid UTF-8.
 
-    With `lines` new lines and tabs stay: for a text of several lines, where nobody can forge one.
+    Args:
+        text: The text.
+        lines: Keep newlines and tabs, where a forged line can't be mistaken for another message.
     """
     return (_CONTROL_IN_LINES if lines else _CONTROL).sub(_readable, text)
 
 
 def harmless(text: str, *, lines: bool = False) -> str:
-    """`text` without the letters that control, for sentences of somebody else between our own.
+    """Remove the control characters of untrusted text.
 
-    New lines and tabs become spaces, or stay with `lines`.
+    Args:
+        text: The text.
+        lines: Keep newlines and tabs instead of replacing them by spaces.
     """
     if lines:
         return _CONTROL_IN_LINES.sub("", text)
@@ -57,25 +61,25 @@ def harmless(text: str, *, lines: bool = False) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """`text` as it is, or its first `most` letters and how many there are."""
+    """Return `text`, or its first `most` characters followed by its length."""
     if len(text) <= most:
         return text
     return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
 
 
 def bounded_str(value: object, max_length: int = _QUOTED) -> str:
-    r"""Return `str(value)`, shortened to `max_length` characters, of a value that a stranger may have sent.
+    r"""Return `str(value)` of an untrusted value, shortened to `max_length` characters.
 
-    Never raises, whatever the type, size or nesting, and takes time in proportion to `max_length`, not to
-    the value. The text can be encoded as UTF-8: half a surrogate pair is written as `\udc80`. An exception
-    without words is its class's name.
+    Never raises, whatever the type, size or nesting; the cost depends on `max_length`, not on the value. The
+    result is valid UTF-8: lone surrogates are written as `\udc80`. An exception without a message becomes its
+    class name.
     """
     text = shortened(value, max_length) if isinstance(value, str) else _rendered(value, max_length)
     return _SURROGATE.sub(_readable, text)
 
 
 def quotable(value: object) -> str:
-    """Return a stranger's word or value as a sentence may quote it: see `bounded_str` and `escaped`."""
+    """Return an untrusted value as it may be quoted in a message: see `bounded_str` and `escaped`."""
     return escaped(bounded_str(value))
 
 
@@ -86,7 +90,7 @@ def _rendered(value: object, max_length: int) -> str:
             text += piece
             if len(text) > max_length:
                 return text[:max_length] + "…"
-    except Exception:  # noqa: BLE001 - a container of somebody's own class, or no stack left
+    except Exception:  # noqa: BLE001 - a container of any class, or stack exhaustion
         text = ""
     return text or type(value).__name__
 
@@ -116,7 +120,7 @@ def _pieces(value: object, max_length: int, depth: int) -> Iterator[str]:
 def _str_of(value: object) -> str:
     try:
         text = str(value)
-    except BaseException:  # noqa: BLE001 - the words of a class of somebody's own are their code
+    except BaseException:  # noqa: BLE001 - __str__ of any class may raise anything
         text = ""
     return text or type(value).__name__
 

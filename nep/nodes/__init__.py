@@ -1,4 +1,4 @@
-"""Nodes with their publishers and subscribers: what programs use, made by `nep.node`.
+"""Nodes, publishers and subscribers: the API that `nep.node` opens.
 
-Payloads go in and come out here; a back end carries the bytes.
+Payloads are encoded and decoded here; a back end transports the bytes.
 """

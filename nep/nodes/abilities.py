@@ -1,4 +1,4 @@
-"""What a back end can do, and a caller asks for: refused in a sentence where it cannot."""
+"""Checks of optional back-end features that a caller requests."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["codec_with", "history_for", "is_pattern_for", "quality_for"]
 
 
 def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | None) -> bool:
-    """Whether a subscriber of `topic` hears all topics that match. Raises `ValueError`."""
+    """Return True if `topic` is a pattern. Raises `ValueError` if the back end has no patterns."""
     if isinstance(configuration, Direct) or not is_pattern(topic):
         return False
     if not backend.has_patterns:
@@ -31,7 +31,7 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
 
 
 def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
-    """The codec of a publisher whose pictures are sent as `image` says. Raises `ValueError`."""
+    """Return `codec` with the image format `image`. Raises `ValueError` for other codecs than "image"."""
     if image is None:
         return codec
     if not isinstance(image, ImageFormat):
@@ -44,7 +44,7 @@ def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
 
 
 def history_for(backend: Backend, history: int, configuration: Configuration) -> int:
-    """`history` itself when a publisher can keep so many messages. Raises `ValueError`."""
+    """Validate a history length and return it. Raises `ValueError` if the back end or wire has no history."""
     within("history", history, 0, MAX_HISTORY)
     is_original = isinstance(configuration, Direct) and configuration.wire == "original"
     if history and (is_original or not backend.has_history):
@@ -58,7 +58,7 @@ def history_for(backend: Backend, history: int, configuration: Configuration) ->
 
 
 def quality_for(backend: Backend, qos: str) -> str:
-    """`qos` itself when it is one of the back end's words. Raises `ValueError`."""
+    """Validate a quality of service and return it. Raises `ValueError`."""
     if qos and not backend.qos:
         raise ValueError(
             _("the back end '{name}' has no qualities of service; leave out qos").format(name=backend.name)

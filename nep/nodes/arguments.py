@@ -1,4 +1,4 @@
-"""Arguments as callers give them. Services check theirs, too: see `nep.system.arguments`."""
+"""Argument validation for nodes; see `nep.system.arguments`."""
 
 from nep.system.arguments import at_least as at_least
 from nep.system.arguments import flag as flag

@@ -1,4 +1,4 @@
-"""Reading in a loop of asyncio. See `Subscriber.receive_async`."""
+"""Reading messages in an asyncio event loop. See `Subscriber.receive_async`."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ else:
 __all__ = ["AsyncMessages", "AsyncReader"]
 
 _TURN = 64
-"""After so many messages that were there at once, other coroutines of the loop have their turn."""
+"""Number of messages read without waiting before other coroutines get a turn."""
 
 
 class AsyncReader:
-    """Reads one subscriber's messages in a loop. `poll` takes the next one, without waiting."""
+    """Reader of one subscriber's messages in an event loop.
+
+    `poll` returns the next message without waiting.
+    """
 
     def __init__(self, transport: SubscriberTransport, poll: Callable[[], Message | None]) -> None:
         self._transport = transport
@@ -33,7 +36,7 @@ class AsyncReader:
         self._at_once = 0
 
     async def receive(self, timeout_s: float | None) -> Message | None:
-        """The next message; None after `timeout_s` seconds. Whoever is cancelled has taken none."""
+        """Return the next message, or None after `timeout_s` seconds. Cancelling it loses no message."""
         self._at_once += 1
         if self._at_once >= _TURN:
             self._at_once = 0
@@ -52,7 +55,7 @@ class AsyncReader:
         return None
 
     async def _rung(self, loop: asyncio.AbstractEventLoop, deadline: float | None) -> None:
-        """Wait until there may be a message, until `deadline` at most."""
+        # Wait until there may be a message, at most until `deadline`.
         rung = loop.create_future()
 
         def call() -> None:
@@ -71,7 +74,7 @@ class AsyncReader:
 
 
 class AsyncMessages:
-    """The messages that `reader` reads, until its subscriber is closed."""
+    """Asynchronous iterator over the messages of a subscriber; ends when it is closed."""
 
     def __init__(self, reader: AsyncReader) -> None:
         self._reader = reader
@@ -84,6 +87,6 @@ class AsyncMessages:
             message = await self._reader.receive(None)
         except ClosedError:
             raise StopAsyncIteration from None
-        if message is None:  # it waits for ever
+        if message is None:  # unreachable: receive(None) waits without limit
             raise StopAsyncIteration
         return message

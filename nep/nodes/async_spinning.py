@@ -1,4 +1,4 @@
-"""Spinning in a loop of asyncio. See `Node.spin_async`."""
+"""Spinning in an asyncio event loop. See `Node.spin_async`."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ else:
 __all__ = ["spin"]
 
 _TURNS = 64
-"""After so many turns without a rest other coroutines of the loop have theirs."""
+"""Number of busy turns before other coroutines get a turn."""
 
 
 async def spin(work: Work, timeout_s: float | None) -> None:
-    """See `Node.spin_async`."""
+    """Run the work of a node until it is stopped or closed, or for `timeout_s` seconds."""
     loop = asyncio.get_running_loop()
     deadline = math.inf if timeout_s is None else work.clock() + timeout_s
     rests = _Rests(work, loop, loop_wait())
@@ -48,10 +48,7 @@ async def spin(work: Work, timeout_s: float | None) -> None:
 
 
 async def _turn(work: Work) -> bool:
-    """Each timer that is due, one call for each server, and one message for each callback that has one.
-
-    Whether there was anything.
-    """
+    # One turn: every due timer, one call per server, one message per callback. Returns False if idle.
     has_called = work.run_servers()
     for timer in work.timers:
         if timer.take_turn():
@@ -75,7 +72,7 @@ async def _until_done(returned: object) -> None:
 
 
 class _Rests:
-    """How a node that spins in a loop waits: what came rings, and so does what others order. A `Wakes`."""
+    """Waiter of a node that spins in an event loop: woken by messages, calls and `wake` (a `Wakes`)."""
 
     def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
         self._work = work
@@ -84,15 +81,15 @@ class _Rests:
         self._rung = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
         self._calls: list[CallQueue] = []
-        """Those of servers, which ring as long as this rests or works."""
+        """Queues of servers that wake this waiter until `end`."""
 
     def wake(self) -> None:
-        """From any thread."""
+        # Thread-safe.
         with suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._rung.set)
 
     async def rest(self, timeout_s: float) -> None:
-        """Until there may be something to do, `timeout_s` at most."""
+        # Wait until there may be work, at most `timeout_s`.
         for subscriber in self._work.waiting:
             if subscriber not in self._watched:
                 call = self._watched[subscriber] = self._caller(subscriber)
@@ -118,7 +115,6 @@ class _Rests:
         return call
 
     def end(self) -> None:
-        """Watch nothing any more."""
         for subscriber, call in self._watched.items():
             self._waits.unwatch(subscriber, call)
         self._watched.clear()

@@ -1,8 +1,8 @@
-"""Executor: callbacks and timers of several nodes in one thread, also of different back ends.
+"""Executor: callbacks and timers of several nodes, also of different back ends, in one thread.
 
-The nodes take turns: in each round every timer that is due is called, and every callback that has a message
-gets one. What comes on one topic comes in order; nobody notes what came first on two of them, so of those
-that have something at the same time none is before its turn, and none waits for more than one round.
+Scheduling is round-robin: in each round every due timer is called, and every callback that has a message gets
+one. Messages of one topic are delivered in order. Their order across topics is not recorded, so no callback
+is served twice before the others, and none waits longer than one round.
 """
 
 from __future__ import annotations
@@ -18,10 +18,17 @@ __all__ = ["spin_all"]
 
 
 def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
-    """Do this work until all nodes are stopped or closed, or for `timeout_s` seconds, in this thread.
+    """Run the work of several nodes in this thread until all are stopped or closed.
 
-    A node that is stopped leaves; the others go on. What a callback raises comes out here. In a child that is
-    forked it raises `ClosedError`. Raises `TooManyFilesError`.
+    A node that is stopped leaves; the others go on. Exceptions of callbacks propagate.
+
+    Args:
+        works: The work of the nodes.
+        timeout_s: Time limit in seconds; None for no limit.
+
+    Raises:
+        ClosedError: This is a forked child process.
+        TooManyFilesError: The process has too many open files.
     """
     if len(works) == 1:
         works[0].spin(timeout_s)
@@ -37,7 +44,8 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - clock())
             if left <= 0.0:
                 return
-            if any([each.run() for each in running if each.is_running]):  # noqa: C419 - all of them
+            # a generator would stop at the first
+            if any([each.run() for each in running if each.is_running]):  # noqa: C419
                 continue
             left = min(left, *(each.due_s for each in running))
             if left > 0.0:
@@ -52,7 +60,7 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
 
 
 def _still_running(works: Sequence[Work]) -> list[Work]:
-    """Those that go on; one that was stopped may be spun by somebody else from now on."""
+    # A stopped node may be spun by another thread from now on.
     running = [each for each in works if each.is_running]
     for each in works:
         if each not in running:
@@ -61,7 +69,7 @@ def _still_running(works: Sequence[Work]) -> list[Work]:
 
 
 def _wait(waits: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
-    """Until one of them has something to do. Nothing stays armed: who reads nothing keeps nobody waiting."""
+    # Disarms everything at the end: a subscriber that is armed but not read would block its publisher.
     entered: list[CallQueue] = []
     try:
         for each in (queue for work in works for queue in work.services.queues):

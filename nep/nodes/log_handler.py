@@ -1,11 +1,11 @@
-"""Log records on the bus: what programs log travels on `/nep/log`, to Studio's Console and to `nep log`.
+"""Log records as messages: published on `/nep/log`, shown by Studio's Console and by `nep log`.
 
     node.log.warning("the battery is at %d %%", 9)
-    logging.getLogger().addHandler(node.log_handler)      # all that this program logs
+    logging.getLogger().addHandler(node.log_handler)      # everything that this program logs
 
-A node that logs errors also keeps the last of them, latched on `/nep/log/errors`, as long as it lives.
-A node that never logs has no thread and no publisher for it. A flood is cut to `RATE_HZ` records a second;
-what is left out is counted, and the count is a record of its own.
+A node that logs errors also publishes the last of them, latched, on `/nep/log/errors`. A node that never logs
+has no thread and no publisher for it. The rate is limited to `RATE_HZ` records per second; dropped records
+are counted, and the count is published as a record.
 """
 
 from __future__ import annotations
@@ -45,15 +45,15 @@ LOG_TOPIC = "/nep/log"
 LOG_TYPE = "nep/log"
 LAST_ERRORS_TOPIC = "/nep/log/errors"
 LAST_ERRORS_TYPE = "nep/log_errors"
-"""A latched list of the last errors of a node, for whoever comes later; there once it has logged one."""
+"""Type of the latched list of a node's last errors, published once the node has logged an error."""
 LAST_ERRORS = 20
 LEVELS = ("debug", "info", "warning", "error", "critical")
-"""The levels of a record, the quietest first."""
+"""Log levels in ascending order of severity."""
 RATE_HZ = 100.0
 BURST = 200
-"""How many records a node may publish at once; after that `RATE_HZ` of them a second."""
+"""Number of records a node may publish at once, before the limit of `RATE_HZ` applies."""
 TEXT_LIMIT = 8_000
-"""Letters of a record's text; a longer one is cut and says so."""
+"""Maximum length of a record's text in characters; longer texts are truncated."""
 
 _ERROR_TEXT_LIMIT = 1_000
 _SHOWN = 2_000
@@ -68,9 +68,17 @@ _ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "de
 
 @dataclass(frozen=True, slots=True)
 class LogRecord:
-    """One record: `level` (one of `LEVELS`), `text`, `name` of the logger, `node`, `stamp_ns` since 1970.
+    """One log record.
 
-    `file` and `line` say where it was logged, `pid` in which process; None where that is not known.
+    Attributes:
+        level: One of `LEVELS`.
+        text: The message.
+        name: The name of the logger.
+        node: The name of the node.
+        stamp_ns: Nanoseconds since 1970.
+        file: The source file, or None if unknown.
+        line: The line number, or None if unknown.
+        pid: The process id, or None if unknown.
     """
 
     level: str
@@ -83,7 +91,7 @@ class LogRecord:
     pid: int | None = None
 
     def to_plain(self) -> dict[str, object]:
-        """The payload of a message; what is not known is left out."""
+        """Return the payload of a message, without unknown fields."""
         plain: dict[str, object] = {
             "level": self.level,
             "text": self.text,
@@ -96,9 +104,11 @@ class LogRecord:
 
     @classmethod
     def from_plain(cls, payload: object, stamp_ns: int | None = None) -> LogRecord:
-        """A payload as a record. Whatever somebody published becomes one: what does not fit is left out.
+        """Return the record of a received payload; invalid fields are ignored.
 
-        `stamp_ns` stands in for a record that has no stamp of its own.
+        Args:
+            payload: Any received value.
+            stamp_ns: The time stamp of a record that has none.
         """
         given = payload if isinstance(payload, Mapping) else {"text": payload}
         text, stamp = given.get("text"), _number(given.get("stamp_ns"))
@@ -115,23 +125,23 @@ class LogRecord:
 
 
 def level_of(given: object) -> str:
-    """The level of that name, also as others write it ("WARN"); "info" for what is none."""
+    """Return the level of a name, also of common aliases such as "WARN"; "info" for unknown names."""
     word = given.strip().lower() if isinstance(given, str) else ""
     word = _ALIASES.get(word, word)
     return word if word in LEVELS else "info"
 
 
 class ShownErrors:
-    """Which errors were shown already: each comes live and again in the lists of the last ones.
+    """Filter of errors that were already shown: each error is received live and in the latched list.
 
-    Keeps the newest 2000.
+    Remembers the newest 2000.
     """
 
     def __init__(self) -> None:
         self._shown: dict[tuple[str, int, str], None] = {}
 
     def is_new(self, record: LogRecord) -> bool:
-        """Whether it is to be shown: any that is no error, and each error once."""
+        """Return True for a record that is not an error, and once for each error."""
         if record.level not in _ERRORS:
             return True
         key = (record.node, record.stamp_ns, record.text[:100])
@@ -143,34 +153,40 @@ class ShownErrors:
         return True
 
     def new_in(self, payload: object) -> list[LogRecord]:
-        """Those in a list of last errors that were not shown yet, oldest first."""
+        """Return the errors of a latched list that were not shown yet, oldest first."""
         given = payload[-LAST_ERRORS:] if isinstance(payload, list) else []
         records = sorted(map(LogRecord.from_plain, given), key=lambda record: record.stamp_ns)
         return [record for record in records if record.stamp_ns and self.is_new(record)]
 
 
 class LogPublisher(Protocol):
-    """What a handler needs of a publisher."""
+    """Publisher as the log handler uses it."""
 
     def publish(self, payload: object) -> None:
         """Publish one payload."""
 
 
 class LogNode(Protocol):
-    """What a node's handler needs of the node."""
+    """Node as the log handler uses it."""
 
     name: str
 
     def new_pub(self, topic: str, msg_type: str, *, latched: bool = False) -> LogPublisher:
-        """A publisher."""
+        """Return a new publisher."""
 
 
 class LogHandler(logging.Handler):
-    """Publishes what is logged, as records of `node`. Never blocks who logs and never raises.
+    """Logging handler that publishes records as messages of a node. Never blocks and never raises.
 
-    `open_publisher` is called in a thread of the handler's own when the first record comes, and again each
-    second until it succeeds; so long records wait, 1000 of them at most. `open_errors` is called when the
-    first error comes, for a latched publisher of the last ones; without it nobody keeps them.
+    Args:
+        node: The name of the node.
+        open_publisher: Called in the handler's thread at the first record, and again every second until it
+            succeeds. Up to 1000 records are queued until then.
+        open_errors: Called at the first error; opens the latched publisher of the last errors. None: not
+            published.
+        rate_hz: Maximum rate of records.
+        burst: Number of records allowed at once.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(
@@ -185,7 +201,7 @@ class LogHandler(logging.Handler):
     ) -> None:
         super().__init__()
         self.logger = logging.Logger(node, logging.INFO)  # noqa: LOG001 - lives as long as its node
-        """What it logs from INFO on is published, and also goes where the program logs."""
+        """Logger whose records from INFO on are published and passed to the root logger."""
         self.logger.parent = logging.getLogger()
         self.logger.addHandler(self)
         self._node = node
@@ -205,13 +221,13 @@ class LogHandler(logging.Handler):
 
     @property
     def left_out(self) -> int:
-        """Records that were left out and not told yet."""
+        """Number of dropped records not yet reported."""
         return self._left_out
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand one record over to the handler's thread."""
+        """Queue a record for the handler's thread."""
         if getattr(record, _OWN, None) is self or threading.current_thread() is self._thread:
-            return  # it came twice (by the node's logger and by the root), or is about our own publishing
+            return  # received twice (from the node's logger and the root), or caused by publishing itself
         setattr(record, _OWN, self)
         with self._has_work:
             if self._is_closed:
@@ -221,7 +237,7 @@ class LogHandler(logging.Handler):
                 return
         try:
             plain = self._plain(record)
-        except Exception:  # noqa: BLE001 - a program must not end because of how it logs
+        except Exception:  # noqa: BLE001 - a logging error must not end the program
             self.handleError(record)
             return
         with self._has_work:
@@ -230,14 +246,18 @@ class LogHandler(logging.Handler):
                 return
             try:
                 self._begin()
-            except RuntimeError:  # the interpreter is ending (from 3.12 on), or no thread can be had
+            # the interpreter is shutting down (Python 3.12+), or no thread can be started
+            except RuntimeError:
                 self._left_out += 1
                 return
             self._waiting.append(plain)
             self._has_work.notify()
 
     def close(self, timeout_s: float = _FLUSH_S) -> None:
-        """Publish what waits, within `timeout_s`; what is logged later is dropped. May be called twice."""
+        """Publish queued records within `timeout_s` seconds and stop. Later records are dropped.
+
+        Idempotent.
+        """
         with self._has_work:
             self._is_closed = True
             thread = self._thread
@@ -247,17 +267,17 @@ class LogHandler(logging.Handler):
         super().close()
 
     def forked(self) -> None:
-        """In a child that was forked: its node is closed there. See `nep.system.forks`."""
+        """Mark the handler as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = True
         self._has_work = threading.Condition()
         self._thread = None
         self._waiting.clear()
         self._left_out = 0
 
-    # ---- inside
+    # ---- worker thread
 
     def _may(self) -> bool:
-        """Whether one more record may be published now; called under the lock."""
+        # Token bucket. Called with the lock held.
         now = self._clock()
         self._tokens = min(float(self._burst), self._tokens + (now - self._counted_at) * self._rate_hz)
         self._counted_at = now
@@ -302,19 +322,19 @@ class LogHandler(logging.Handler):
             self._keep_errors([record for record in records if record["level"] in _ERRORS])
 
     def _keep_errors(self, records: list[dict[str, object]]) -> None:
-        """Publish the last errors again, with these, for whoever comes later."""
+        # Republish the latched list with these errors.
         if not records or self._open_errors is None:
             return
         for record in records:
             text = shortened(str(record["text"]), _ERROR_TEXT_LIMIT)
             self._errors.append({**record, "text": text})
-        with suppress(NepError):  # with the next error it is tried again
+        with suppress(NepError):  # retried with the next error
             if self._errors_publisher is None:
                 self._errors_publisher = self._open_errors()
             self._errors_publisher.publish(list(self._errors))
 
     def _opened(self) -> LogPublisher | None:
-        """The publisher, as soon as there is one; None when the handler was closed meanwhile."""
+        # Retry until a publisher can be opened; None when the handler is closed.
         while True:
             try:
                 return self._open()
@@ -326,10 +346,10 @@ class LogHandler(logging.Handler):
                         return None
 
     def _next(self) -> list[dict[str, object]] | None:
-        """What is to be published now; None at the end. Waits."""
+        # Blocks until there are records; None at the end.
         with self._has_work:
             while not self._waiting and not self._is_closed:
-                # how many were left out is told once a second while it goes on, and when it is over
+                # the number of dropped records is reported once a second, and at the end of the burst
                 told = self._has_work.wait(_SAY_LEFT_OUT_S if self._left_out else None)
                 if not told and self._left_out:
                     break
@@ -356,7 +376,7 @@ class LogHandler(logging.Handler):
 
 
 def handler_of(node: LogNode) -> LogHandler:
-    """A handler that publishes on `LOG_TOPIC` as this node."""
+    """Return a handler that publishes on `LOG_TOPIC` as the given node."""
     return LogHandler(
         node.name,
         lambda: node.new_pub(LOG_TOPIC, LOG_TYPE),

@@ -1,8 +1,9 @@
-"""LoopWait: coroutines of a loop of asyncio wait for messages, in one thread for all of them.
+"""Wait for messages in an asyncio event loop, with one thread per loop.
 
-The thread waits for every subscriber that a coroutine waits for, and tells the loop when one may have
-something; the message itself is read in the loop. So a message costs no thread, and a coroutine that is
-cancelled has not taken one. No descriptor is given to the loop: that works with Windows' loop as well.
+The thread waits for all subscribers that coroutines wait for and notifies the loop when one may have a
+message; the message itself is read in the loop. So a message costs no thread switch of its own, and
+cancelling a coroutine loses no message. No descriptor is registered with the loop, so it also works with
+Windows' proactor loop.
 """
 
 from __future__ import annotations
@@ -28,21 +29,21 @@ else:
 __all__ = ["LoopWait", "give_way", "loop_wait"]
 
 _LOOK_S = 1.0
-"""How often the thread looks whether its loop was closed without `asyncio.run`'s farewell."""
+"""Interval at which the thread checks for a loop closed without `asyncio.run`'s shutdown."""
 _JOIN_S = 5.0
 
 Call = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
-"""By the loop's id; the loop itself must not be kept alive."""
+"""Waits by loop id; keeping the loop itself would keep it alive."""
 _inherited: list[LoopWait] = []
-"""Those of the process that forked this one: kept, because nothing of them may be touched."""
+"""Waits of the parent process after a fork. Referenced for ever, because they must not be finalized."""
 _lock = threading.Lock()
 
 
 def _forked() -> None:
-    """In a child: there is no thread, and no loop goes on."""
-    global _lock  # noqa: PLW0603 - there is one a process
+    # In a forked child there is no thread, and no loop runs.
+    global _lock  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
     _inherited.extend(_waits.values())
     _waits.clear()
@@ -52,7 +53,7 @@ forks.in_child(_forked)
 
 
 def loop_wait() -> LoopWait:
-    """The one of the running loop, made when there is none. Raises `TooManyFilesError`."""
+    """Return the wait of the running loop; create it if needed. Raises `TooManyFilesError`."""
     loop = asyncio.get_running_loop()
     with _lock:
         known = _waits.get(id(loop))
@@ -65,12 +66,15 @@ def loop_wait() -> LoopWait:
 
 @coroutine
 def give_way() -> Generator[None, None, None]:
-    """Await it, and the other coroutines of the loop have their turn."""
+    """Yield to the other coroutines of the loop."""
     yield
 
 
 class LoopWait:
-    """See the module. Everything but `close` is to be called in the loop's thread."""
+    """Wait for subscribers in one thread for all coroutines of a loop.
+
+    Except `close`, call it in the loop.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = weakref.ref(loop)
@@ -83,7 +87,7 @@ class LoopWait:
         self._farewell = self._until_shutdown()
 
     def start(self) -> None:
-        """Start the thread, and let the loop end it when `asyncio.run` is over."""
+        """Start the thread, and register its shutdown with the loop (`asyncio.run`)."""
         try:
             self._thread.start()
         except BaseException:
@@ -92,18 +96,18 @@ class LoopWait:
         _step(self._farewell.asend(None))
 
     def serves(self, loop: asyncio.AbstractEventLoop) -> bool:
-        """Whether it is this loop's, and has not ended."""
+        """Return True if this wait belongs to `loop` and is running."""
         return self._loop() is loop and not self._is_over
 
     def watch(self, subscriber: SubscriberTransport, call: Call) -> None:
-        """Call this once, when the subscriber may have something or is closed; unless `unwatch` is called."""
+        """Call `call` once when the subscriber may have a message or is closed."""
         calls = self._calls.setdefault(subscriber, [])
         calls.append(call)
         if len(calls) == 1:
             self._order(True, subscriber)
 
     def unwatch(self, subscriber: SubscriberTransport, call: Call) -> None:
-        """Do not call it any more. May be called when it was called already."""
+        """Cancel a `watch`. May be called after the call."""
         calls = self._calls.get(subscriber)
         if calls is not None and call in calls:
             calls.remove(call)
@@ -112,14 +116,14 @@ class LoopWait:
                 self._order(False, subscriber)
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._is_over = True
         self._wait.wake()
         if threading.current_thread() is not self._thread:
             self._thread.join(_JOIN_S)
 
     async def _until_shutdown(self) -> AsyncGenerator[None, None]:
-        """The loop closes its asynchronous generators before it ends, this one among them."""
+        # asyncio.run closes asynchronous generators at shutdown, this one among them.
         try:
             yield
         finally:
@@ -130,12 +134,12 @@ class LoopWait:
         self._wait.wake()
 
     def _ring(self, subscribers: list[SubscriberTransport]) -> None:
-        """In the loop: these may have something."""
+        # Runs in the loop.
         for subscriber in subscribers:
             for call in self._calls.pop(subscriber, ()):
                 call()
 
-    # ---- in the thread
+    # ---- thread
 
     def _run(self) -> None:
         try:
@@ -152,7 +156,7 @@ class LoopWait:
                     del _waits[self._id]
 
     def _obeyed(self) -> list[SubscriberTransport]:
-        """Arm and disarm what was ordered; those that may have something already."""
+        # Returns subscribers that may already have a message.
         rung = []
         while self._orders:
             is_armed, subscriber = self._orders.popleft()
@@ -163,19 +167,19 @@ class LoopWait:
         return rung
 
     def _has_told(self, rung: list[SubscriberTransport]) -> bool:
-        """Tell the loop who may have something; False when it is not there any more."""
+        # Returns False when the loop is gone.
         loop = self._loop()
         if loop is None or loop.is_closed():
             return False
         if rung:
             try:
                 loop.call_soon_threadsafe(self._ring, rung)
-            except RuntimeError:  # it was closed just now
+            except RuntimeError:  # closed in the meantime
                 return False
         return True
 
 
 def _step(awaitable: Coroutine[None, None, None]) -> None:
-    """Go on to where it yields: it awaits nothing before."""
+    # Runs the generator to its first yield; it awaits nothing before that.
     with suppress(StopIteration):
         awaitable.send(None)

@@ -1,4 +1,4 @@
-"""Node: a program, or a part of one, with its publishers and subscribers."""
+"""Node: a program's participant in a network, with its publishers, subscribers and services."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-import zmq.utils.garbage  # noqa: F401 - its exit hook must be older than ours: it frees what we still send
+# its exit hook must be older than ours: it frees frames that are still being sent
+import zmq.utils.garbage  # noqa: F401
 
-import nep.system.exits  # noqa: F401 - so must this one's
+import nep.system.exits  # noqa: F401 - its exit hook must be older than ours, too
 from nep.backends.base import (
     PublisherSpec,
     Sink,
@@ -58,31 +59,46 @@ if TYPE_CHECKING:
 __all__ = ["Node", "spin"]
 
 FLUSH_S = 2.0
-"""How long closing waits for what was published to be delivered."""
+"""Time in seconds that closing waits for published messages to be delivered."""
 
 _WORKER_PRIORITY = 10
-"""0 and more: before a worker waits for processes of its own, which may need what was published."""
+"""Exit priority >= 0: runs before a worker joins its own children, which may need published messages."""
 
 _alive: set[Node] = set()
-"""Nodes live until they are closed or the interpreter ends: a publisher may outlive its node's variable."""
+"""Open nodes, referenced until they are closed: a publisher may outlive the variable of its node."""
 _inherited: list[Node] = []
-"""Nodes of the process that forked this one: closed, and kept, because nothing of them may be touched."""
+"""Nodes of the parent process after a fork. Referenced for ever, because they must not be finalized."""
 _closed_in = 0
-"""The process in which `multiprocessing` knows that nodes are to be closed."""
+"""Process id in which closing is registered with `multiprocessing`."""
 
 
 class Node(ServiceNode):
-    """A node of this name. It needs no master until something is made on it; works in any thread.
+    """Participant in a network, with publishers, subscribers, services, timers and parameters.
 
-    `name`: what others see it as; it may be there more than once, which is an alert. `transport`: the back
-    end, "zeromq" (also "ZMQ"), "memory" (nodes of this process only), "zenoh", "nanomsg", "ros" or "ros2"
-    (docs/backends.md). `master`: the master's address (default: $NEP_MASTER, else 127.0.0.1:7780). `wait_s`:
-    how long `new_pub` and `new_sub` wait for a master before they raise `MasterUnreachable`; None waits for
-    ever. `generation`: what it is in the graph, another word for gateways to other systems. `language`: the
-    language of its program in the graph; "web" for the web pages of `nep web`. `strict`: its publishers raise
-    `EncodeError` for whatever cannot be sent, see `Publisher.publish`. Raises `UnknownBackendError`,
-    `BackendUnavailableError`, `BadNameError`, `TooManyFilesError`. In a child that is forked it is closed,
-    with all that was made on it; a new node works there.
+    A node connects to the master when its first publisher, subscriber or service is created. Thread-safe;
+    usable as a context manager. In a forked child process it is closed, with everything created on it; open a
+    new one there.
+
+        with nep.node("camera") as node:
+            pub = node.new_pub("/camera/state")
+            pub.publish({"on": True})
+
+    Args:
+        name: Name shown to others. Several nodes may share a name; the graph reports an alert then.
+        transport: Back end: "zeromq" (alias "ZMQ"), "memory" (nodes of this process only), "zenoh",
+            "nanomsg", "ros" or "ros2" (docs/backends.md).
+        master: Address of the master. Default: $NEP_MASTER, else 127.0.0.1:7780.
+        wait_s: Time in seconds that `new_pub` and `new_sub` wait for a master; None waits without limit.
+        generation: Kind of node reported in the graph; gateways to other systems use other values.
+        language: Programming language reported in the graph; "web" for the web pages of `nep web`.
+        strict: Make every publisher raise `EncodeError` for payloads that can't be encoded
+            (`Publisher.publish`).
+
+    Raises:
+        UnknownBackendError: There is no back end of this name.
+        BackendUnavailableError: The back end is not installed.
+        BadNameError: The name is invalid.
+        TooManyFilesError: The process has too many open files.
     """
 
     def __init__(
@@ -99,7 +115,7 @@ class Node(ServiceNode):
         self.name = check_node_name(name)
         key = secrets.token_hex(16)
         self.id: str = node_id_from(key)
-        """What the graph knows it by: 16 hexadecimal digits, new with each start of the program."""
+        """Id in the graph: 16 hexadecimal digits, new at each start of the program."""
         self._key = key
         self._numbers = itertools.count(1)
         self._backend = backend_named(text("transport", transport))
@@ -133,23 +149,26 @@ class Node(ServiceNode):
         _close_with_worker()
         forks.watch(self)
 
-    # ---- how to connect
+    # ---- configurations
 
     def hybrid(
         self,
         master_ip: str = "127.0.0.1",
         mode: str = "many2many",
-        transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
+        transport: str = "",  # noqa: ARG002 - as in the original, the node's own transport is used
     ) -> Hybrid:
-        """Connected through a master; any number of publishers and subscribers, whatever the mode says.
+        """Return the configuration of a connection through a master.
 
-        "127.0.0.1" means the node's own master.
+        Args:
+            master_ip: Address of the master; "127.0.0.1" means the node's own master.
+            mode: Accepted for compatibility; any number of publishers and subscribers can connect.
+            transport: Ignored; the node's transport is used.
         """
         is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
         return Hybrid(self._master if is_own else self._backend.master(master_ip), checked_mode(mode))
 
     def broker(self, mode: str = "many2many") -> Hybrid:
-        """Return `hybrid(mode=mode)`: the original module's name for it up to 0.5.2."""
+        """Return `hybrid(mode=mode)`, under its name in the original module up to 0.5.2."""
         return self.hybrid(mode=mode)
 
     def direct(
@@ -157,17 +176,28 @@ class Node(ServiceNode):
         ip: str = "127.0.0.1",
         port: str | int = "9000",
         mode: str = "one2many",
-        transport: str = "",  # noqa: ARG002 - the node's transport is used, as in the original
+        transport: str = "",  # noqa: ARG002 - as in the original, the node's own transport is used
         *,
         generation: Literal["A", "B"] = "A",
         wire: Literal["original", "native", "tcp"] = "original",
     ) -> Direct:
-        """Connected without a master to `ip:port`; see `Direct` for the modes.
+        """Return the configuration of a connection to a fixed address, without a master.
 
-        Sends the frames of the original NEP up to 0.5.4.5, or from 0.5.4.8 on (`generation="B"`), or native
-        ones; receives both forms of the original. `wire="tcp"` carries calls of services, also of programs
-        that have no ZeroMQ. Raises `NepError` for what is no address, mode or port, `ValueError` for another
-        generation or wire.
+            sub = node.new_sub("scan", "json", node.direct("192.168.0.7", 9000))
+
+        Args:
+            ip: Address to bind or connect to.
+            port: Port, 1 to 65535.
+            mode: Which end binds; see `Direct`.
+            transport: Ignored; the node's transport is used.
+            generation: Frames of the original NEP up to 0.5.4.5 ("A") or from 0.5.4.8 on ("B"). Both are
+                received.
+            wire: "original" or "native" frames; "tcp" for service calls over plain TCP, also from programs
+                without ZeroMQ.
+
+        Raises:
+            NepError: Invalid address, mode or port.
+            ValueError: Invalid generation or wire.
         """
         return Direct(
             checked_host(ip),
@@ -191,16 +221,32 @@ class Node(ServiceNode):
         qos: str = "",
         image: ImageFormat | None = None,
     ) -> Publisher:
-        """A publisher. The first message reaches every subscriber that was there before this returned.
+        """Create a publisher.
 
-        `msg_type`: a name, or a dataclass or TypedDict, whose instances are published (docs/types.md).
-        `latched`: whoever subscribes later gets the last message at once. `history`: it gets so many of the
-        last ones, up to 1000 and 64 MB, in order and before those that follow. `batch`: messages published
-        within 20 microseconds of each other may go out together, 100 microseconds later at most (the last
-        ones of a burst that goes on for longer: 500). `qos`: a quality of service in one word, where the
-        back end knows such ("ros2": "reliable", "best_effort", "sensor"). `image`: how pictures are sent,
-        JPEG, PNG or raw, and how large. Raises `MasterUnreachable`, `BadTopicError`, `AddressInUseError`,
-        `TooManyFilesError`, `ClosedError`, and `ValueError` for what is none of the allowed arguments.
+        The first message reaches every subscriber that was registered before this call returned.
+
+            pub = node.new_pub("/robot/pose", "json", latched=True)
+            pub.publish({"x": 1.5, "y": 0.0})
+
+        Args:
+            topic: Name of the topic.
+            msg_type: "json", "string", "bytes", "msgpack", "image" or another registered name; or a dataclass
+                or TypedDict, whose instances are published (docs/types.md).
+            configuration: Result of `hybrid` or `direct`. Default: the node's master.
+            latched: Send the newest message to later subscribers.
+            history: Number of messages sent to later subscribers, in order: 0 to 1000, 64 MB at most.
+            batch: Combine messages published within 20 µs of each other; adds up to 100 µs of latency (500 µs
+                for the last messages of a longer burst).
+            qos: Quality of service of the back end; "ros2" has "reliable", "best_effort" and "sensor".
+            image: Encoding and size of images: JPEG, PNG or raw.
+
+        Raises:
+            MasterUnreachable: No master replied within `wait_s`.
+            BadTopicError: The topic name is invalid.
+            AddressInUseError: The address of a direct connection is in use.
+            TooManyFilesError: The process has too many open files.
+            ClosedError: The node is closed.
+            ValueError: An argument is invalid.
         """
         connected = for_messages(self._configured(configuration))
         kept = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
@@ -240,16 +286,30 @@ class Node(ServiceNode):
         qos: str = "",
         wildcards: bool = True,
     ) -> Subscriber:
-        """A subscriber. What is published after this returned arrives, from every registered publisher.
+        """Create a subscriber.
 
-        With a dataclass or TypedDict as `msg_type` its payloads are instances of that.
-        A level of `topic` that is `*` is any level, `**` any number of them: "/robot/*/camera". Publishers
-        of all topics that match are heard, also those that come later, and a message has its own topic;
-        without `wildcards`, and in direct connections, the topic of just this name.
-        `keep="latest"`: only the newest message is kept for `listen`; "all": up to `max_messages` (and
-        256 MB), then the oldest are dropped and counted. `sink`: takes the messages in batches, 200 times a
-        second at most, in a thread of the node's own, instead of `listen`. `qos` as for `new_pub`. Raises as
-        `new_pub` does.
+        It receives every message published after this call returned, from every registered publisher.
+
+            with node.new_sub("/robot/*/camera", "image", keep="latest") as sub:
+                for message in sub:
+                    show(message.payload)
+
+        Args:
+            topic: Name of the topic, or a pattern: `*` matches one level, `**` any number of levels, also of
+                topics that are created later. Each message has its own topic.
+            msg_type: As for `new_pub`; with a dataclass or TypedDict the payloads are instances of it.
+            configuration: Result of `hybrid` or `direct`. Default: the node's master.
+            keep: "all": queue up to `max_messages` (256 MB at most), then drop the oldest; "latest": keep
+                only the newest.
+            max_messages: Length of the queue, 1 or more.
+            sink: Function called with lists of messages, at most 200 times per second, in a thread of the
+                node; replaces `listen`.
+            qos: As for `new_pub`.
+            wildcards: False to treat `*` as part of the name, as direct connections do.
+
+        Raises:
+            NepError: As `new_pub` does.
+            ValueError: An argument is invalid, or the back end has no patterns.
         """
         number = next(self._numbers)
         spec = SubscriberSpec(
@@ -279,13 +339,28 @@ class Node(ServiceNode):
         with_message: bool = False,
         qos: str = "",
     ) -> Subscriber:
-        """A subscriber whose payloads are given to `callback`, in the thread that calls `spin`.
+        """Create a subscriber whose payloads are passed to `callback` in the thread that calls `spin`.
 
-        `keep` and `max_messages` as for `new_sub`: with `keep="latest"` a callback that is slower than the
-        topic gets the newest message each time and never falls behind. `with_message`: it is given the
-        `Message`, which has the payload, topic, stamp_ns, seq and publisher. A message that cannot be decoded
-        is skipped, logged, and an alert in the graph, either way. `msg_type` and wildcards in `topic` as for
-        `new_sub`, `qos` as for `new_pub`. Raises as `new_pub` does.
+            node.new_callback("/robot/pose", "json", lambda pose: print(pose["x"]))
+            node.spin()
+
+        Messages that can't be decoded are skipped, logged, and reported as an alert in the graph.
+
+        Args:
+            topic: Name or pattern, as for `new_sub`.
+            msg_type: As for `new_sub`.
+            callback: Function of one argument; a coroutine function needs `spin_async`.
+            configuration: Result of `hybrid` or `direct`. Default: the node's master.
+            keep: "all" or "latest", as for `new_sub`. With "latest" a slow callback always gets the newest
+                message.
+            max_messages: Length of the queue, 1 or more.
+            with_message: Pass the `Message` (payload, topic, stamp_ns, seq, publisher) instead of the
+                payload.
+            qos: As for `new_pub`.
+
+        Raises:
+            NepError: As `new_pub` does.
+            ValueError: An argument is invalid.
         """
         transport = self._open_transport()
         function("callback", callback)
@@ -313,33 +388,37 @@ class Node(ServiceNode):
         return id_from(self._key, number), number
 
     def _wake(self) -> None:
-        """Who spins looks again at what there is to do."""
         self._work.wake()
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or is the parent's in a child that was forked."""
+        """True if the node was closed, or if this is a forked child process."""
         return self._is_closed
 
     # ---- parameters
 
     @property
     def parameters(self) -> Parameters:
-        """Its parameters: values that others may read and set while it runs (`nep param`)."""
+        """Parameters of this node: named values that others can read and set at run time (`nep param`)."""
         with self._lock:
             self._parameters = self._parameters or Parameters(self)
             return self._parameters
 
     def parameters_of(self, node: str, timeout_s: float | None = 5.0) -> RemoteParameters:
-        """The parameters of another node, by its name or id. `timeout_s` is how long it may take to answer.
+        """Return the parameters of another node.
 
-        Raises `NepError` when there is no such node, or several, or when it has declared none.
+        Args:
+            node: Name or id of the node.
+            timeout_s: Time limit of each request in seconds; None for no limit.
+
+        Raises:
+            NepError: No node or several nodes match, or the node has no parameters.
         """
         found = node_with_parameters(self.graph(), node)
         return RemoteParameters(self.new_client(place_of(found), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
-        """See `nep.patterns.parameters.owned.ParameterHost`."""
+        """Open the publisher and the server of this node's parameters. Internal; used by `Parameters`."""
         publisher = self.new_pub(place, MSG_TYPE, latched=True)
         if hasattr(self._open_transport(), "server"):
             try:
@@ -374,7 +453,6 @@ class Node(ServiceNode):
         return subscriber
 
     def _forget(self, subscriber: Subscriber) -> None:
-        """It is closed."""
         with self._lock:
             self._subscribers.discard(subscriber)
         self._work.forget_callback(subscriber)
@@ -382,73 +460,100 @@ class Node(ServiceNode):
     # ---- spinning
 
     def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
-        """A timer: `callback` is called every `period_s` seconds, in the thread that calls `spin`.
+        """Create a timer that calls `callback` every `period_s` seconds in the thread that calls `spin`.
 
-        So never beside another callback. The first call comes after one period. When it is late, because
-        a callback took long or nobody span, it is called once, not once for each period that passed, and
-        goes on at whole periods. What it raises comes out of `spin`. `Timer.cancel` ends it, and so does
-        closing the node. Raises `ClosedError`, and `ValueError` for a period that is not above 0 or infinite.
+        The first call is after one period. Missed ticks are coalesced: a late timer is called once, and the
+        schedule stays aligned to the period. Callbacks never run concurrently. Exceptions propagate out of
+        `spin`. Cancel it with `Timer.cancel`; closing the node cancels it, too.
+
+        Args:
+            period_s: Period in seconds, above 0 and finite.
+            callback: Function without arguments; a coroutine function needs `spin_async`.
+
+        Raises:
+            ClosedError: The node is closed.
+            ValueError: The period is invalid.
         """
         self._open_transport()
         return self._work.new_timer(period("period_s", period_s), function("callback", callback))
 
     def spin(self, timeout_s: float | None = None) -> None:
-        """Run callbacks and timers in this thread until `stop_spin`, `close`, or for `timeout_s` seconds.
+        """Run callbacks, timers and servers in this thread until `stop_spin` or `close`.
 
-        What they raise comes out here. A `stop_spin` that came before ends the next spin at once. In a
-        child that is forked, also by a callback, it raises `ClosedError`. `nep.spin` does it for several
-        nodes.
+        Exceptions of callbacks propagate. A `stop_spin` called before makes the next spin return at once. Use
+        `nep.spin` for several nodes.
+
+        Args:
+            timeout_s: Time limit in seconds; None for no limit.
+
+        Raises:
+            ClosedError: This is a forked child process, also if a callback forked it.
         """
         self._work.spin(seconds("timeout_s", timeout_s))
 
     async def spin_async(self, timeout_s: float | None = None) -> None:
-        """As `spin`, in a loop of asyncio, whose other coroutines run while this one waits.
+        """Run callbacks, timers and servers in the running asyncio event loop; otherwise as `spin`.
 
-        Callbacks, and those of timers, may be coroutine functions. One at a time is called, and awaited: no
-        callback of the node runs beside another one. Whatever is to go on meanwhile is a task of its own.
+        Callbacks may be coroutine functions. They are awaited one at a time, so that callbacks of a node
+        never run concurrently; start a task for work that should continue in the background.
+
+        Args:
+            timeout_s: Time limit in seconds; None for no limit.
         """
         await spin_in_loop(self._work, seconds("timeout_s", timeout_s))
 
     def stop_spin(self) -> None:
-        """End `spin` or `spin_async`, from any thread or from a callback."""
+        """End `spin` or `spin_async`, or the next one. Thread-safe; may be called from a callback."""
         if not self._is_forked:
             self._work.stop()
 
-    # ---- what it tells, the graph, and the end
+    # ---- logging, graph, closing
 
     @property
     def log(self) -> logging.Logger:
-        """A logger whose records, from INFO on, Console and `nep log` show."""
+        """Logger of this node. Records from INFO on are published to Studio's Console and `nep log`."""
         return self.log_handler.logger
 
     @property
     def log_handler(self) -> LogHandler:
-        """Publishes records as this node's; add it to a logger to publish all that a program logs."""
+        """Logging handler that publishes records as this node.
+
+        Add it to a logger to publish everything that is logged there.
+        """
         with self._lock:
             self._log_handler = self._log_handler or handler_of(self)
             return self._log_handler
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Who is there now. Raises `MasterUnreachable` when the master does not answer in time."""
+        """Return a snapshot of all nodes, topics, services and alerts that the master knows.
+
+        Args:
+            timeout_s: Time limit in seconds.
+
+        Raises:
+            MasterUnreachable: The master did not reply in time.
+        """
         seconds("timeout_s", timeout_s)
         return self._open_transport().graph(self.hybrid(), timeout_s)
 
     def close(self, timeout_s: float = FLUSH_S) -> None:
-        """Unregister and end; what was published is delivered first, within `timeout_s`. May be called twice.
+        """Unregister and close everything created on this node. Idempotent.
 
-        What could not be delivered is logged as a warning. Happens by itself when the interpreter ends.
-        `new_pub`, `new_sub` and the like raise `ClosedError` when it comes while another thread is in them.
+        Published messages are delivered first; those that could not be are logged as a warning. Called
+        automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or the like raises `ClosedError`.
+
+        Args:
+            timeout_s: Time limit for the delivery in seconds.
         """
         limit("timeout_s", timeout_s)
         _close((self,), timeout_s)
 
     def _end_log(self, timeout_s: float) -> None:
-        """Publish what was logged, and no more."""
         if self._log_handler is not None:
             self._log_handler.close(timeout_s)
 
     def _begin_close(self) -> bool:
-        """Say that all ends here, and wait for nothing; whether it was open. `_finish_close` follows."""
+        # Starts closing without waiting; returns False if already closed. `_finish_close` must follow.
         with self._lock:
             if self._is_closed:
                 return False
@@ -465,14 +570,13 @@ class Node(ServiceNode):
         return True
 
     def _finish_close(self, timeout_s: float) -> None:
-        """Deliver what was published, within `timeout_s`, and give everything back."""
         deadline = time.monotonic() + timeout_s
         self._services.finish_calls(timeout_s / 2)
         self._transport.close(max(0.0, deadline - time.monotonic()))
         self._services.end(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the node as closed in a forked child process. See `nep.system.forks`."""
         self._is_closed = self._is_forked = True
         self._lock = threading.RLock()
         self._work.forked()
@@ -505,32 +609,41 @@ class Node(ServiceNode):
 
 
 def _own_topic(topic: str) -> str:
-    """`topic` itself when messages may travel on it. Raises `BadTopicError`."""
+    # Service names start with a reserved prefix.
     if check_topic(topic).startswith(PREFIX):
         raise BadTopicError(topic, _("names that begin with '{prefix}' are services'").format(prefix=PREFIX))
     return topic
 
 
 def spin(*nodes: Node, timeout_s: float | None = None) -> None:
-    """Run callbacks and timers of all these nodes in this thread, as `Node.spin` does for one.
+    """Run the callbacks, timers and servers of several nodes in this thread.
 
-    They may be of different back ends. They take turns: in each round every timer that is due is called, and
-    every callback that has a message is given one. `stop_spin` of a node ends its part; the others go on.
-    Ends when all nodes are stopped or closed, or after `timeout_s` seconds. Raises `ValueError` for what are
-    no nodes, or none.
+    The nodes may use different back ends. Scheduling is round-robin: in each round every due timer is called,
+    and every callback with a message gets one. `Node.stop_spin` ends the part of its node; the others
+    continue.
+
+        nep.spin(camera, arm, timeout_s=10.0)
+
+    Args:
+        nodes: One or more nodes.
+        timeout_s: Time limit in seconds; None runs until all nodes are stopped or closed.
+
+    Raises:
+        ValueError: No nodes, or arguments that are not nodes.
+        ClosedError: This is a forked child process.
     """
     if not nodes or not all(isinstance(each, Node) for each in nodes):
         raise WrongTypeError(_("spin was given something else than nodes; give it one node or more"))
-    works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - they are one with the node
+    works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - private to this module
     spin_all(tuple(works), seconds("timeout_s", timeout_s))
 
 
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:
-    """Close all of them within `timeout_s`: no node's subscribers wait for those of another node."""
+    # Closes all within `timeout_s`; all begin to close before one waits, so that none waits for another.
     started = time.monotonic()
     for each in nodes:
-        each._end_log(0.0)  # noqa: SLF001 - they are one with the node
-    for each in nodes:  # what they publish goes out like anything else
+        each._end_log(0.0)  # noqa: SLF001 - private to this module
+    for each in nodes:  # the logs must be flushed before the publishers close
         each._end_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
     for each in [each for each in nodes if each._begin_close()]:  # noqa: SLF001
         each._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
@@ -541,11 +654,10 @@ def _close_all() -> None:
 
 
 def _close_with_worker() -> None:
-    """Let a worker of `multiprocessing` close its nodes: one that was forked skips the interpreter's exit.
-
-    It forgets what was registered before it began, so this is done when a node is made.
-    """
-    global _closed_in  # noqa: PLW0603 - one for the process
+    # A forked worker of `multiprocessing` skips the interpreter's exit handlers, so closing is registered
+    # with `multiprocessing` itself. It forgets registrations made before it starts: register when a node is
+    # created.
+    global _closed_in  # noqa: PLW0603 - one per process
     parent_of_worker = getattr(sys.modules.get("multiprocessing.process"), "parent_process", None)
     if _closed_in != os.getpid() and parent_of_worker is not None and parent_of_worker() is not None:
         _closed_in = os.getpid()

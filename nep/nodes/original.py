@@ -1,6 +1,6 @@
-"""Names of the original module that nep itself has no use for, so that its programs run unchanged.
+"""Names of the original module that only exist for compatibility.
 
-docs/original-nep.md lists them all, with what new programs write instead.
+docs/original-nep.md lists them all with their replacements.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _INSTEAD: Mapping[str, str] = {
 
 
 def original_hint(name: str) -> str:
-    """What to write instead of a name of the original module that nep lacks; "" for any other name."""
+    """Return the replacement for a name of the original module that nep lacks, or "" for any other name."""
     instead = _INSTEAD.get(name)
     if instead is None:
         return ""
@@ -59,36 +59,34 @@ def original_hint(name: str) -> str:
 class FixedServer:
     """Server at a fixed address, without a master: the original module's `server`.
 
-    ::
-
         server = nep.server("127.0.0.1", 8123)
         while True:
             print(server.listen_info())
             server.send_info({"answer": 42})
 
-    Clients are `nep.client`, the original module's `client`, and `node.new_client` with
-    `node.direct(ip, port)`.
+    Its clients are `nep.client`, the original module's `client`, and `node.new_client` with `node.direct(ip,
+    port)`.
     """
 
     def __init__(
         self,
-        IP: str,  # noqa: N803 - the original's names
+        IP: str,  # noqa: N803 - name of the original module
         port: int | str,
         transport: str = "ZMQ",
-        debug: bool = True,  # noqa: ARG002 - as the original has it; nothing is printed
+        debug: bool = True,  # noqa: ARG002 - accepted for compatibility
     ) -> None:
         """Bind `IP:port`.
 
         Args:
             IP: Address of this computer; "*" or "0.0.0.0" for all.
-            port: 1 to 65535.
-            transport: "ZMQ", or "TCP", "POSIX" or "socket" for plain TCP (docs/services.md), which the
-                client must have, too.
+            port: Port, 1 to 65535.
+            transport: "ZMQ"; or "TCP", "POSIX" or "socket" for plain TCP (docs/services.md). Clients need the
+                same.
             debug: Ignored.
 
         Raises:
-            AddressInUseError: Another program has the port.
-            UnknownBackendError: No such transport.
+            AddressInUseError: Another program uses the port.
+            UnknownBackendError: There is no such transport.
         """
         self._node = Node(f"server-{port}", transport)
         try:
@@ -98,15 +96,15 @@ class FixedServer:
             raise
 
     def listen_info(self, timeout_s: float | None = None) -> object:
-        """Return the next request, None when none came within `timeout_s` (None: wait for ever)."""
+        """Return the next request, or None after `timeout_s` seconds (None waits without limit)."""
         return self._server.listen_info(timeout_s)
 
     def send_info(self, info: object) -> None:
-        """Answer the request that `listen_info` returned."""
+        """Reply to the request that `listen_info` returned."""
         self._server.send_info(info)
 
     def close(self) -> None:
-        """Free the port. May be called twice."""
+        """Release the port. Idempotent."""
         self._node.close()
 
     def __enter__(self) -> Self:
@@ -119,30 +117,28 @@ class FixedServer:
 class FixedClient:
     """Client of a server at a fixed address, without a master: the original module's `client`.
 
-    ::
-
-        client = nep.client("127.0.0.1", 8123)
-        client.send_info({"question": "?"})
-        print(client.listen_info())
+    client = nep.client("127.0.0.1", 8123)
+    client.send_info({"question": "?"})
+    print(client.listen_info())
     """
 
     def __init__(
         self,
-        IP: str,  # noqa: N803 - the original's names
+        IP: str,  # noqa: N803 - name of the original module
         port: int | str,
         transport: str = "ZMQ",
-        debug: bool = True,  # noqa: ARG002 - as the original has it; nothing is printed
+        debug: bool = True,  # noqa: ARG002 - accepted for compatibility
         *,
         timeout_s: float | None = None,
     ) -> None:
         """Connect to `IP:port`; the server may start later.
 
         Args:
-            IP: Address or name of the server's computer.
-            port: 1 to 65535.
+            IP: Address or host name of the server.
+            port: Port, 1 to 65535.
             transport: As for `FixedServer`.
             debug: Ignored.
-            timeout_s: How long `listen_info` waits for the answer (None: for ever, as the original does).
+            timeout_s: Time limit of `listen_info` in seconds; None waits without limit, as the original does.
         """
         self._node = Node(f"client-{port}", transport)
         try:
@@ -154,15 +150,15 @@ class FixedClient:
             raise
 
     def send_info(self, info: object) -> None:
-        """Send a request; `listen_info` returns its answer."""
+        """Send a request; `listen_info` returns the reply."""
         self._client.send_info(info)
 
     def listen_info(self) -> object:
-        """Return the answer to what `send_info` sent. Raises as `Client.call` does."""
+        """Return the reply to `send_info`. Raises the exceptions of `Client.call`."""
         return self._client.listen_info()
 
     def close(self) -> None:
-        """Disconnect. May be called twice."""
+        """Disconnect. Idempotent."""
         self._node.close()
 
     def __enter__(self) -> Self:
@@ -172,23 +168,23 @@ class FixedClient:
         self.close()
 
 
-def getMyIP() -> str:  # noqa: N802 - the original's name
-    """Return an address under which other computers may reach this one, "127.0.0.1" when there is none."""
+def getMyIP() -> str:  # noqa: N802 - name of the original module
+    """Return an address at which other computers may reach this one, or "127.0.0.1" if there is none."""
     return next((each.host for each in own_addresses()), _LOOPBACK)
 
 
 def json2dict(text: str | bytes) -> object:
-    """Parse a JSON text, as `json.loads` does."""
+    """Parse JSON text, as `json.loads` does."""
     value: object = json.loads(text)
     return value
 
 
 def dict2json(value: object) -> str:
-    """Return `value` as a JSON text, as `json.dumps` does."""
+    """Return `value` as JSON text, as `json.dumps` does."""
     return json.dumps(value)
 
 
 def read_json(json_file: str | Path) -> object:
-    """Parse a JSON file in UTF-8. Raises `OSError`, `ValueError`."""
+    """Parse a JSON file in UTF-8. Raises `OSError` or `ValueError`."""
     value: object = json.loads(Path(json_file).read_text("utf-8-sig"))
     return value

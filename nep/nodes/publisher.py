@@ -1,9 +1,9 @@
-"""Publisher: payloads in, messages out. Made by `Node.new_pub`.
+"""Publisher returned by `Node.new_pub`.
 
 A payload that can't be encoded is dropped, not raised: it is counted in `Publisher.refused`, logged at
-increasing intervals and shown as an alert in the graph (`Unsendable`). Encoding happens only while the topic
-has subscribers, so raising would make a program fail only when someone starts to watch it
-(docs/adr/0013-watching.md). With ``strict=True`` every payload is encoded, and what can't be is raised.
+increasing intervals and reported as an alert in the graph. Encoding happens only while the topic has
+subscribers, so raising would make a program fail only when someone starts to watch it
+(docs/adr/0013-watching.md). With ``strict=True`` every payload is encoded, and errors are raised.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ __all__ = ["Publisher", "Unsendable", "place_of"]
 
 _logger = logging.getLogger("nep")
 _LOOK_S = 1.0
-"""So often at most a payload is tried out that nobody wants; and a fiftieth of the time at most."""
+"""Interval at which a payload of an unsubscribed topic is encoded to detect errors early."""
 _SHARE = 50
 _LOOKED_AT = 10_000
 _DEEPEST = 50
 _LONGEST = 300
 
-_DATA = (bytes, memoryview)  # made once: this is asked for every message that nobody hears
+_DATA = (bytes, memoryview)  # created once: checked for every unsubscribed message
 
 
 class Publisher:
-    """Publishes on one topic. Use it from any thread; a context manager."""
+    """Publish messages on one topic. Thread-safe; usable as a context manager. Created by `Node.new_pub`."""
 
     def __init__(
         self,
@@ -68,28 +68,28 @@ class Publisher:
         self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
         self.is_closed = False
-        """Whether it, or its node, was closed."""
+        """True if the publisher or its node was closed."""
         if isinstance(transport, PublishesQuickly) and (encode := ordinary(spec.codec)) is not None:
             self._quickly(transport, encode)
 
     @property
     def topic(self) -> str:
-        """The topic's name."""
+        """Name of the topic."""
         return self._spec.topic
 
     @property
     def msg_type(self) -> str:
-        """The type under which it is registered."""
+        """Registered message type."""
         return self._spec.msg_type
 
     @property
     def id(self) -> int:
-        """Its id, as in `Message.publisher` and in the graph."""
+        """Id of the publisher, as in `Message.publisher` and in the graph."""
         return self._spec.id
 
     @property
     def subscribers(self) -> int:
-        """How many subscribers are connected now. Costs nothing."""
+        """Number of connected subscribers."""
         return 0 if self._is_forked else self._transport.subscribers
 
     @property
@@ -105,39 +105,45 @@ class Publisher:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of nodes that subscribe and have not connected: hung, or just being connected."""
+        """Names of subscribed nodes whose connection is not established (starting up or not responding)."""
         return () if self._is_forked else self._transport.missing
 
     @property
     def count(self) -> int:
-        """Messages published so far, also those that nobody was there to hear."""
+        """Number of published messages, including those without a subscriber."""
         return self._transport.count
 
     @property
     def nulled(self) -> int:
-        """Messages in which NaN or infinity was sent as `null`, because JSON has neither; they are logged."""
+        """Number of messages in which NaN or infinity was replaced by ``null``, which JSON lacks."""
         return 0 if self._nulls is None else self._nulls.count
 
     @property
     def refused(self) -> int:
-        """Payloads that could not be encoded, and so nobody got; why is logged and an alert in the graph."""
+        """Number of payloads that could not be encoded; the reason is logged and an alert in the graph."""
         return self._unsendable.count
 
     @property
     def problem(self) -> str:
-        """Why the newest payload was refused; empty when it could be sent."""
+        """Reason why the newest payload was rejected, or "" if it could be encoded."""
         return self._unsendable.problem
 
     def publish(self, payload: object, *, strict: bool = False) -> None:
-        """Encode and send `payload`; an `Encoded` is sent as it is. Never blocks.
+        """Encode and send a payload. Never blocks.
 
-        Raises `EncodeError` for a payload of a type that the message type does not take, and `ClosedError`.
-        What cannot be sent because of something inside is refused: counted in `refused`, logged, and an alert
-        in the graph until one can. So nothing depends on whether somebody listens: with no subscriber a
-        payload is encoded only now and then, to see whether it could be sent, unless it is latched.
+        While the topic has no subscriber and is not latched, payloads are encoded only once per second to
+        detect errors.
 
-        With `strict` (or a node that was made with it) the payload is always encoded, also while nobody
-        listens, and `EncodeError` is raised for whatever cannot be sent, with its place in the payload.
+        Args:
+            payload: Value of the publisher's message type; an `Encoded` is sent as it is.
+            strict: Always encode, also without subscribers, and raise `EncodeError` for any payload that
+                can't be encoded. Otherwise only a wrong type is raised; errors inside the payload are counted
+                in `refused`, logged, and reported as an alert in the graph until a payload can be encoded.
+
+        Raises:
+            EncodeError: The message type does not accept the type of the payload, or `strict` is set and it
+                can't be encoded.
+            ClosedError: The publisher is closed.
         """
         if strict or self._is_strict:
             self._publish_strictly(payload)
@@ -147,7 +153,7 @@ class Publisher:
             return
         try:
             made = payload if isinstance(payload, Encoded) else self._encode(payload)
-        except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
+        except Exception as error:  # noqa: BLE001 - a payload of any class may raise anything
             self._check(payload)
             self._unsendable.add(payload, error)
             return
@@ -167,7 +173,7 @@ class Publisher:
             else:
                 made = self._encode(payload)
         except Exception as error:
-            self._check(payload)  # raises in better words
+            self._check(payload)  # raises a more specific error
             raise self._unsendable.error(payload, error, self._spec.codec.name) from error
         self._unsendable.resolve()
         if self._transport.is_heard or self._is_latched:
@@ -176,22 +182,31 @@ class Publisher:
             self._transport.skip()
 
     def _quickly(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
-        """Let `publish` be a function of the transport: what is not ordinary comes back to the method."""
+        # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
         look = None if self._nulls is None else self._nulls.look
         kind = bytes if self._spec.codec.name == "bytes" else None
         quick = transport.quick_publish(QuickPublish(self, kind, encode, look, self.publish))
         quick.__doc__ = Publisher.publish.__doc__
-        setattr(self, "publish", quick)  # noqa: B010 - mypy takes a method for what cannot be replaced
+        setattr(self, "publish", quick)  # noqa: B010 - mypy rejects the assignment to a method
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
-        """Send bytes that are encoded already. Raises as `publish` does."""
+        """Send data that is already encoded. Thread-safe.
+
+        Args:
+            data: The encoded payload.
+            extension: Additional header fields of the message.
+
+        Raises:
+            EncodeError: The data is not bytes, or the extension is not a map.
+            ClosedError: The publisher is closed.
+        """
         if self.is_closed or not (self._transport.is_heard or self._is_latched):
             self._skip(Encoded(data, extension))
         else:
             self._send(encoded((data, extension)))
 
     def refuse(self, payload: object, error: Exception) -> None:
-        """Count and tell a payload that its owner could not encode, as `publish` does what it refuses."""
+        """Count and report a payload that the caller could not encode, as `publish` does."""
         self._unsendable.add(payload, error)
 
     def _send(self, made: Encoded) -> None:
@@ -199,14 +214,14 @@ class Publisher:
             self._check(made)
         try:
             self._transport.send(made)
-        except WireError as error:  # what is in the extension
+        except WireError as error:  # in the extension
             self._unsendable.add(made, error)
             return
         if self._unsendable.problem:
             self._unsendable.resolve()
 
     def _check(self, payload: object) -> None:
-        """Raises `EncodeError` for what can be seen at once."""
+        # Raises `EncodeError` for errors visible without encoding.
         if not isinstance(payload, Encoded):
             self._spec.codec.check(payload)
             return
@@ -217,47 +232,54 @@ class Publisher:
             raise EncodeError(codec, type(extension).__name__, _("an extension is a map"))
 
     def _skip(self, payload: object) -> None:
-        """Count a message that nobody wants; now and then see whether it could be sent."""
+        # Counts a message without subscribers; encodes it from time to time to detect errors.
         if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         self._check(payload)
         if self._unsendable.try_out(payload):
             self._transport.skip()
 
-    # ---- the original module's names
+    # ---- names of the original module
 
     def send_json(self, message: object) -> None:
-        """Publish a message of the type `json`. Raises as `publish` does."""
+        """Publish a message of type `json`, as `publish` does."""
         self.publish(message)
 
     def send_string(self, message: str) -> None:
-        """Publish a message of the type `string`. Raises as `publish` does."""
+        """Publish a message of type `string`, as `publish` does."""
         self.publish(message)
 
     def send_image(self, message: object) -> None:
-        """Publish a picture. Raises as `publish` does."""
+        """Publish an image, as `publish` does."""
         self.publish(message)
 
     def send_bytes(self, message: bytes) -> None:
-        """Publish a message of the type `bytes`. Raises as `publish` does."""
+        """Publish a message of type `bytes`, as `publish` does."""
         self.publish(message)
 
     def send_msgpack(self, message: object) -> None:
-        """Publish a message of the type `msgpack`. Raises as `publish` does."""
+        """Publish a message of type `msgpack`, as `publish` does."""
         self.publish(message)
 
-    sendJson = sendDictionary = send_json  # noqa: N815 - the original's names from 0.5.4.7 on
+    sendJson = sendDictionary = send_json  # noqa: N815 - names of the original module from 0.5.4.7 on
     sendString = sendTopicString = send_string  # noqa: N815
     sendImages = send_image  # noqa: N815
     sendBytes = send_bytes  # noqa: N815
     sendMsgPack = send_msgpack  # noqa: N815
 
     def loan(self, shape: int | tuple[int, ...], dtype: str = "uint8") -> NDArray[Any]:
-        """An array to write into and then publish: a picture (`nep.raw_image`), or `bytes` as `Encoded`.
+        """Return an array to fill and publish without a copy.
 
-        It lies in memory that all subscribers share, where they do, and is then published without being
-        copied at all; else it is an ordinary array. After it is published it is the readers': take a new one
-        for the next message. Needs numpy. Raises `ClosedError`.
+        With shared memory the array lies in memory of all subscribers on this computer; otherwise it is an
+        ordinary array. Publish it as an image (`nep.raw_image`) or, for type `bytes`, as an `Encoded`. Don't
+        write to it after it is published: get a new one for the next message. Needs numpy.
+
+        Args:
+            shape: Shape of the array.
+            dtype: numpy type name.
+
+        Raises:
+            ClosedError: The publisher is closed.
         """
         if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
@@ -273,7 +295,7 @@ class Publisher:
         return lent
 
     def close(self, timeout_s: float = 2.0) -> None:
-        """Unregister, after what was published is delivered, `timeout_s` at most. May be called twice."""
+        """Deliver published messages within `timeout_s` seconds and unregister. Idempotent."""
         limit("timeout_s", timeout_s)
         if not self.is_closed:
             self.is_closed = True
@@ -284,11 +306,11 @@ class Publisher:
                     self._on_close(self)
 
     def node_closes(self) -> None:
-        """Its node closes it, with all others."""
+        """Mark the publisher as closed, together with its node."""
         self.is_closed = True
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the publisher as closed in a forked child process. See `nep.system.forks`."""
         self.is_closed = self._is_forked = True
 
     def __enter__(self) -> Self:
@@ -302,9 +324,13 @@ class Publisher:
 
 
 class Unsendable:
-    """Payloads of one publisher that cannot become bytes.
+    """Payloads of one publisher that can't be encoded: count, log and report them.
 
-    `encode` is its codec's; `report` tells the graph why, "" when all is well again.
+    Args:
+        topic: Name of the topic.
+        encode: The codec's encoder.
+        report: Called with the problem for the graph, or "" when it is solved.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(
@@ -315,9 +341,9 @@ class Unsendable:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.count = 0
-        """How many were refused."""
+        """Number of rejected payloads."""
         self.problem = ""
-        """Why the newest was; empty when it could be sent."""
+        """Reason why the newest payload was rejected, or "" if it could be encoded."""
         self._topic = topic
         self._encode = encode
         self._report = report
@@ -327,13 +353,13 @@ class Unsendable:
         self._known = ("", "")
 
     def try_out(self, payload: object) -> bool:
-        """Whether a payload that nobody wants could be sent. It is looked at now and then only."""
+        """Encode an unsubscribed payload at most once per interval; return False if it can't be encoded."""
         started = self._clock()
         if started < self._look_at:
             return True
         try:
             check_sendable(payload) if isinstance(payload, Encoded) else self._encode(payload)
-        except Exception as error:  # noqa: BLE001 - a payload may be of any class, which may raise anything
+        except Exception as error:  # noqa: BLE001 - a payload of any class may raise anything
             self.add(payload, error)
         else:
             self.resolve()
@@ -342,12 +368,12 @@ class Unsendable:
         return not self.problem
 
     def add(self, payload: object, error: Exception) -> None:
-        """`payload` cannot be sent because of `error`."""
+        """Count a payload that can't be encoded because of `error`."""
         self.count += 1
         said = _said(error)
         now = self._clock()
         if self._known[0] != said and (now >= self._place_at or not self._known[0]):
-            self._place_at = now + _LOOK_S  # looking for the place may take long
+            self._place_at = now + _LOOK_S  # finding the path may take long
             place = "" if getattr(error, "place", "") else _place_of(payload, self._encode)
             self._known = (said, f"{said}; it is at '{place}'" if place else said)
         sentence = self._known[1] if self._known[0] == said else said
@@ -360,7 +386,7 @@ class Unsendable:
             self._report(sentence)
 
     def error(self, payload: object, error: Exception, codec: str) -> EncodeError:
-        """What to raise for `payload`, which cannot be sent because of `error`: with the place, if known."""
+        """Return the exception to raise for a payload, with the path of the offending value."""
         if not isinstance(error, EncodeError):
             error = EncodeError(codec, type(payload).__name__, _said(error))
         place = error.place or _place_of(payload, self._encode)
@@ -369,7 +395,7 @@ class Unsendable:
         return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
 
     def resolve(self) -> None:
-        """A payload could be sent."""
+        """Report that a payload could be encoded."""
         if self.problem:
             self.problem = ""
             self._report("")
@@ -378,7 +404,7 @@ class Unsendable:
 def _said(error: Exception) -> str:
     try:
         said = str(error)
-    except Exception:  # noqa: BLE001 - its class is the payload's own
+    except Exception:  # noqa: BLE001 - an exception class of the payload may raise anything
         said = ""
     if not isinstance(error, EncodeError | WireError):
         said = f"{type(error).__name__}: {said}"
@@ -386,7 +412,7 @@ def _said(error: Exception) -> str:
 
 
 def check_sendable(payload: Encoded) -> None:
-    """Raises `WireError` for an extension that has no form on the wire."""
+    """Raise `WireError` for an extension that can't be encoded."""
     if payload.extension:
         extension_part(payload.extension)
 
@@ -394,14 +420,14 @@ def check_sendable(payload: Encoded) -> None:
 def _place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     try:
         return "" if isinstance(payload, Encoded) else escaped(shortened(place_of(payload, encode), _LONGEST))
-    except Exception:  # noqa: BLE001 - its keys may be of any class
+    except Exception:  # noqa: BLE001 - keys of any class may raise anything
         return ""
 
 
 def place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
-    """Where in `payload` the first value is that cannot be encoded, such as "pose.x" or "joints[3]".
+    """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
-    Empty when that is the whole, or is not found among ten thousand values.
+    Empty for the payload itself, or when none is found among ten thousand values.
     """
     path, value, left = "", payload, _LOOKED_AT
     for _level in range(_DEEPEST):

@@ -1,4 +1,4 @@
-"""SharedWait: what one thread waits by for subscribers of any nodes and back ends."""
+"""Wait of one thread for subscribers of any nodes and back ends."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from nep.system.wakeup import Waker
 __all__ = ["SharedWait"]
 
 _LOOK_S = 0.01
-"""How often those are looked at that cannot tell when something comes."""
+"""Polling interval for subscribers that can't notify."""
 
 
 class _Bell:
-    """What a subscriber rings. A `Wakes`."""
+    """Callback object that a subscriber wakes (a `Wakes`)."""
 
     def __init__(self, waits: SharedWait, subscriber: SubscriberTransport) -> None:
         self._waits = waits
         self._subscriber = subscriber
 
     def wake(self) -> None:
-        """There may be something to read. From any thread."""
+        # Thread-safe.
         self._waits.ring(self._subscriber)
 
 
 class SharedWait:
-    """Subscribers that are armed, until they ring: one that has a descriptor is polled, others ring a bell.
+    """Set of armed subscribers and the wait for them: by descriptor where there is one, else by notification.
 
-    Only the thread that waits arms, disarms and closes; any thread may `wake` it. A wake that comes early is
-    kept. Raises `TooManyFilesError`.
+    Only the waiting thread may arm, disarm and close; `wake` is thread-safe. A wake before the wait is kept.
+    Raises `TooManyFilesError`.
     """
 
     def __init__(self) -> None:
@@ -51,10 +51,10 @@ class SharedWait:
         self._rung: deque[SubscriberTransport] = deque()
 
     def arm(self, subscriber: SubscriberTransport) -> bool:
-        """Wait for this one, too; False when it may have something already, or is closed. Twice is once."""
+        """Arm a subscriber. Return False if it may already have a message or is closed. Idempotent."""
         if subscriber in self._bells or subscriber in self._looked_at:
             return True
-        if getattr(subscriber, "enter_wait", None) is None:  # of a plug-in that is older
+        if getattr(subscriber, "enter_wait", None) is None:  # an older plug-in
             self._looked_at.add(subscriber)
             return not subscriber.is_closed
         bell = _Bell(self, subscriber)
@@ -64,31 +64,31 @@ class SharedWait:
         if subscriber.fd >= 0:
             try:
                 self._selector.register(subscriber.fd, selectors.EVENT_READ, subscriber)
-            except (OSError, ValueError, KeyError):  # it cannot be polled
+            except (OSError, ValueError, KeyError):  # not pollable
                 subscriber.leave_wait(self._bells.pop(subscriber))
                 self._looked_at.add(subscriber)
         return True
 
     def disarm(self, subscriber: SubscriberTransport) -> None:
-        """Wait for it no more."""
+        """Disarm a subscriber."""
         self._looked_at.discard(subscriber)
         bell = self._bells.pop(subscriber, None)
         if bell is not None:
             if subscriber.fd >= 0:
                 with suppress(
                     OSError, ValueError, KeyError
-                ):  # it was closed, and the number may be another's
+                ):  # closed; its number may belong to another file now
                     self._selector.unregister(subscriber.fd)
             subscriber.leave_wait(bell)
 
     def disarm_all(self) -> None:
-        """Wait for none any more."""
+        """Disarm all subscribers."""
         for subscriber in list(self._bells):
             self.disarm(subscriber)
         self._looked_at.clear()
 
     def wait(self, timeout_s: float) -> list[SubscriberTransport]:
-        """Wait until one rings or `wake` is called, `timeout_s` at most; those that rang are disarmed."""
+        """Wait for a subscriber or `wake`, at most `timeout_s`. Return and disarm ready subscribers."""
         ready = self._selector.select(min(timeout_s, _LOOK_S) if self._looked_at else timeout_s)
         self._waker.clear()
         self._rung.extend(key.data for key, _events in ready if key.data is not None)
@@ -102,16 +102,16 @@ class SharedWait:
         return list(rung)
 
     def ring(self, subscriber: SubscriberTransport) -> None:
-        """This one may have something to read. From any thread."""
+        """Mark a subscriber as ready and end the wait. Thread-safe."""
         self._rung.append(subscriber)
         self._waker.wake()
 
     def wake(self) -> None:
-        """End the wait that is under way, or the next one. From any thread."""
+        """End the current wait, or the next one. Thread-safe."""
         self._waker.wake()
 
     def close(self) -> None:
-        """Disarm all, and give the descriptors back."""
+        """Disarm all subscribers and close the descriptors."""
         self.disarm_all()
         self._selector.close()
         self._waker.close()

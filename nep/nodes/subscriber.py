@@ -1,4 +1,4 @@
-"""Subscriber: messages in, payloads out. Made by `Node.new_sub`."""
+"""Subscriber returned by `Node.new_sub`."""
 
 from __future__ import annotations
 
@@ -22,17 +22,23 @@ if TYPE_CHECKING:
 __all__ = ["SLICE_S", "Subscriber"]
 
 SLICE_S = 0.1
-"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
 
 _NO_PAYLOADS: deque[Any] = deque()
 _logger = logging.getLogger("nep")
 
 
 class Subscriber:
-    """Receives from one topic, in order. Iterating yields `Message`s until it is closed, also `async for`."""
+    """Receive messages of one topic, in order. Created by `Node.new_sub`.
+
+    Iterating (`for` or `async for`) yields `Message` objects until the subscriber is closed. Usable as a
+    context manager.
+
+        has_message, payload = sub.listen(timeout_s=1.0)
+    """
 
     is_typed = False
-    """Whether its payloads are instances of a type of its own (`nep.nodes.typed`)."""
+    """True if payloads are instances of a declared type (`nep.nodes.typed`)."""
 
     def __init__(
         self,
@@ -47,7 +53,7 @@ class Subscriber:
         self._ready = transport.ready
         self._quick = transport if isinstance(transport, GivesPayloads) else None
         self.payloads = _NO_PAYLOADS if self._quick is None else self._quick.payloads
-        """Of messages that come next: for who wants no more of them. See `GivesPayloads`."""
+        """Decoded payloads that are read next, for callers that don't need the messages."""
         self._empty = codec_for(spec.msg_type).empty
         self._async_reader = AsyncReader(transport, self._poll_first)
         self._problem = ""
@@ -55,44 +61,51 @@ class Subscriber:
 
     @property
     def topic(self) -> str:
-        """The topic's name."""
+        """Name of the topic, or the pattern."""
         return self._spec.topic
 
     @property
     def msg_type(self) -> str:
-        """The type under which it is registered; messages tell their own."""
+        """Registered message type; each message has its own."""
         return self._spec.msg_type
 
     @property
     def id(self) -> int:
-        """Its id in the graph."""
+        """Id of the subscriber in the graph."""
         return self._spec.id
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of received messages."""
         return self._transport.received
 
     @property
     def lost(self) -> int | None:
-        """Messages that did not arrive or were dropped here unread; None where nobody can know."""
+        """Number of messages lost in transit or dropped unread; None if the back end can't know it."""
         return self._transport.lost
 
     @property
     def refused(self) -> int:
-        """What came and was no message at all; why is an alert in the graph."""
+        """Number of received frames that were not valid messages; the reason is an alert in the graph."""
         return self._transport.refused
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True if the subscriber or its node was closed."""
         return self._transport.is_closed
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """(True, payload) of the next message, or (False, an empty payload) when there is none.
+        """Return (True, payload) of the next message, or (False, empty payload) without one.
 
-        Does not wait, unless `block_mode` (for ever) or `timeout_s` is given. A message that cannot be
-        decoded is skipped, logged, and an alert in the graph until one can. Raises `ClosedError`.
+        Messages that can't be decoded are skipped, logged, and reported as an alert in the graph.
+
+        Args:
+            block_mode: Wait without limit.
+            timeout_s: Time limit in seconds. Without both arguments the call does not wait.
+
+        Raises:
+            ClosedError: The subscriber is closed.
+            ValueError: `timeout_s` is negative.
         """
         try:
             is_wrong = timeout_s is not None and not timeout_s >= 0.0
@@ -106,7 +119,7 @@ class Subscriber:
                 return True, payloads.popleft()
             except IndexError:  # another thread took the last one
                 pass
-        while ready:  # read already
+        while ready:  # already read
             try:
                 message = ready.popleft()
             except IndexError:  # another thread took the last one
@@ -114,7 +127,7 @@ class Subscriber:
             try:
                 if self._problem:
                     return True, self.decoded(message)
-                if message.decoded is UNDECODED:  # nobody else has it: what it says need not be kept
+                if message.decoded is UNDECODED:  # not shared: the decoded payload need not be cached
                     return True, message.kind.decode(message.raw, message.extension)
                 return True, message.decoded
             except DecodeError as error:
@@ -122,7 +135,6 @@ class Subscriber:
         return self._listen_on(block_mode, timeout_s)
 
     def _listen_on(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
-        """When nothing was read already."""
         limit = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit if limit else None
         while True:
@@ -135,38 +147,43 @@ class Subscriber:
                 if deadline is not None:
                     limit = max(0.0, deadline - time.monotonic())
 
-    # ---- the original module's names
+    # ---- names of the original module
 
     def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return what `listen` does, for a topic of the type `json`."""
+        """Call `listen`, for a topic of type `json`."""
         return self.listen(block_mode)
 
     def listen_string(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return what `listen` does, for a topic of the type `string`."""
+        """Call `listen`, for a topic of type `string`."""
         return self.listen(block_mode)
 
     def listen_image(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return what `listen` does, for a topic of pictures."""
+        """Call `listen`, for a topic of images."""
         return self.listen(block_mode)
 
     def listen_bytes(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return what `listen` does, for a topic of the type `bytes`."""
+        """Call `listen`, for a topic of type `bytes`."""
         return self.listen(block_mode)
 
     def listen_msgpack(self, block_mode: bool = False) -> tuple[bool, object]:
-        """Return what `listen` does, for a topic of the type `msgpack`."""
+        """Call `listen`, for a topic of type `msgpack`."""
         return self.listen(block_mode)
 
-    listenJson = listenDictionary = listen_json  # noqa: N815 - the original's names from 0.5.4.7 on
+    listenJson = listenDictionary = listen_json  # noqa: N815 - names of the original module from 0.5.4.7 on
     listenString = listenStringTopic = listen_string  # noqa: N815
     listenImages = listen_image  # noqa: N815
     listenBytes = listen_bytes  # noqa: N815
     listenMsgPack = listen_msgpack  # noqa: N815
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """The next message, undecoded; None after `timeout_s` seconds without one (None waits for ever).
+        """Return the next message, not yet decoded, or None after the time limit.
 
-        Raises `ClosedError`, and `ValueError` for a time below 0.
+        Args:
+            timeout_s: Time limit in seconds; None waits without limit.
+
+        Raises:
+            ClosedError: The subscriber is closed.
+            ValueError: `timeout_s` is negative.
         """
         try:
             is_wrong = timeout_s is not None and not timeout_s >= 0.0
@@ -178,24 +195,23 @@ class Subscriber:
         return self._receive(timeout_s)
 
     def _receive_to_listen(self, timeout_s: float | None) -> Message | None:
-        """As `receive`; of messages that come with it only the payloads are wanted."""
         self.want_payloads()
         return self._receive(timeout_s)
 
     def want_payloads(self) -> None:
-        """Of what is read next only the payloads are wanted; not while there is a problem to be resolved."""
+        """Read only payloads from now on, unless a problem is reported or the payloads are typed."""
         if self._quick is not None:
             self._quick.wants_payloads = not (self._problem or self.is_typed)
 
     def want_messages(self) -> None:
-        """Of what is read next whole messages are wanted, also of what was read already."""
+        """Read whole messages from now on, also from data that was already read."""
         if self._quick is not None:
             self._quick.wants_payloads = False
             if self.payloads:
                 self._quick.restore()
 
     def _receive(self, timeout_s: float | None) -> Message | None:
-        if self._ready:  # read already
+        if self._ready:  # already read
             try:
                 return self._ready.popleft()
             except IndexError:  # another thread took it
@@ -207,7 +223,6 @@ class Subscriber:
         return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
 
     def _receive_on(self, timeout_s: float | None) -> Message | None:
-        """After the first slice."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             if self._transport.is_closed:
@@ -220,11 +235,17 @@ class Subscriber:
                 return message
 
     async def receive_async(self, timeout_s: float | None = None) -> Message | None:
-        """As `receive`, while other coroutines of the loop run. Whoever is cancelled has taken no message."""
+        """Return the next message as `receive` does, in an asyncio event loop.
+
+        Cancelling it loses no message.
+        """
         return await self._async_reader.receive(seconds("timeout_s", timeout_s))
 
     async def listen_async(self, timeout_s: float | None = None) -> tuple[bool, object]:
-        """As `listen`, while other coroutines of the loop run; waits for ever without `timeout_s`."""
+        """Return the next payload as `listen` does, in an asyncio event loop.
+
+        Waits without limit by default.
+        """
         limit = seconds("timeout_s", timeout_s)
         deadline = None if limit is None else time.monotonic() + limit
         while True:
@@ -237,7 +258,6 @@ class Subscriber:
                 limit = None if deadline is None else max(0.0, deadline - time.monotonic())
 
     def _poll_first(self) -> Message | None:
-        """What was read already, or what is there. Raises `ClosedError`."""
         self.want_messages()
         try:
             return self._ready.popleft()
@@ -253,13 +273,14 @@ class Subscriber:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def typed(self, message: Message) -> Message:
-        """A message that its transport handed out, as this subscriber hands it out."""
+        """Return a message of the transport as this subscriber presents it."""
         return message
 
     def decoded(self, message: Message) -> object:
-        """The payload of a message that it got; a problem is logged rarely and shown in the graph.
+        """Return the payload of a message. Errors are logged (rarely) and reported in the graph.
 
-        Raises `DecodeError`.
+        Raises:
+            DecodeError: The payload can't be decoded.
         """
         try:
             payload = message.payload
@@ -272,7 +293,7 @@ class Subscriber:
         return payload
 
     def taken(self, message: Message) -> object:
-        """What `decoded` gives, of a message that nobody else gets: what it says need not be kept."""
+        """Return the payload of a message that is not shared, without caching it."""
         if self._problem or message.decoded is not UNDECODED:
             return self.decoded(message)
         try:
@@ -282,7 +303,6 @@ class Subscriber:
             raise
 
     def _tell(self, error: DecodeError) -> None:
-        """A message cannot be read: tell the graph, and log it rarely."""
         self._unreadable += 1
         if is_logged(self._unreadable):
             _logger.warning(
@@ -292,14 +312,14 @@ class Subscriber:
         self._transport.report(self._problem)
 
     def close(self) -> None:
-        """Unregister; what was not read is forgotten. May be called twice."""
+        """Unregister and discard unread messages. Idempotent."""
         if not self._is_forked:
             self._transport.close()
             if self._on_close is not None:
                 self._on_close(self)
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the subscriber as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
         self._transport.forked()
 
@@ -311,7 +331,7 @@ class Subscriber:
                 return
             if message is not None:
                 yield message
-                message = None  # what was read can be given back before the next one comes
+                message = None  # release the payload before waiting for the next message
 
     def __aiter__(self) -> AsyncMessages:
         return AsyncMessages(self._async_reader)

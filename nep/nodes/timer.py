@@ -1,4 +1,4 @@
-"""Timer: calls a function again and again, in the thread that spins. Made by `Node.new_timer`."""
+"""Timer: calls a function periodically in the thread that spins. Created by `Node.new_timer`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ __all__ = ["Timer", "next_due"]
 
 
 class Timer:
-    """Due every `period_s` seconds, for the first time after one period; late, it is due once.
+    """Periodic timer of a node. Thread-safe. Created by `Node.new_timer`.
 
-    So a timer whose periods passed while something else ran does not make up for them, and keeps its beat:
-    it is due at whole periods after it was made. May be used from any thread, and by several that spin.
+    The first call is after one period. Missed ticks are coalesced, and the schedule stays aligned to the
+    period.
+
+        timer = node.new_timer(0.1, lambda: pub.publish(read_sensor()))
+        node.spin()
     """
 
     def __init__(
@@ -33,53 +36,53 @@ class Timer:
 
     @property
     def period_s(self) -> float:
-        """Seconds from one call to the next."""
+        """Period in seconds."""
         return self._period_s
 
     @property
     def callback(self) -> Callable[[], object]:
-        """What it calls."""
+        """Function that the timer calls."""
         return self._callback
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether it, or its node, was ended."""
+        """True if the timer was cancelled or its node was closed."""
         return self._is_cancelled
 
     @property
     def due(self) -> float:
-        """When it is due, by its clock."""
+        """Next due time, by the timer's clock."""
         return self._due
 
     def run_if_due(self) -> bool:
-        """Call the function if it is time; whether it was. What the function raises comes out here."""
+        """Call the function if it is due; return True if it was. Exceptions propagate."""
         is_due = self.take_turn()
         if is_due:
             self._callback()
         return is_due
 
     def take_turn(self) -> bool:
-        """Whether it is time to call the function; True to one of several threads that ask, which then does.
+        """Return True if the function is due; of several threads only one gets True and must call it.
 
-        It is not due again before the next period, also when the function raises, or spins itself.
+        The next due time is set before the call, so it is also right if the function raises or spins itself.
         """
         now = self._clock()
         if self._is_cancelled or now < self._due:
             return False
         with self._lock:
-            if now < self._due:  # another thread was first
+            if now < self._due:  # another thread was faster
                 return False
             self._due = now + self._period_s - math.fmod(now - self._due, self._period_s)
         return True
 
     def cancel(self) -> None:
-        """Call no more; a call that is under way ends by itself. From any thread; may be called twice."""
+        """Stop calling. A running call is not interrupted. Thread-safe; idempotent."""
         self._is_cancelled = True
         if self._on_cancel is not None:
             self._on_cancel(self)
 
     def node_closes(self) -> None:
-        """Call no more: the node is closed, or this is a child that was forked. Takes no lock."""
+        """Stop calling because the node is closed or the process was forked. Takes no lock."""
         self._is_cancelled = True
 
     def __repr__(self) -> str:
@@ -87,5 +90,5 @@ class Timer:
 
 
 def next_due(timers: Sequence[Timer]) -> float:
-    """When the first of them is due; infinite when there are none."""
+    """Return the earliest due time, or infinity without timers."""
     return min((each.due for each in timers), default=math.inf)

@@ -1,6 +1,6 @@
-"""Typed messages of nodes: `msg_type` may be a dataclass or a TypedDict wherever it may be a name.
+"""Typed messages: `msg_type` may be a dataclass or a TypedDict wherever it may be a name.
 
-What a type declares is looked at in `nep.messages.typed`, which is imported when the first one is given.
+`nep.messages.typed`, which analyses the declarations, is imported when the first type is used.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ else:
 __all__ = ["MsgType", "TypedSubscriber", "codec_of", "name_of", "new_subscriber", "sink_of"]
 
 MsgType = str | type
-"""A name, or a dataclass or TypedDict whose instances are the payloads."""
+"""Name of a message type, or a dataclass or TypedDict whose instances are the payloads."""
 
 
 def name_of(msg_type: object) -> str:
-    """The name under which it is registered. Raises `ValueError`."""
+    """Return the registered name of a message type. Raises `ValueError`."""
     return typed.message_type(msg_type).name if isinstance(msg_type, type) else text("msg_type", msg_type)
 
 
 def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
-    """The codec of a publisher."""
+    """Return the codec of a publisher."""
     if not isinstance(msg_type, type):
         return backend.codec_for(msg_type)
     declared = typed.message_type(msg_type)
@@ -41,7 +41,7 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
 
 
 def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
-    """A subscriber's sink: it is given messages with typed payloads. Raises `ValueError`."""
+    """Return a sink that gets messages with typed payloads. Raises `ValueError`."""
     if sink is None or not isinstance(msg_type, type):
         return None if sink is None else function("sink", sink)
     give, reader = function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
@@ -49,7 +49,7 @@ def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
 
 
 class TypedSubscriber(Subscriber):
-    """Its messages have instances of a type as their payloads; `listen` gives None when nothing came."""
+    """Subscriber whose payloads are instances of a type; `listen` returns (False, None) without a message."""
 
     is_typed = True
 
@@ -65,20 +65,20 @@ class TypedSubscriber(Subscriber):
         self._empty = _nothing
 
     def typed(self, message: Message) -> Message:
-        """See `Subscriber.typed`."""
+        """Return the message with a typed payload."""
         return self._reader.typed(message)
 
     def taken(self, message: Message) -> object:
-        """See `Subscriber.taken`."""
+        """Return the typed payload of a message that is not shared."""
         return self.decoded(self._reader.typed(message))
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
-        """See `Subscriber.listen`."""
+        """Return (True, payload) of the next message, or (False, None) without one."""
         seconds("timeout_s", timeout_s)
         return self._listen_on(block_mode, timeout_s)
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """See `Subscriber.receive`."""
+        """Return the next message with a typed payload, or None after the time limit."""
         message = super().receive(timeout_s)
         return None if message is None else self._reader.typed(message)
 
@@ -100,7 +100,7 @@ def new_subscriber(
     on_close: Callable[[Subscriber], object],
     msg_type: MsgType,
 ) -> Subscriber:
-    """A subscriber of this type."""
+    """Return a subscriber for the message type."""
     if isinstance(msg_type, type):
         return TypedSubscriber(transport, spec, on_close, msg_type)
     return Subscriber(transport, spec, on_close)

@@ -1,4 +1,4 @@
-"""Work: what a node does when it spins: its callbacks, timers and servers. One for each node."""
+"""Work of a spinning node: its callbacks, timers and servers."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from nep.system.arguments import is_coroutine_function
 __all__ = ["NOTHING", "Callback", "Work"]
 
 NOTHING = object()
-"""There is no message for a callback."""
+"""Returned instead of a message when there is none."""
 
 
 class Callback(NamedTuple):
-    """A function, and whose messages it is given: whole ones, or their payloads."""
+    """Callback with its subscriber; `with_message`: it gets whole messages instead of payloads."""
 
     subscriber: Subscriber
     transport: SubscriberTransport
@@ -31,9 +31,9 @@ class Callback(NamedTuple):
 
 
 class Work:
-    """Callbacks, timers and servers of one node, and whether they are to run. May be used from any thread.
+    """Callbacks, timers and servers of one node, and their scheduling. Thread-safe.
 
-    `clock` tells seconds that never go back.
+    `clock` is a monotonic clock in seconds.
     """
 
     def __init__(
@@ -50,12 +50,12 @@ class Work:
         self._is_stopped = threading.Event()
         self._watchers: tuple[Wakes, ...] = ()
         self._coroutine = ""
-        """What only a loop of asyncio can run; empty when there is nothing."""
+        """Description of a callback that needs an event loop, or ""."""
 
-    # ---- what there is to do
+    # ---- callbacks and timers
 
     def add_callback(self, callback: Callback) -> None:
-        """Give it messages from now on."""
+        """Add a callback."""
         with self._lock:
             if not callback.transport.is_closed and not self.is_closed:
                 self.callbacks = (*self.callbacks, callback)
@@ -64,13 +64,13 @@ class Work:
         self.wake()
 
     def forget_callback(self, subscriber: Subscriber) -> None:
-        """It is closed."""
+        """Remove the callback of a closed subscriber."""
         with self._lock:
             self.callbacks = tuple(each for each in self.callbacks if each.subscriber is not subscriber)
             self._look_again()
 
     def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
-        """A timer that runs from now on. See `Timer`."""
+        """Create and start a timer. See `Timer`."""
         timer = Timer(period_s, callback, self.clock, self._forget_timer)
         with self._lock:
             if self.is_closed:
@@ -79,56 +79,55 @@ class Work:
                 self.timers = (*self.timers, timer)
                 if is_coroutine_function(callback):
                     self._coroutine = self._coroutine or repr(timer)
-        self.wake()  # who spins already waits for less long now
+        self.wake()  # a spinning thread may have to wake earlier now
         return timer
 
     def _forget_timer(self, timer: Timer) -> None:
-        """It is cancelled."""
         with self._lock:
             self.timers = tuple(each for each in self.timers if each is not timer)
             self._look_again()
 
     def _look_again(self) -> None:
-        """Something ended: whether there is anything left that only a loop can run."""
+        # Call with the lock held.
         if self._coroutine:
             topics = (each.subscriber.topic for each in self.callbacks if is_coroutine_function(each.call))
             timers = (repr(each) for each in self.timers if is_coroutine_function(each.callback))
             self._coroutine = next(chain(topics, timers), "")
 
-    # ---- whether it is to be done
+    # ---- state
 
     @property
     def is_running(self) -> bool:
-        """Whether it was neither stopped nor closed."""
+        """True unless stopped or closed."""
         return not self._is_stopped.is_set() and not self.is_closed
 
     def stop(self) -> None:
-        """End the spin that is under way, or the next one."""
+        """End the current spin, or the next one."""
         self._is_stopped.set()
         self.wake()
 
     def begin_anew(self) -> None:
-        """Who span has ended: the next spin is not stopped."""
+        """Reset the stop request: the spin has ended."""
         self._is_stopped.clear()
 
     def wake(self) -> None:
-        """Whoever waits looks again at what there is to do."""
+        """Wake the spinning thread so that it re-evaluates its work."""
         self.transport.wake()
         for each in self._watchers:
             each.wake()
 
     def watch(self, watcher: Wakes) -> None:
-        """Wake this one as well, until `unwatch`."""
+        """Add an object that `wake` also wakes."""
         with self._lock:
             self._watchers = (*self._watchers, watcher)
 
     def unwatch(self, watcher: Wakes) -> None:
-        """Wake it no more."""
+        """Remove an object added by `watch`."""
         with self._lock:
             self._watchers = tuple(each for each in self._watchers if each is not watcher)
 
     def close(self) -> None:
-        """The node is closed: nothing is called any more."""
+        """Remove all callbacks and timers: the node is closed."""
         with self._lock:
             self.is_closed = True
             self.callbacks = ()
@@ -140,7 +139,7 @@ class Work:
             each.wake()
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Discard everything in a forked child process. See `nep.system.forks`."""
         self.is_closed = self.is_forked = True
         self._lock = threading.Lock()
         self._is_stopped = threading.Event()
@@ -149,18 +148,19 @@ class Work:
         self.callbacks, self.timers, self._watchers = (), (), ()
 
     def check_not_forked(self) -> None:
-        """Raises `ClosedError` in a child that was forked."""
+        """Raise `ClosedError` in a forked child process."""
         if self.is_forked:
             raise ClosedError(f"node '{self._node_name}'", is_forked=True)
 
-    # ---- doing it
+    # ---- running
 
     def run(self) -> bool:
-        """Each timer that is due, one call for each server and one message for each callback that has one.
+        """Run due timers, one call per server and one message per callback; return True if there may be more.
 
-        Whether there is more.
+        Exceptions of callbacks propagate.
 
-        Raises what they raise, and `NepError` when one is a coroutine function.
+        Raises:
+            NepError: A callback is a coroutine function.
         """
         if self._coroutine:
             raise NepError(
@@ -175,10 +175,7 @@ class Work:
         return self._run_callbacks() or has_run
 
     def _run_on(self, until: float) -> bool:
-        """What `run` does, and for the only callback there is more than one message, until this time.
-
-        With several callbacks each gets one message and then the next one has its turn.
-        """
+        # A single callback gets messages until the time `until`; several callbacks get one message each.
         callbacks = self.callbacks
         if len(callbacks) != 1 or self.services.has_servers or self._coroutine:
             return self.run()
@@ -190,7 +187,7 @@ class Work:
         return self._run_payloads(callbacks, until) or has_run
 
     def _run_payloads(self, callbacks: tuple[Callback, ...], until: float) -> bool:
-        """The only callback gets payloads until this time; whether there may be more."""
+        # Returns True if there may be more.
         subscriber, transport, call, _with_message = callbacks[0]
         ready, clock, is_stopped = transport.ready, self.clock, self._is_stopped.is_set
         taken, payloads, is_brisk = subscriber.taken, subscriber.payloads, False
@@ -207,21 +204,20 @@ class Work:
                         return is_brisk
                     payload = taken(found)
             except (DecodeError, IndexError):
-                continue  # it is logged and an alert; or another thread took the last one
+                continue  # already logged and reported; or another thread took the last one
             call(payload)
             if not (payloads or ready):
                 return is_brisk
-            is_brisk = True  # several came together: there may be more
+            is_brisk = True  # several were received together: there may be more
             if clock() >= until:
                 break
         return True
 
     def run_servers(self) -> bool:
-        """One call for each server that has one; whether there was any."""
+        """Run one call per server; return True if there was any."""
         return self.services.run(self._is_stopped)
 
     def _run_timers(self) -> bool:
-        """Each timer that is due; whether there was any."""
         has_fired = False
         for timer in self.timers:
             has_fired = timer.run_if_due() or has_fired
@@ -230,14 +226,14 @@ class Work:
         return has_fired
 
     def _run_callbacks(self) -> bool:
-        """One message for each callback that has one; whether another was read with one of them."""
+        # Returns True if another message was read together with one of these.
         has_more, is_stopped = False, self._is_stopped.is_set
         for subscriber, transport, call, with_message in self.callbacks:
             if is_stopped() or self.is_closed:
                 break
             if subscriber.payloads:
                 subscriber.want_messages()
-            try:  # as in `given`, which takes a third longer for each message
+            try:  # inlined from `given`, which takes a third longer per message
                 message = transport.ready.popleft()
             except IndexError:
                 found = None if transport.is_closed else transport.poll()
@@ -251,12 +247,12 @@ class Work:
             try:
                 payload = subscriber.decoded(message)
             except DecodeError:
-                continue  # it is logged and an alert
+                continue  # already logged and reported
             call(message if with_message else payload)
         return has_more
 
     def given(self, callback: Callback) -> object:
-        """What a callback is given next; `NOTHING` when no message is there, or it cannot be decoded."""
+        """Return the next message or payload for a callback, or `NOTHING` without one that can be decoded."""
         subscriber, transport = callback.subscriber, callback.transport
         if subscriber.payloads:
             subscriber.want_messages()
@@ -272,31 +268,33 @@ class Work:
         try:
             payload = subscriber.decoded(message)
         except DecodeError:
-            return NOTHING  # it is logged and an alert
+            return NOTHING  # already logged and reported
         return message if callback.with_message else payload
 
     # ---- waiting
 
     @property
     def waiting(self) -> list[SubscriberTransport]:
-        """Those whose messages there is a callback for."""
+        """Transports of the open subscribers with a callback."""
         return [each[1] for each in self.callbacks if not each[1].is_closed]
 
     @property
     def due_s(self) -> float:
-        """So long until the first timer is due; infinite when there is none."""
+        """Seconds until the first timer is due; infinite without timers."""
         return next_due(self.timers) - self.clock()
 
     def _wait(self, timeout_s: float) -> None:
-        """For a message, a call, or `wake`."""
         waiting = [each[1] for each in self.callbacks if not each[1].is_closed]
-        if self.services.has_servers:  # so the transport has services
+        if self.services.has_servers:  # has_servers implies that the transport has services
             self.transport.wait(waiting, timeout_s, self.services.queues)  # type: ignore[call-arg]
         else:
             self.transport.wait(waiting, timeout_s)
 
     def spin(self, timeout_s: float | None) -> None:
-        """See `Node.spin`."""
+        """Run the work in this thread until stopped or closed, or for `timeout_s` seconds.
+
+        See `Node.spin`.
+        """
         deadline = None if timeout_s is None else self.clock() + timeout_s
         is_stopped = self._is_stopped.is_set
         try:
