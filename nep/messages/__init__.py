@@ -1,4 +1,4 @@
-"""Messages and what is in them: codecs between bytes and payloads, pictures, queues of messages.
+"""Messages: codecs between payloads and bytes, images, queues.
 
-Nothing here knows of sockets, nodes or masters.
+Independent of sockets, nodes and masters.
 """

@@ -1,4 +1,4 @@
-"""How the clocks of two computers differ, and how surely that is known."""
+"""Offset between the clocks of two computers, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -18,28 +18,31 @@ __all__ = [
 ]
 
 OFFSET_MAX_NS = 2**62
-"""No clock is wrong by more: 146 years."""
+"""Maximum plausible offset of a clock: 146 years."""
 UNCERTAINTY_MAX_NS = 10_000_000_000
-"""What is not known to ten seconds is not known."""
+"""Maximum useful uncertainty of an offset."""
 _DRIFT_PARTS = 20_000
-"""Two clocks that nobody sets drift apart by one part of so many at most: 50 microseconds a second."""
+"""Reciprocal of the maximum drift between two free-running clocks: 50 µs per second."""
 
 
 def drift_ns(elapsed_ns: float) -> int:
-    """How far two clocks may have drifted apart within so long."""
+    """Return the maximum drift of two clocks within a time."""
     return int(max(0.0, elapsed_ns)) // _DRIFT_PARTS
 
 
 def is_clock(offset_ns: int, uncertainty_ns: int) -> bool:
-    """Whether a clock can be so wrong, known so surely: what strangers tell may be any number."""
+    """Return True for a plausible offset and uncertainty; untrusted peers may send any number."""
     return abs(offset_ns) <= OFFSET_MAX_NS and 0 <= uncertainty_ns <= UNCERTAINTY_MAX_NS
 
 
 @dataclass(frozen=True)
 class ClockDifference:
-    """Add `add_ns` to a time of the other computer's clock, and it is one of this computer's.
+    """Difference between the clock of another computer and this one.
 
-    `uncertainty_ns` as of `known_at_ns` (`time.monotonic_ns`); None: both are the same clock.
+    Attributes:
+        add_ns: Added to a time of the other computer, it gives a time of this computer.
+        uncertainty_ns: Uncertainty at the time `known_at_ns`.
+        known_at_ns: Time of the comparison (`time.monotonic_ns`), or None for one and the same clock.
     """
 
     add_ns: int
@@ -47,7 +50,7 @@ class ClockDifference:
     known_at_ns: int | None = None
 
     def uncertainty_at(self, now_ns: int) -> int:
-        """How surely it is known now: clocks drift."""
+        """Return the uncertainty at a time: it grows with the drift of the clocks."""
         if self.known_at_ns is None:
             return self.uncertainty_ns
         return self.uncertainty_ns + drift_ns(now_ns - self.known_at_ns)
@@ -57,16 +60,16 @@ SAME_CLOCK = ClockDifference(0, 0)
 
 
 class PublisherClock:
-    """The clock of one publisher as its subscriber knows it: `difference` changes while messages are kept."""
+    """Clock of one publisher; `difference` is updated while messages refer to it."""
 
     __slots__ = ("difference",)
 
     def __init__(self, difference: ClockDifference | None = None) -> None:
         self.difference = difference
-        """None: nobody has compared it with the clock of this computer."""
+        """Difference to this computer's clock, or None if it is unknown."""
 
     def seconds(self) -> tuple[float, float] | None:
-        """What to add to its times (s), and how surely that is known (s, to both sides); None: not known."""
+        """Return the offset to add to its times and its uncertainty (±), in seconds; None if unknown."""
         known = self.difference
         if known is None:
             return None
@@ -74,6 +77,6 @@ class PublisherClock:
 
 
 NOT_COMPARED = PublisherClock()
-"""For publishers whose back end compares no clocks. It stays as it is,"""
+"""Clock of publishers whose back end does not compare clocks. Immutable."""
 OWN_CLOCK = PublisherClock(SAME_CLOCK)
-"""and so does this one, for publishers of this very computer."""
+"""Clock of publishers on this computer. Immutable."""

@@ -1,20 +1,19 @@
-"""Codecs: bytes ↔ payload. A codec is chosen by its name, on the wire by its number.
+"""Codecs between payloads and bytes, chosen by name, and identified on the wire by number.
 
-| name    | number | payload                                                                  |
-|---------|--------|--------------------------------------------------------------------------|
-| json    | 1      | what JSON has; also numpy arrays and scalars, dataclasses, date and time |
-| string  | 2      | `str`, as UTF-8                                                          |
-| bytes   | 3      | `bytes`                                                                  |
-| msgpack | 4      | what msgpack has, bytes and NaN included; date and time as its timestamp |
-| image   | 5      | a picture: an array (height, width, 3) in BGR order, see `nep.messages.image_codec`    |
+| name    | number | payload                                                                   |
+|---------|--------|---------------------------------------------------------------------------|
+| json    | 1      | JSON types; also numpy arrays and scalars, dataclasses, dates and times   |
+| string  | 2      | `str`, as UTF-8                                                           |
+| bytes   | 3      | `bytes`                                                                   |
+| msgpack | 4      | msgpack types including bytes and NaN; dates and times as its timestamp   |
+| image   | 5      | array (height, width, 3) in BGR order, see `nep.messages.image_codec`     |
 
-JSON has no NaN and no infinity: they are sent as `null`, and a publisher tells of it
-(`JsonEncoder`): a sensor without a value must not end its robot's program, and its readers must be
-able to read on. The original NEP up to 0.5.4.5 raised `ValueError`, 0.5.4.8 sends the bare word `NaN`,
-which no strict reader takes. Keys that are numbers become strings. msgpack takes numpy arrays and dataclasses
-as JSON does. Readers in other languages may want keys that are text or numbers; ours reads all that Python
-can have. Lists and maps have 64 levels at most, in both (`nep.messages.nesting`).
-Any other message type ("robot/description", "sensor_msgs/Image") is carried as json.
+JSON lacks NaN and infinity: they are sent as `null` and reported (`JsonEncoder`), because a sensor without a
+value must not stop its robot's program or its readers. The original NEP raised `ValueError` up to 0.5.4.5;
+0.5.4.8 sends `NaN`, which strict parsers reject. Number keys become strings. msgpack converts numpy arrays
+and dataclasses as JSON does; readers in other languages may require text or number keys. Lists and maps have
+at most 64 levels in both (`nep.messages.nesting`). Any other message type ("robot/description",
+"sensor_msgs/Image") is encoded as json.
 """
 
 from __future__ import annotations
@@ -61,22 +60,26 @@ _NUMPY = orjson.OPT_SERIALIZE_NUMPY
 _modules = sys.modules
 
 AGAIN_S = 10.0
-"""A topic that goes on sending them is told of so seldom."""
+"""Minimum interval between two warnings of a topic about NaN."""
 _logger = logging.getLogger("nep")
 _DEEPEST = 100
 NULL = b"null"
-"""Looked for from the end: in half the time of `in`, whose skipping trips over commas and digits."""
+"""Searched from the end: `rfind` takes half the time of `in`, which is slow with many commas and digits."""
 _PACKED_NAN = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
-"""NaN or infinity as msgpack has it; now and then something else."""
+"""NaN or infinity in msgpack; has false positives."""
 
 
 @dataclass(frozen=True)
 class Codec:
-    """One way to turn payloads into bytes and back.
+    """Encoder and decoder of a message type.
 
-    `encode` raises `EncodeError`, `decode` raises `DecodeError`; `empty` makes what `listen()` hands out
-    when nothing came; `number` goes into the message's header. `check` raises `EncodeError` for what can be
-    seen at once, whatever the payload's size: it is of a type that the codec does not take.
+    Attributes:
+        name: Name of the codec.
+        number: Number in the message header.
+        encode: Returns the `Encoded` payload. Raises `EncodeError`.
+        decode: Returns the payload of bytes and extension. Raises `DecodeError`.
+        empty: Returns the payload that `listen` returns without a message.
+        check: Raises `EncodeError` for a payload of a wrong type, in constant time.
     """
 
     name: str
@@ -88,7 +91,7 @@ class Codec:
 
 
 def _plain(value: object) -> object:
-    """What neither orjson nor msgpack know: things with `tolist()` (numpy), sets are refused by name."""
+    # Called for types unknown to orjson and msgpack; numpy values have `tolist`.
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
         return to_list()
@@ -109,11 +112,11 @@ def _encode_json(payload: object) -> Encoded:
     try:
         return encoded((_checked(orjson.dumps(payload, _plain, option), payload), None))
     except TypeError:
-        pass  # number keys need the slower way; everything else fails again with its reason
+        pass  # number keys need the slower option; other errors are raised again below
     try:
         data = orjson.dumps(payload, _plain, option | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError) as error:
-        # orjson itself takes 254 levels, and says so in words of its own
+        # orjson's own limit is 254 levels
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
         reason = too_deep() if is_deep else str(error.__cause__ or error) or _("it does not fit")
         raise EncodeError("json", type(payload).__name__, reason) from error
@@ -123,12 +126,11 @@ def _encode_json(payload: object) -> Encoded:
 
 
 def _ordinary_json(payload: object) -> bytes:
-    # `numpy_option` spelled out: the call itself would cost a tenth of a small message
+    # `numpy_option` inlined: the call would cost a tenth of the time of a small message
     return _checked(orjson.dumps(payload, _plain, _NUMPY if "numpy" in _modules else 0), payload)
 
 
 def _checked(data: bytes, payload: object) -> bytes:
-    """Return encoded JSON. Raises `EncodeError` when it is nested too deeply."""
     if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep())
     return data
@@ -140,7 +142,7 @@ def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> 
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as first:
-        # The original NEP's 0.5.4.8 sends bare NaN, which only Python's own reader takes.
+        # the original NEP 0.5.4.8 sends NaN, which only Python's json accepts
         try:
             return json.loads(str(data, "utf-8-sig"))
         except (ValueError, RecursionError):
@@ -148,7 +150,8 @@ def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> 
 
 
 def _anything(payload: object) -> None:
-    """What is in it shows only when it is encoded."""
+    # errors are detected by encoding only
+    ...
 
 
 def _check_string(payload: object) -> str:
@@ -197,8 +200,8 @@ def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) ->
 
 
 def _packable(value: object) -> object:
-    """What msgpack does not know, in the form that it has in JSON; only times keep their own."""
-    if isinstance(value, datetime):  # without a zone, or of a class of its own
+    # Converts as JSON does, except for times.
+    if isinstance(value, datetime):  # without a time zone, or of a subclass
         return msgpack.Timestamp.from_datetime(value.astimezone(timezone.utc))
     if isinstance(value, date | time):
         return value.isoformat()
@@ -271,12 +274,12 @@ _ORDINARY: Mapping[Callable[[object], Encoded], Callable[[Any], bytes]] = {
 }
 
 
-# What the original NEP calls by another name.
+# names of the original NEP
 _ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
 
 
 def codec(name: str) -> Codec:
-    """The codec of this name. Raises `DecodeError` for a name there is not."""
+    """Return a codec by name. Raises `DecodeError` for an unknown name."""
     try:
         return CODECS[name]
     except KeyError:
@@ -286,28 +289,31 @@ def codec(name: str) -> Codec:
 
 
 def codec_numbered(number: int) -> Codec | None:
-    """The codec of a header's number, None when this version of nep does not have it."""
+    """Return a codec by its number in the header, or None if this version lacks it."""
     return _NUMBERED.get(number)
 
 
 def ordinary(codec: Codec) -> Callable[[Any], bytes] | None:
-    """What makes the same bytes as `codec.encode`, of the payloads that there are most of.
+    """Return a faster encoder for common payloads, or None if there is none.
 
-    It raises anything for all others. None where nothing is quicker than `encode`.
+    It returns the same bytes as `codec.encode`; for other payloads it raises any exception.
     """
     return _ORDINARY.get(codec.encode)
 
 
 def codec_for(msg_type: str) -> Codec:
-    """The codec that carries a message type: the one of the same name, json for any other type."""
+    """Return the codec of a message type: the one of the same name, or json."""
     return CODECS.get(msg_type) or _ALIASES.get(msg_type, JSON)
 
 
-# ---- NaN and infinity, of which JSON has neither
+# ---- NaN and infinity, which JSON lacks
 
 
 class JsonEncoder:
-    """Encodes JSON for one publisher. `count` messages had NaN or infinity, which were sent as `null`."""
+    """JSON encoder of one publisher.
+
+    `count` is the number of messages in which NaN or infinity became `null`.
+    """
 
     def __init__(
         self,
@@ -326,7 +332,7 @@ class JsonEncoder:
         self._told_at = -math.inf
 
     def encode(self, payload: object) -> Encoded:
-        """The payload as JSON. Raises `EncodeError`."""
+        """Encode a payload as JSON. Raises `EncodeError`."""
         made = self._encode(payload)
         data = made.data
         if type(data) is bytes and data.rfind(NULL) >= 0:
@@ -334,7 +340,7 @@ class JsonEncoder:
         return made
 
     def look(self, payload: object) -> None:
-        """Count and tell a payload whose bytes have `NULL` in them, if it has NaN or infinity."""
+        """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log them."""
         if _may_have_nan(payload) and (where := nan_in(payload)) is not None:
             self.count += 1
             now = self._clock()
@@ -351,7 +357,7 @@ class JsonEncoder:
 
 
 def _may_have_nan(payload: object) -> bool:
-    """Whether it is worth looking: mostly `null` is None. msgpack takes a tenth of a look at each value."""
+    # Fast check: `null` is usually None, and msgpack takes a tenth of the time of a search in Python.
     try:
         return _PACKED_NAN.search(MSGPACK.encode(payload).data) is not None
     except EncodeError:
@@ -359,7 +365,7 @@ def _may_have_nan(payload: object) -> bool:
 
 
 def nan_in(value: object, path: str = "", depth: int = _DEEPEST) -> str | None:
-    """Where the first NaN or infinity is, such as "pose.x" or "joints[3]"; None when there is none."""
+    """Return the path of the first NaN or infinity, such as "pose.x" or "joints[3]", or None."""
     if isinstance(value, float):
         return None if math.isfinite(value) else path
     if value is None or isinstance(value, str | bytes | int) or depth <= 0:

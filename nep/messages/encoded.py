@@ -1,4 +1,4 @@
-"""Encoded: a payload that already is bytes."""
+"""Encoded: a payload as bytes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ __all__ = ["Encoded", "encoded"]
 
 
 class Encoded(NamedTuple):
-    """Bytes of a payload, and what has to travel beside them. A publisher sends it unchanged.
+    """Encoded payload, which a publisher sends unchanged.
 
-    `data`: the bytes, as the codec of the topic's type has them. `extension`: a map with text keys, such as
-    an image's "shape" and "encoding"; None for nothing.
+        pub.publish(nep.Encoded(jpeg_bytes))
+
+    Attributes:
+        data: Bytes in the encoding of the topic's message type.
+        extension: Additional header fields with text keys, such as "shape" and "encoding" of an image; or
+            None.
     """
 
     data: bytes | memoryview
@@ -23,4 +27,4 @@ class Encoded(NamedTuple):
 encoded: Callable[[tuple[bytes | memoryview, Mapping[str, object] | None]], Encoded] = partial(
     tuple.__new__, Encoded
 )
-"""An `Encoded` of these two, in a third of the time: it is made for every message."""
+"""Fast constructor of `Encoded`, in a third of the time; called for every message."""

@@ -13,7 +13,7 @@ __all__ = ["MISSING", "Path", "leaves", "parse_path", "path_text", "pick"]
 
 Path = tuple[str | int, ...]
 MISSING = object()
-"""What `pick` gives for a field that a message does not have."""
+"""Returned by `pick` for a missing field."""
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _DEEPEST = 40
@@ -21,7 +21,7 @@ _PLAIN = re.compile(r"[^.\[\]\"\s]+")
 
 
 def parse_path(text: str) -> Path:
-    """The steps of a path. Raises `NepError` with a sentence."""
+    """Parse a field path. Raises `NepError`."""
     if text == ".":
         return ()
     steps: list[str | int] = []
@@ -46,10 +46,10 @@ def parse_path(text: str) -> Path:
 
 
 def pick(payload: object, path: Path) -> object:
-    """The value at the path, or `MISSING`."""
+    """Return the value at a path, or `MISSING`."""
     value = payload
     for step in path:
-        if type(value) is dict:  # nearly always: an abstract class is asked for ten times as long
+        if type(value) is dict:  # common case: isinstance checks of abstract classes take ten times as long
             value = value.get(step, MISSING)
             if value is MISSING:
                 return MISSING
@@ -65,7 +65,7 @@ def pick(payload: object, path: Path) -> object:
 
 
 def path_text(path: Path) -> str:
-    """The path as it is written: `parse_path` reads it back."""
+    """Format a path; the inverse of `parse_path`."""
     return "".join(_written(step) for step in path).removeprefix(".") or "."
 
 
@@ -76,7 +76,7 @@ def _written(step: str | int) -> str:
 
 
 def leaves(payload: object, most: int = 200) -> Iterator[str]:
-    """The paths of all single values in a message, `most` of them at most; what is deeper is one value."""
+    """Iterate over the paths of at most `most` scalar values; values below the depth limit count as one."""
     left = [most]
     yield from _leaves(payload, "", left, _DEEPEST)
 

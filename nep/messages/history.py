@@ -1,4 +1,4 @@
-"""History: a publisher's newest messages, for subscribers that come late. Bounded in number and in bytes."""
+"""History: newest messages of a publisher for later subscribers, bounded in number and bytes."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Generic, TypeVar
 __all__ = ["HISTORY_BYTES", "MAX_HISTORY", "History"]
 
 MAX_HISTORY = 1_000
-"""So many messages a publisher keeps at most: every back end takes them for a new subscriber at once."""
+"""Maximum length of a history: every back end accepts this number at once for a new subscriber."""
 HISTORY_BYTES = 64 * 2**20
 
 T = TypeVar("T")
 
 
 class History(Generic[T]):
-    """The newest `most` messages, oldest first, of `max_bytes` together; the newest in any case.
+    """Newest messages, oldest first, bounded in number and total bytes; the newest is always kept.
 
-    Without messages to keep it is empty for ever. It lives under its publisher's lock.
+    With `most` 0 it stays empty. Not thread-safe: guarded by the publisher's lock.
     """
 
     def __init__(self, most: int, max_bytes: int = HISTORY_BYTES) -> None:
@@ -26,10 +26,10 @@ class History(Generic[T]):
         self._max_bytes = max_bytes
         self._kept: deque[tuple[T, int]] = deque()
         self.size_bytes = 0
-        """Of all payloads."""
+        """Total size of the payloads."""
 
     def add(self, message: T, size_bytes: int) -> None:
-        """Keep it, and as many of those before as there is room for."""
+        """Append a message; evict the oldest beyond the limits."""
         if not self._most:
             return
         self._kept.append((message, size_bytes))

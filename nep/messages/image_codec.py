@@ -1,16 +1,15 @@
-"""The codec `image`: pictures as JPEG, PNG or raw bytes ↔ arrays, colours in BGR order.
+"""Codec `image`: arrays in BGR order, encoded as JPEG, PNG or raw pixels.
 
-The extension that travels beside the bytes is `{"shape": [height, width, channels], "encoding": NAME}`, where
-NAME is "jpeg", "png", or says how raw bytes are laid out: "mono8", "bgr8", "bgra8", "mono16", "bgr16",
-"bgra16", "rgb8", "rgba8", or the type of its numbers and the count of channels, such as "32FC1" (float).
+The extension of a message is `{"shape": [height, width, channels], "encoding": NAME}`. NAME is "jpeg" or
+"png", or the layout of raw pixels: "mono8", "bgr8", "bgra8", "mono16", "bgr16", "bgra16", "rgb8", "rgba8", or
+number type and number of channels, such as "32FC1" (float).
 
-An array is published as a publisher's `ImageFormat` says, else as what keeps it: `uint8` of one or three
-channels, which a camera sends, as JPEG of quality 90; with an alpha channel or of 16 bits (depth) as PNG; any
-other numbers as raw bytes.
-`raw_image(array)` makes a payload that is sent raw, without loss and without the time for a PNG. Bytes that
-already are a JPEG or PNG file pass unchanged. Who receives it gets an array (height, width) of one channel,
-else (height, width, channels), of the same numbers. Messages of the original NEP carry no extension: their
-first bytes tell what they are.
+An array is encoded as its publisher's `ImageFormat` requests. By default `uint8` with one or three channels,
+as from a camera, is sent as JPEG of quality 90, with alpha channel or 16 bits (depth) as PNG, and other types
+as raw pixels. `raw_image(array)` returns a payload that is sent raw: without loss and without the time for
+PNG compression. Bytes of a JPEG or PNG file are sent unchanged. Subscribers get an array (height, width) for
+one channel, otherwise (height, width, channels), of the same number type. Messages of the original NEP have
+no extension: the format is detected from the first bytes.
 """
 
 from __future__ import annotations
@@ -46,9 +45,9 @@ __all__ = [
 
 JPEG_QUALITY = 90
 WIDEST = 65_535
-"""Pixels."""
+"""Maximum width in pixels."""
 _NEEDS = lazy("install the picture codec with: pip install 'nep-studio[image]'")
-_QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the quickest that compresses
+_QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the fastest that compresses
 _NAMED = {
     "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
     "mono16": ("<u2", 1), "bgr16": ("<u2", 3), "bgra16": ("<u2", 4), "rgb16": ("<u2", 3),
@@ -62,12 +61,16 @@ _TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 @dataclass(frozen=True)
 class ImageFormat:
-    """How a publisher sends its pictures: `nep.ImageFormat("jpeg", quality=70, width=640)`.
+    """Encoding of a publisher's images: `nep.ImageFormat("jpeg", quality=70, width=640)`.
 
-    `kind`: "jpeg" (of `uint8` with one or three channels), "png", "raw", or "auto", which keeps what there
-    is. `quality`: of a JPEG, 1 to 100. `width`: a wider picture is made so wide, and its height goes with it;
-    of depth and labels (16 bits and more) pixels are left out then, not mixed. Bytes that are a file already,
-    and `raw_image`, are sent as they are. Raises `ValueError` for what is none of these.
+    Encoded files and `raw_image` are sent unchanged. Raises `ValueError` for invalid values.
+
+    Attributes:
+        kind: "jpeg" (`uint8` with one or three channels), "png", "raw", or "auto" (see
+            `nep.messages.image_codec`).
+        quality: JPEG quality, 1 to 100.
+        width: Maximum width in pixels; wider images are scaled down, keeping the aspect ratio. Images of 16
+            bits and more (depth, labels) are subsampled instead of interpolated.
     """
 
     kind: str = "auto"
@@ -81,7 +84,7 @@ class ImageFormat:
             within("width", self.width, 1, WIDEST)
 
     def encode(self, payload: object) -> Encoded:
-        """A picture as bytes of this kind. Raises `EncodeError`."""
+        """Encode an image. Raises `EncodeError`."""
         if isinstance(payload, bytes | bytearray | memoryview):
             return encode(payload)
         try:
@@ -95,7 +98,6 @@ class ImageFormat:
         return _raw(frame) if self.kind == "raw" else _kept(frame, self.quality)
 
     def _sized(self, frame: NDArray[Any]) -> NDArray[Any]:
-        """The picture, not wider than it may be."""
         height, width = frame.shape[:2]
         if self.width is None or width <= self.width:
             return frame
@@ -111,7 +113,7 @@ class ImageFormat:
 
 @dataclass(frozen=True, slots=True)
 class RawLayout:
-    """How raw pixels are laid out: numpy's name of their numbers, how many a pixel has, red first or last."""
+    """Layout of raw pixels: numpy type of the numbers, channels per pixel, RGB or BGR order."""
 
     numbers: str
     channels: int
@@ -119,7 +121,7 @@ class RawLayout:
 
 
 def _opencv() -> ModuleType:
-    """OpenCV, loaded at the first picture: it costs a fifth of a second and is optional."""
+    # Imported lazily: OpenCV is optional and takes 0.2 s.
     import cv2  # noqa: PLC0415 - optional and heavy
 
     return cv2
@@ -131,11 +133,11 @@ def _numpy() -> ModuleType:
     return np
 
 
-# ---- arrays become bytes
+# ---- encoding
 
 
 def encode(payload: object) -> Encoded:
-    """A picture as bytes that keep it, or JPEG/PNG bytes unchanged. Raises `EncodeError`."""
+    """Encode an image in the default format; JPEG and PNG files pass unchanged. Raises `EncodeError`."""
     kind = type(payload).__name__
     if isinstance(payload, bytes | bytearray | memoryview):
         data = bytes(payload)
@@ -154,7 +156,7 @@ def _channels(frame: NDArray[Any]) -> int:
 
 
 def _kept(frame: NDArray[Any], quality: int) -> Encoded:
-    """As what keeps it; see the module."""
+    # See the module docstring.
     if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
         return _as_jpeg(frame, quality)
     return _as_png(frame) if _has_png(frame) else _raw(frame)
@@ -179,10 +181,16 @@ def _as_png(frame: NDArray[Any]) -> Encoded:
 
 
 def raw_image(payload: object) -> Encoded:
-    """A picture without loss: its numbers as they are, in the array's own memory. Raises `EncodeError`.
+    """Return a payload that is sent as raw pixels: lossless and without compression.
 
-    `payload`: an array of numpy, (height, width) or (height, width, 1 to 4 channels), colours as OpenCV has
-    them: blue, green, red. Publish it before the array changes.
+        pub.publish(nep.raw_image(depth))
+
+    Args:
+        payload: numpy array (height, width) or (height, width, 1 to 4 channels), colours in BGR order as in
+            OpenCV. It is not copied: publish it before the array changes.
+
+    Raises:
+        EncodeError: The value is not an image, or numpy is not installed.
     """
     try:
         return _raw(_checked(payload))
@@ -194,7 +202,7 @@ def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     opencv = _opencv()
     try:
         is_made, buffer = opencv.imencode(f".{kind}", frame, options)
-    except opencv.error:  # such as a JPEG of more than 65535 rows
+    except opencv.error:  # such as a JPEG with more than 65535 rows
         is_made, buffer = False, None
     if not is_made:
         reason = _("OpenCV cannot make a {kind} of it; publish 'nep.raw_image(…)' of it").format(kind=kind)
@@ -208,13 +216,13 @@ def _raw(frame: NDArray[Any]) -> Encoded:
     encoding = _ENCODING.get((numbers, shape[2]))
     if encoding is None:
         encoding = f"{next(name for name, each in _NUMBERS.items() if each == numbers)}C{shape[2]}"
-    # The array's own memory: a publisher copies it once, into shared memory where it can.
+    # not copied: a publisher copies it once, into shared memory if possible
     data = frame.astype(numbers, copy=False).data.cast("B")
     return Encoded(data, {"shape": shape, "encoding": encoding})
 
 
 def _numbers(dtype: np.dtype[Any]) -> str:
-    """The type of numbers as `_NUMBERS` names it: little-endian, as everything on the wire."""
+    # Name as in `_NUMBERS`: little-endian, as everything on the wire.
     return dtype.newbyteorder("<").str.removeprefix("|")
 
 
@@ -223,7 +231,7 @@ def _shape(frame: NDArray[Any]) -> list[int]:
 
 
 def check(payload: object) -> None:
-    """Raises `EncodeError` for what is no picture by its type, its shape or its numbers."""
+    """Raise `EncodeError` for a value that is not an image, by its type, shape and number type."""
     if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
@@ -233,7 +241,6 @@ def check(payload: object) -> None:
 
 
 def _picture(payload: object) -> NDArray[Any]:
-    """The array of a picture as it is. Raises `EncodeError`."""
     np = _numpy()
     kind = type(payload).__name__
     if not isinstance(payload, np.ndarray):
@@ -260,7 +267,7 @@ def _picture(payload: object) -> NDArray[Any]:
 
 
 def _checked(payload: object) -> NDArray[Any]:
-    """An array of a picture; one channel in two dimensions. Raises `EncodeError`."""
+    # One channel becomes two dimensions. Raises `EncodeError`.
     np = _numpy()
     frame = _picture(payload)
     if frame.ndim == 3 and frame.shape[2] == 1:
@@ -269,14 +276,13 @@ def _checked(payload: object) -> NDArray[Any]:
     return whole
 
 
-# ---- bytes become arrays
+# ---- decoding
 
 
 def decode(data: memoryview, extension: Mapping[str, object]) -> object:
-    """The picture as an array, (height, width) or (height, width, channels) in BGR order.
+    """Decode an image to an array (height, width) or (height, width, channels) in BGR order.
 
-    Raises `DecodeError`, before it takes memory for more than a picture may have (see
-    `nep.messages.image_files`).
+    Raises `DecodeError` before memory beyond the limits of `nep.messages.image_files` is allocated.
     """
     try:
         layout = raw_layout(extension.get("encoding"))
@@ -291,10 +297,13 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
 
 
 def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
-    """The pixels of a file, turned as it says; a JPEG `reduced` by 1, 2, 4 or 8. Raises `DecodeError`."""
+    """Decode the pixels of a file, upright; a JPEG scaled down by `reduced` (1, 2, 4, 8).
+
+    Raises `DecodeError`.
+    """
     opencv, np = _opencv(), _numpy()
     if file.kind == "png":
-        flag = -1  # IMREAD_UNCHANGED: its numbers, one channel, alpha
+        flag = -1  # IMREAD_UNCHANGED: keeps number type, single channel and alpha
     else:
         whole, colour = {1: (0, 1), 2: (16, 17), 4: (32, 33), 8: (64, 65)}[reduced]  # IMREAD_REDUCED_…
         flag = 128 + (whole if file.channels == 1 else colour)  # IMREAD_IGNORE_ORIENTATION
@@ -308,7 +317,7 @@ def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
 
 
 def _turned(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """The picture upright, as EXIF's orientation says."""
+    # Rotate and flip by the EXIF orientation.
     if orientation == 1:
         return picture
     if orientation >= 5:
@@ -320,7 +329,7 @@ def _turned(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def raw_layout(encoding: object) -> RawLayout | None:
-    """The layout that an encoding names; None for one that is none of raw bytes."""
+    """Return the layout of an encoding, or None if it is not raw."""
     if not isinstance(encoding, str):
         return None
     named = _NAMED.get(encoding)
@@ -331,7 +340,7 @@ def raw_layout(encoding: object) -> RawLayout | None:
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
-    """Raw bytes as an array of the layout's own order of colours, without a copy. Raises `DecodeError`."""
+    """Return raw bytes as an array in their own channel order, without a copy. Raises `DecodeError`."""
     np = _numpy()
     numbers = np.dtype(layout.numbers)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
@@ -352,7 +361,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
 
 
 def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
-    """The extension of a JPEG or PNG file, from its head; None for what `decode` would refuse by it."""
+    """Return the extension of a JPEG or PNG file from its header, or None if `decode` would reject it."""
     try:
         return examine(data).extension
     except DecodeError:

@@ -1,8 +1,8 @@
-"""JPEG and PNG files: what their bytes tell, and how large they may be. Nothing is decoded here.
+"""Headers and size limits of JPEG and PNG files, checked without decoding.
 
-Whoever decodes a picture file asks `examine` first: a file of a few bytes may tell of pixels that take
-gigabytes, or of a thousand passes over them. What the bytes are decides, never what somebody says of them.
-Only JPEG and PNG are pictures here: a decoder of every other format is one more that a stranger can reach.
+Call `examine` before decoding a file: a file of a few bytes may declare pixels of several gigabytes, or a
+thousand scans. The format is detected from the bytes, never taken from metadata. Only JPEG and PNG are
+supported: each decoder of another format would add to the attack surface.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from nep.i18n import _, number
 __all__ = ["MOST_BYTES", "MOST_PIXELS", "ImageFile", "check_size", "examine"]
 
 MOST_PIXELS = 120_000_000
-"""More than any camera of a robot has."""
+"""Maximum number of pixels, beyond any camera of a robot."""
 MOST_BYTES = 750_000_000
-"""What the pixels, and what the decoder has beside them, may take of memory."""
+"""Maximum memory for the pixels and the decoder's buffers."""
 _COPIES = 2
-"""OpenCV holds all pixels twice while it decodes (measured with 4.14, JPEG and PNG)."""
+"""Copies of the pixels that OpenCV holds while decoding (measured with 4.14, JPEG and PNG)."""
 MOST_SCANS = 100
-"""Passes of a JPEG that comes in refinements; encoders make about ten."""
+"""Maximum number of scans of a progressive JPEG; encoders write about ten."""
 MOST_SCANNED = 1_200_000_000
-"""Pixels times passes: how long decoding may take, which is a few seconds at worst."""
+"""Maximum number of pixels times scans, which limits decoding to a few seconds."""
 MOST_PIECES = 100_000
-"""Segments of a JPEG, chunks of a PNG; an encoder makes one of 8 kB and more."""
+"""Maximum number of JPEG segments or PNG chunks; encoders write them of 8 kB and more."""
 
 _JPEG = b"\xff\xd8\xff"
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -39,26 +39,31 @@ _OTHERS = {
 }  # fmt: skip
 _FILL = re.compile(rb"\xff*")
 _ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
-"""Markers of a JPEG without a length: TEM and RST."""
+"""JPEG markers without a length: TEM and RST."""
 _FRAMES = {0xC0: False, 0xC1: False, 0xC2: True}
-"""Heads of a JPEG's pixels, and whether these come in refinements. Others no camera and no browser knows."""
+"""Supported JPEG frame headers, and whether they are progressive. Cameras and browsers use no others."""
 _TABLES = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 _SCAN, _APP1 = 0xDA, 0xE1
 _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
-"""Channels of a PNG by its colour type, as they are decoded."""
+"""Channels of a decoded PNG by its colour type."""
 _DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
 _NEEDED = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
 _TURNED = 5
-"""From this orientation on, rows of the file are columns of the picture."""
+"""First EXIF orientation in which rows and columns are swapped."""
 
 
 @dataclass(frozen=True)
 class ImageFile:
-    """A JPEG or PNG file that may be decoded.
+    """Header of a JPEG or PNG file that may be decoded.
 
-    `width` and `height` are those of the picture as it is shown: turned as `orientation` (1 to 8, as EXIF
-    has it) says. `channels` are 1 (grey), 3 or 4 (with alpha) of `bits` (8 or 16) each. `data` is what to
-    give to a decoder: the file, or for a PNG with text, profiles or an animation the picture alone.
+    Attributes:
+        kind: Format of the file.
+        width: Width in pixels after applying `orientation`.
+        height: Height in pixels after applying `orientation`.
+        channels: 1 (grey), 3, or 4 (with alpha).
+        bits: 8 or 16 per channel.
+        orientation: EXIF orientation, 1 to 8.
+        data: Bytes for the decoder: the file, or a PNG without its text, profiles and animation.
     """
 
     kind: Literal["jpeg", "png"]
@@ -71,12 +76,12 @@ class ImageFile:
 
     @property
     def extension(self) -> dict[str, object]:
-        """What travels beside it in a message."""
+        """Extension of a message with this file."""
         return {"shape": [self.height, self.width, self.channels], "encoding": self.kind}
 
 
 def examine(data: bytes | memoryview) -> ImageFile:
-    """What a file is. Raises `DecodeError` for what is neither JPEG nor PNG, is broken, or is too large."""
+    """Return the header of a file. Raises `DecodeError` if it is not a valid JPEG or PNG, or too large."""
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
     head = bytes(file[:8])
     if head == _PNG:
@@ -95,9 +100,13 @@ def examine(data: bytes | memoryview) -> ImageFile:
 
 
 def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> None:
-    """Raises `DecodeError` for more pixels, or more memory for them, than a picture may have.
+    """Raise `DecodeError` for an image beyond the limits of pixels or memory.
 
-    `pixel_bytes` is what each takes in memory, `size_bytes` how many bytes told of them.
+    Args:
+        width: Width in pixels.
+        height: Height in pixels.
+        pixel_bytes: Memory per pixel.
+        size_bytes: Size of the received data, for the message.
     """
     if width < 1 or height < 1:
         raise DecodeError(
@@ -119,7 +128,7 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
 
 
 class _Reader:
-    """What both kinds of files have in common."""
+    """Common parts of both file readers."""
 
     kind: Literal["jpeg", "png"]
 
@@ -128,11 +137,9 @@ class _Reader:
         self.size = len(data)
 
     def number(self, at: int, count: int) -> int:
-        """The big-endian number of `count` bytes there."""
         return int.from_bytes(self.data[at : at + count], "big")
 
     def broken(self, reason: str) -> DecodeError:
-        """The error that refuses the file."""
         reason = _("they are no picture that can be read, but a broken {upper}: {reason}").format(
             upper=self.kind.upper(), reason=reason
         )
@@ -140,16 +147,15 @@ class _Reader:
 
 
 class _Jpeg(_Reader):
-    """The segments of a JPEG up to its first scan.
+    """Reader of the JPEG segments up to the first scan.
 
-    What no encoder writes is refused, not guessed: a decoder may understand it in another way than we do,
-    and then other sizes count than we have seen.
+    Unusual structures are rejected, not guessed: a decoder might interpret them differently, and then the
+    checked size would not be the decoded one.
     """
 
     kind = "jpeg"
 
     def read(self) -> ImageFile:
-        """See `examine`."""
         frame, orientation, at = None, 1, 2
         for _piece in range(MOST_PIECES):
             marker, at = self._marker(at)
@@ -174,7 +180,6 @@ class _Jpeg(_Reader):
         raise self.broken(_("it has too many segments"))
 
     def _marker(self, at: int) -> tuple[int, int]:
-        """The marker there and where it ends."""
         if self.number(at, 1) != 0xFF:
             reason = _("it ends too early") if at >= self.size else _("its segments do not follow each other")
             raise self.broken(reason)
@@ -205,11 +210,11 @@ class _Jpeg(_Reader):
         channels = 1 if frame.components == 1 else 3
         pixel_bytes = float(_COPIES * channels)
         is_refined = frame.is_refined or self.number(at + 2, 1) != frame.components
-        if is_refined:  # the decoder keeps all coefficients until the last scan
+        if is_refined:  # the decoder holds all coefficients until the last scan
             pixel_bytes += frame.coefficient_bytes
         check_size(frame.width, frame.height, pixel_bytes, self.size)
         if is_refined:
-            # One scan may come in a few bytes and makes the decoder walk over all pixels again.
+            # a scan of a few bytes makes the decoder process all pixels again
             scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
             if scans > MOST_SCANS or scans * frame.width * frame.height > MOST_SCANNED:
                 reason = _("{width} × {height} pixels in {scans} passes take too long").format(  # noqa: RUF001
@@ -224,7 +229,7 @@ class _Jpeg(_Reader):
 
 @dataclass(frozen=True)
 class _Frame:
-    """What the head of a JPEG's pixels tells."""
+    """JPEG frame header."""
 
     width: int
     height: int
@@ -234,7 +239,7 @@ class _Frame:
 
     @property
     def coefficient_bytes(self) -> float:
-        """What the coefficients of one pixel take: two bytes each, of whole blocks."""
+        # Two bytes per coefficient, in whole blocks.
         across, down = max(each[0] for each in self.factors), max(each[1] for each in self.factors)
         units = -(-self.width // (8 * across)) * -(-self.height // (8 * down))
         blocks = units * sum(each[0] * each[1] for each in self.factors)
@@ -242,12 +247,11 @@ class _Frame:
 
 
 class _Png(_Reader):
-    """The chunks of a PNG."""
+    """Reader of the PNG chunks."""
 
     kind = "png"
 
     def read(self) -> ImageFile:
-        """See `examine`."""
         if self.size < 33 or self.data[8:16] != b"\0\0\0\x0dIHDR":
             raise self.broken(_("it does not begin with its size"))
         width, height = self.number(16, 4), self.number(20, 4)
@@ -268,11 +272,9 @@ class _Png(_Reader):
         return ImageFile("png", width, height, channels, bits, orientation, data)
 
     def _chunks(self) -> tuple[list[tuple[int, int]], set[bytes], int]:
-        """Where the chunks are that a picture needs (neighbours together), their kinds, its orientation.
-
-        All others are left out: compressed text and profiles may be bombs of their own, and what an animation
-        adds is no part of its first picture.
-        """
+        # Returns the ranges of the chunks needed for the picture, all kinds, and the orientation. Other
+        # chunks are dropped: compressed text and profiles may be decompression bombs, and animation frames
+        # are not used.
         needed: list[tuple[int, int]] = []
         kinds: set[bytes] = set()
         orientation, at = 1, 8
@@ -281,7 +283,7 @@ class _Png(_Reader):
             if kind == b"IHDR" and kind in kinds:
                 raise self.broken(_("it has two heads"))
             if kind in _NEEDED:
-                if end > self.size:  # OpenCV takes memory for all that it tells of, 4 GB, and then looks
+                if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
                     raise self.broken(_("it ends too early"))
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
@@ -299,11 +301,11 @@ class _Png(_Reader):
 
 
 _HEAD = 4096
-"""How far into EXIF data the orientation is looked for."""
+"""Number of bytes of EXIF data searched for the orientation."""
 
 
 def _orientation(exif: bytes | memoryview) -> int | None:
-    """The orientation (1 to 8) that EXIF data tell; None when they tell none."""
+    # None without an orientation.
     data = bytes(exif[:_HEAD])
     if data[:6] != b"Exif\0\0" or data[6:10] not in (b"II*\0", b"MM\0*"):
         return None

@@ -1,4 +1,4 @@
-"""Explain where and why a text is not JSON, for editors, the command line and files that people write."""
+"""Location and reason of JSON syntax errors, for editors, the command line and files written by people."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|n
 
 @dataclass(frozen=True, slots=True)
 class JsonFix:
-    """Edit that repairs a fault: replace the characters from ``start`` to ``end`` with ``text``."""
+    """Edit that fixes a fault: replace the characters from ``start`` to ``end`` with ``text``."""
 
     start: int
     end: int
@@ -54,12 +54,12 @@ class JsonFault:
 
 
 def looks_like_json(text: str) -> bool:
-    """Whether `text` begins as JSON does, so that its author probably meant JSON rather than plain text."""
+    """Return True if `text` starts like JSON, so that its author probably meant JSON."""
     return _JSON_START.match(text) is not None
 
 
 def find_json_fault(text: str, *, allow_nan: bool = False) -> JsonFault | None:
-    """Return the first fault of `text`, None when it is JSON that nep can publish.
+    """Return the first fault of `text`, or None if nep can publish it as JSON.
 
     With `allow_nan`, NaN and Infinity are values, too.
     """
@@ -71,13 +71,13 @@ def find_json_fault(text: str, *, allow_nan: bool = False) -> JsonFault | None:
         return _constant(text)
     except RecursionError:
         return JsonFault(1, 1, _("too many nested levels"))
-    except ValueError:  # Python reads no numbers of thousands of digits, and 1e999 as infinity
+    except ValueError:  # Python limits the digits of ints, and parses 1e999 as infinity
         return JsonFault(1, 1, _("a number is too large"))
     return None if allow_nan else _stricter_fault(text)
 
 
 def _stricter_fault(text: str) -> JsonFault | None:
-    """What Python's reader takes and nep's doesn't: surrogates, a thousand levels."""
+    # Accepted by Python's parser, but not by orjson: surrogates, deep nesting.
     try:
         orjson.loads(text)
     except orjson.JSONDecodeError as error:
@@ -165,7 +165,6 @@ def _missing_comma(text: str, position: int, end: int) -> JsonFault:
 
 
 def _unclosed(text: str, end: int) -> JsonFault:
-    """The text ends before its value does."""
     opened: list[str] = []
     for found in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
         sign = found[0]
@@ -204,7 +203,7 @@ def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
 
 
 def _open_string(text: str, position: int) -> JsonFault:
-    """A string has no closing quote, or contains a character that must be escaped."""
+    # No closing quote, or a character that must be escaped.
     sign = text[position : position + 1]
     if sign == "\t":
         fix = JsonFix(position, position + 1, "\\t")

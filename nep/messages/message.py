@@ -1,4 +1,4 @@
-"""Message: one datum on a topic. Bytes are the truth; the payload is decoded on first use."""
+"""Message: one message of a topic, decoded at the first access to its payload."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ __all__ = ["NOTHING", "UNDECODED", "Message", "MessageKind", "arrived", "kind_of
 NOTHING: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
 new_message = object.__new__
-"""For whoever makes hundreds of thousands a second and sets their fields itself: `arrived` shows how."""
+"""Fast constructor without `__init__`, for creating messages at high rates; see `arrived`."""
 
 
 class MessageKind(NamedTuple):
-    """What the messages of one publisher have in common. Made by `kind_of`."""
+    """Properties shared by all messages of one publisher. Created by `kind_of`."""
 
     topic: str
     codec: str
@@ -39,7 +39,7 @@ def kind_of(
     is_latched: bool = False,
     clock: PublisherClock = NOT_COMPARED,
 ) -> MessageKind:
-    """The `MessageKind` with these. The codec may be one that there is not: then decoding says so."""
+    """Return a `MessageKind`. An unknown codec raises only when a payload is decoded."""
     known = CODECS.get(codec)
     decode = partial(_no_codec, codec) if known is None else known.decode
     return MessageKind(topic, codec, msg_type, is_latched, decode, clock)
@@ -50,23 +50,28 @@ def _no_codec(name: str, data: bytes | memoryview, extension: Mapping[str, objec
 
 
 class Message:
-    """One message, as it came from the wire. Treat it as immutable: it is handed from thread to thread.
+    """Message received from a topic. Treat it as immutable: it is shared between threads.
 
-    `topic`      the topic's name
-    `data`       the encoded payload, a read-only memoryview
-    `codec`      the codec's name ("json", "string", "bytes", "msgpack", "image")
-    `msg_type`   the type's name in the graph ("json", "robot/description", ...)
-    `stamp_ns`   the publisher's clock when it was published, in nanoseconds since 1970; None from the
-                 original wire
-    `seq`        counts the publisher's messages from 1; None from the original wire
-    `publisher`  the publisher's id; None from the original wire
-    `extension`  what travels beside the payload (an image's shape and encoding), else empty
-    `is_latched` True when the publisher kept it for subscribers that come late
-    `latency_s`  how long after its publication this program looked at it (s)
-    `latency_uncertainty_s`  how surely that is known (s)
+        for message in subscriber:
+            print(message.topic, message.seq, message.payload)
+
+    Attributes:
+        topic: Name of the topic.
+        data: Encoded payload, a read-only memoryview.
+        codec: Name of the codec ("json", "string", "bytes", "msgpack", "image").
+        msg_type: Message type in the graph ("json", "robot/description", ...).
+        payload: Decoded payload.
+        stamp_ns: Time of publication by the publisher's clock, in nanoseconds since 1970; None on the
+            original wire.
+        seq: Sequence number, counted from 1 by the publisher; None on the original wire.
+        publisher: Id of the publisher; None on the original wire.
+        extension: Additional header fields, such as the shape and encoding of an image.
+        is_latched: True if the topic is latched.
+        latency_s: Time from publication to the first access of this property, in seconds.
+        latency_uncertainty_s: Uncertainty of `latency_s` (±) in seconds.
     """
 
-    # Few, and what can wait is made on first use: hundreds of thousands are made a second.
+    # few slots, and lazy values: created at rates of 100,000 per second and more
     __slots__ = ("decoded", "extension", "kind", "publisher", "raw", "seen_ns", "seq", "stamp_ns")
 
     raw: bytes | memoryview
@@ -75,7 +80,7 @@ class Message:
     extension: Mapping[str, object]
     publisher: int | None
     seen_ns: int
-    """When `latency_s` was asked for first, by this computer's clock; not set before."""
+    """Time of the first access to `latency_s` by this computer's clock; not set before."""
     seq: int | None
     stamp_ns: int | None
 
@@ -101,32 +106,32 @@ class Message:
 
     @property
     def topic(self) -> str:
-        """The topic's name."""
+        """Name of the topic."""
         return self.kind.topic
 
     @property
     def data(self) -> memoryview:
-        """The encoded payload; read-only."""
+        """Encoded payload; read-only."""
         return memoryview(self.raw)
 
     @property
     def codec(self) -> str:
-        """The codec's name."""
+        """Name of the codec."""
         return self.kind.codec
 
     @property
     def msg_type(self) -> str:
-        """The type's name in the graph."""
+        """Message type in the graph."""
         return self.kind.msg_type
 
     @property
     def is_latched(self) -> bool:
-        """Whether the publisher kept it for subscribers that come late."""
+        """True if the publisher keeps its newest message for later subscribers."""
         return self.kind.is_latched
 
     @property
     def payload(self) -> object:
-        """The decoded payload, decoded once. Raises `DecodeError` when the bytes are none of the codec's."""
+        """Decoded payload, cached. Raises `DecodeError` if the data is not valid in its codec."""
         payload = self.decoded
         if payload is UNDECODED:
             payload = self.decoded = self.kind.decode(self.raw, self.extension)
@@ -134,10 +139,10 @@ class Message:
 
     @property
     def latency_s(self) -> float | None:
-        """Seconds from its publication until this was asked for first; None when it has no time.
+        """Seconds from publication to the first access of this property, or None without a time stamp.
 
-        Ask as soon as a message comes. Between two computers it is corrected by how their clocks differ, as
-        far as that is known: `latency_uncertainty_s` tells. So it may be a little below 0.
+        Read it as soon as a message is received. Between computers the difference of the clocks is corrected
+        as far as it is known (`latency_uncertainty_s`), so that the value may be slightly negative.
         """
         if self.stamp_ns is None:
             return None
@@ -150,17 +155,17 @@ class Message:
 
     @property
     def latency_uncertainty_s(self) -> float | None:
-        """By how many seconds `latency_s` may be wrong, to both sides, because clocks of computers differ.
+        """Uncertainty of `latency_s` (±) in seconds, caused by the clocks of different computers.
 
-        0.0 on one computer, where there is one clock. None when nobody has compared the two clocks (yet):
-        then `latency_s` is not corrected, and may be wrong by any time.
+        0.0 on one computer. None if the two clocks have not been compared (yet); `latency_s` is not corrected
+        then, and may be wrong by any amount.
         """
         known = self.kind.clock.seconds()
         return None if self.stamp_ns is None or known is None else known[1]
 
     @property
     def size_bytes(self) -> int:
-        """Bytes of the encoded payload."""
+        """Size of the encoded payload in bytes."""
         return len(self.raw) if isinstance(self.raw, bytes) else self.raw.nbytes
 
     def __repr__(self) -> str:
@@ -175,7 +180,7 @@ def arrived(
     publisher: int,
     extension: Mapping[str, object] = NOTHING,
 ) -> Message:
-    """A message as a back end makes it: `data` never changes, and `kind` is made once for many."""
+    """Create a received message, in a back end. `data` must never change; reuse `kind` for many messages."""
     message = new_message(Message)
     message.kind = kind
     message.raw = data

@@ -1,9 +1,9 @@
-"""How deep lists and maps may be nested in a message: 64 levels, in every codec.
+"""Limit of nested lists and maps in a message: 64 levels, in every codec.
 
-Readers walk payloads recursively; a message of 2 kB with 1000 levels would end them with `RecursionError`.
-The check of JSON reads the bytes before they are decoded: most messages have too few brackets to be deep, and
-seeing that takes less than a microsecond. msgpack is checked after decoding, with the garbage collector's
-traversal of lists and maps, which takes about a quarter of the time of a loop in Python.
+Readers walk payloads recursively; a message of 2 kB with 1000 levels would raise `RecursionError` in them.
+JSON is checked before decoding: most messages have too few brackets to be deep, which takes less than 1 µs to
+detect. msgpack is checked after decoding, with the garbage collector's traversal, in a quarter of the time of
+a Python loop.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _TEXT = re.compile(rb'"[^"]*"')
 
 
 def too_deep() -> str:
-    """Return the sentence for it."""
+    """Return the reason for an error message."""
     return _("it has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
 
 
 def json_is_too_deep(data: bytes | memoryview) -> bool:
-    """Return whether JSON has more than 64 levels. Anything else may give either answer."""
+    """Return True if JSON has more than 64 levels. The result for invalid JSON is undefined."""
     size = len(data)
     if size <= 2 * MAX_LEVELS:
         return False
@@ -60,7 +60,7 @@ def _has_many_brackets(data: bytes) -> bool:
 
 
 def _brackets(data: bytes) -> bytes:
-    """All that is left of JSON but its brackets, as those of lists; without what is inside texts."""
+    # Reduces JSON to its brackets, outside of strings, all as list brackets.
     if b"\\" in data:
         data = data.replace(b"\\\\", b"").replace(b'\\"', b"")
     brackets = data.translate(_AS_LISTS, _NO_BRACKETS).replace(b'""', b"")
@@ -72,14 +72,14 @@ def _levels_exceeded(brackets: bytes) -> bool:
         inner = brackets.replace(b"[]", b"")
         if not inner:
             return False
-        if len(inner) == len(brackets):  # they don't match: it is no JSON
+        if len(inner) == len(brackets):  # unbalanced: invalid JSON
             return inner.count(b"[") > MAX_LEVELS
         brackets = inner
     return True
 
 
 def packed_is_too_deep(data: bytes | memoryview, value: object) -> bool:
-    """Return whether a value has more than 64 levels; `data` is the value as msgpack."""
+    """Return True if a value has more than 64 levels; `data` is its msgpack encoding."""
     size = len(data)
     if size <= MAX_LEVELS:
         return False
@@ -89,11 +89,9 @@ def packed_is_too_deep(data: bytes | memoryview, value: object) -> bool:
 
 
 def _may_be_too_deep(value: object) -> bool:
-    """Return False only for a value of plain types with 64 levels at most.
-
-    Keys count as values here, so that tuples as keys can give a wrong True. Anything but plain types ends the
-    traversal: from an instance of a class it would lead to the class, its module and the whole program.
-    """
+    # False only for plain types with at most 64 levels. Keys count as values here, so tuples as keys may
+    # cause a false True. Other types end the traversal: an instance would lead to its class, module and the
+    # whole program.
     level: list[object] = [value]
     for _level in range(MAX_LEVELS):
         inner = gc.get_referents(*level)
@@ -118,7 +116,7 @@ def _is_too_deep(value: object) -> bool:
 
 
 def _members(value: object) -> Iterable[object]:
-    """Return what is directly in a list, a map, or a dataclass, without its private fields."""
+    # Values of a list, map, or dataclass, without private fields.
     if isinstance(value, dict):
         return value.values()
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""msgpack with types: bytes ↔ plain values."""
+"""msgpack encoding of plain values."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ _LEAST, _MOST = -(2**63), 2**64 - 1
 
 
 def pack(value: object, default: Callable[[object], object] | None = None) -> bytes:
-    """`value` as msgpack; `default` turns what msgpack does not know. Raises `ValueError`.
+    """Encode a value as msgpack. Raises `ValueError`.
 
-    A date with time becomes msgpack's timestamp, which every language reads; without a zone it is this
-    computer's time, as everywhere in Python.
+    Args:
+        value: The value. A datetime becomes msgpack's timestamp; without a time zone it is local time, as in
+            Python.
+        default: Converts values of other types.
     """
     try:
         packed: bytes = msgpack.packb(value, use_bin_type=True, default=default, datetime=True)
@@ -29,30 +31,30 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
 
 
 def saturated(value: object) -> int:
-    """The nearest number that msgpack has a form for. Raises `TypeError` for what is none."""
+    """Return the nearest int that msgpack can encode. Raises `TypeError` for other types."""
     if not isinstance(value, int):
         raise TypeError(_("a '{kind}' has no form in msgpack").format(kind=type(value).__name__))
     return max(_LEAST, min(_MOST, value))
 
 
 def pack_saturated(value: object) -> bytes:
-    """What nodes and the master say as msgpack; of plain values only.
+    """Encode plain values of nodes and the master as msgpack, without failing.
 
-    Nothing that the network can bring about makes it fail: numbers saturate, halves of letters become "?".
+    Values from the network can't make it raise: ints saturate, lone surrogates become "?".
     """
     packed: bytes = msgpack.packb(value, use_bin_type=True, unicode_errors="replace", default=saturated)
     return packed
 
 
 def unpack(data: bytes | memoryview) -> object:
-    """The value in `data`. Raises `ValueError` for anything that is not exactly one msgpack value.
+    """Decode one msgpack value. Raises `ValueError` for anything else.
 
-    Timestamps are `datetime` in UTC, exact to a microsecond; in a message with one beyond the year 9999 all
-    are `msgpack.Timestamp`. Lists that are keys are tuples.
+    Timestamps become `datetime` in UTC with microseconds; if one is beyond the year 9999, all are
+    `msgpack.Timestamp`. Lists used as keys become tuples.
     """
     try:
         value: object = msgpack.unpackb(data, raw=False, strict_map_key=False, timestamp=3)
-    except (TypeError, OverflowError):  # rare: a list is a key, a timestamp is no date
+    except (TypeError, OverflowError):  # rare: a list as key, or a timestamp beyond datetime's range
         return _unpack_rare(data)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
         raise ValueError(str(error) or _("the bytes end too early")) from error
@@ -82,9 +84,9 @@ def _hashable(key: object) -> object:
 
 
 def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
-    """As `unpack`, for what a stranger sent: `most_lists` lists and maps at most, none longer than `longest`.
+    """Decode untrusted msgpack like `unpack`, with at most `most_lists` lists and maps of length `longest`.
 
-    A million empty lists take a megabyte to send and seconds to make. Raises `ValueError`.
+    A million empty lists are a megabyte to send and take seconds to build. Raises `ValueError`.
     """
     left = most_lists
 
@@ -111,7 +113,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
 
 
 def unpack_first(data: bytes) -> object:
-    """The first of the values in `data`. Raises `ValueError` when there is no whole one."""
+    """Decode the first of several values. Raises `ValueError` without a complete one."""
     unpacker = msgpack.Unpacker(raw=False, strict_map_key=False)
     unpacker.feed(data)
     try:

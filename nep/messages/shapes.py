@@ -1,6 +1,6 @@
-"""Shapes of typed messages' values: what JSON has for a type, what Python has, and what is wrong with one.
+"""Value shapes of typed messages: conversion between Python and JSON values, with error paths.
 
-`nep.messages.typed` makes them of annotations.
+`nep.messages.typed` creates them from annotations.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ __all__ = [
 ]
 
 _LEAST, _MOST = -(1 << 63), (1 << 64) - 1
-"""Whole numbers that JSON carries here."""
+"""Range of ints in JSON."""
 _LONGEST = 100
-"""Letters of a key, or of a value, in a sentence."""
+"""Maximum length of a key or value in a message."""
 
 
-class Misfit(Exception):  # noqa: N818 - never seen by a caller
-    """A value that does not fit, and why. `steps` lead to it, the last one first."""
+class Misfit(Exception):  # noqa: N818 - internal
+    """Value that doesn't match its shape. `steps` is the path to it, innermost first."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -45,27 +45,27 @@ class Misfit(Exception):  # noqa: N818 - never seen by a caller
         super().__init__(reason)
 
     def inside(self, name: object) -> Misfit:
-        """Itself, now told of the value that has the misfit in its field `name`."""
+        """Add the field `name` of the enclosing value to the path, and return self."""
         self.steps.append(f".{escaped(shortened(str(name), _LONGEST))}")
         return self
 
     @property
     def place(self) -> str:
-        """Where in the payload it is, such as "pose.position.x" or "joints[3]"; empty for the whole."""
+        """Path in the payload, such as "pose.position.x" or "joints[3]"; empty for the whole."""
         return "".join(reversed(self.steps)).removeprefix(".")
 
     @property
     def sentence(self) -> str:
-        """Where it is, and why."""
+        """Path and reason as a sentence."""
         place = self.place or _("it")
         return f"{place} {self.reason}"
 
 
 class ValueShape:
-    """How values of one type are read and written.
+    """Reader and writer of the values of one type.
 
-    Made empty and filled later, because a dataclass may have fields of its own type. `read` makes a value of
-    what JSON has, `write` the other way round; both raise `Misfit`.
+    Created empty and filled later, because a dataclass may have fields of its own type. `read` converts a
+    JSON value, `write` converts to one; both raise `Misfit`.
     """
 
     __slots__ = ("_say", "as_it_is", "forms", "name", "read", "write")
@@ -82,37 +82,37 @@ class ValueShape:
     ) -> None:
         self.name = name
         self.forms = frozenset(forms) if as_it_is is None else frozenset({as_it_is})
-        """What its values are in JSON, as types of Python; none: anything."""
+        """Python types of the values in JSON; empty for any."""
         self.as_it_is = as_it_is
-        """Values of just this type are read as they are."""
+        """Type whose instances are read unchanged, or None."""
         self._say = say
 
     @property
     def says(self) -> str:
-        """What to give, such as "a 'float'", in the language of now."""
+        """Description of the expected value, such as "a 'float'", in the current language."""
         return _("a '{name}'").format(name=self.name) if self._say is None else self._say()
 
 
 def wrong(value: object, says: str) -> Misfit:
-    """That a value is of a wrong type."""
+    """Return the misfit of a value of a wrong type."""
     return Misfit(_("is a '{kind}'; give {wanted}").format(kind=type(value).__name__, wanted=says))
 
 
 def missing(shape: ValueShape) -> Misfit:
-    """That there is none."""
+    """Return the misfit of a missing value."""
     return Misfit(_("is missing; give {wanted}").format(wanted=shape.says))
 
 
 def shown(value: object) -> str:
-    """As a sentence shows it."""
+    """Return the shortened `repr` of a value for a message."""
     return escaped(shortened(repr(value), _LONGEST))
 
 
-# ---- numbers and words
+# ---- scalars
 
 
 def _of_numpy(value: object) -> object:
-    """Numbers and arrays of numpy as Python's own."""
+    # numpy scalars and arrays to Python values
     to_list = getattr(value, "tolist", None)
     return to_list() if callable(to_list) else value
 
@@ -229,11 +229,11 @@ def _moment(kind: type[datetime | date | time]) -> ValueShape:
         return isinstance(value, kind) and (kind is not date or not isinstance(value, datetime))
 
     def read(value: object) -> object:
-        if is_one(value):  # msgpack has them
+        if is_one(value):  # msgpack has times
             return value
         if not isinstance(value, str):
             raise wrong(value, _("text such as {example}").format(example=_EXAMPLES[kind]))
-        whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not know Z
+        whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
             return kind.fromisoformat(whole)
         except ValueError:
@@ -271,18 +271,18 @@ SCALARS: Mapping[Any, ValueShape] = {
 }
 
 
-# ---- one of several
+# ---- alternatives
 
 
 def _is_same(value: object, allowed: object) -> bool:
-    """1 is not True, and neither is 1.0; a float may have come as a whole number."""
+    # 1 is neither True nor 1.0; but a float may be sent as an int.
     if value != allowed or isinstance(value, bool) is not isinstance(allowed, bool):
         return False
     return isinstance(value, type(allowed)) or isinstance(allowed, float)
 
 
 def literal_shape(values: Sequence[object]) -> ValueShape | None:
-    """One of these; None when one of them has no form."""
+    """Return the shape of a Literal, or None if a value can't be represented in JSON."""
     if not all(
         (each is None or isinstance(each, str | int)) and not isinstance(each, Enum) for each in values
     ):
@@ -301,7 +301,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
 
 
 def enum_shape(kind: type[Enum]) -> ValueShape | None:
-    """A member, as its value; None when a value has no form."""
+    """Return the shape of an Enum, sent by value, or None if a value can't be represented in JSON."""
     members = list(kind)
     if not all(isinstance(each.value, str | int | float | None) for each in members):
         return None
@@ -330,16 +330,16 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
 
 
 def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
-    """The first of these that fits; None before all others, because null is that before it is NaN.
+    """Return the shape of a Union, or None if two members are the same in JSON.
 
-    None when two of them are the same in JSON: nobody could tell which one was meant.
+    The first member that matches is read; None comes first, because null would otherwise be NaN.
     """
     forms = [form for each in shapes for form in each.forms]
     if len(forms) > len(set(forms)):
         return None
     none = SCALARS[None]
     others = [each for each in shapes if each.name != none.name]
-    others.sort(key=lambda each: float in each.forms)  # which takes whole numbers, too
+    others.sort(key=lambda each: float in each.forms)  # float accepts ints, too
     nones = [none] if len(others) < len(shapes) else []
     ordered = [*nones, *others]
     shape = ValueShape(
@@ -354,23 +354,23 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
             except Misfit as found:
                 misfit = found
         if misfit is not None and misfit.steps and len(others) == 1:
-            raise misfit  # it says what is wrong inside
+            raise misfit  # has the path inside the member
         raise wrong(value, shape.says)
 
-    # Asked when they are used: a dataclass may be filled later.
+    # looked up at use: a dataclass may be filled later
     shape.read = lambda value: first(value, [each.read for each in ordered])
     shape.write = lambda value: first(value, [each.write for each in ordered])
     return shape
 
 
-# ---- several of one kind
+# ---- containers
 
 
 def _each(way: Callable[[Any], Any], values: Iterable[Any], first: int = 0) -> list[Any]:
     made: list[Any] = []
     try:
         for each in values:
-            made.append(way(each))  # noqa: PERF401 - its length says which one it was
+            made.append(way(each))  # noqa: PERF401 - the length gives the index for the error
     except Misfit as misfit:
         misfit.steps.append(f"[{first + len(made)}]")
         raise
@@ -385,13 +385,13 @@ def _items(value: object, says: str) -> list[Any] | tuple[Any, ...]:
 
 
 def list_shape(item: ValueShape, kind: type) -> ValueShape:
-    """Any number of `item`; `kind` is list or tuple."""
+    """Return the shape of a list or tuple (`kind`) of any length."""
     shape = ValueShape(kind.__name__, forms={list})
     exact = {item.as_it_is} - {None}
 
     def read(value: object) -> object:
         values = _items(value, shape.says)
-        # Thousands of numbers at once; a list may be another reader's, too.
+        # fast path for thousands of numbers; the list is copied because it may be shared
         made = values if exact and set(map(type, values)) <= exact else _each(item.read, values)
         return kind(made)
 
@@ -406,7 +406,7 @@ def list_shape(item: ValueShape, kind: type) -> ValueShape:
 
 
 def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
-    """Just these, in their order."""
+    """Return the shape of a tuple with fixed items."""
     shape = ValueShape("tuple", forms={list}, say=lambda: _("{count} values").format(count=len(items)))
 
     def each(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
@@ -424,7 +424,7 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
 
 
 def map_shape(item: ValueShape) -> ValueShape:
-    """Names, and an `item` for each."""
+    """Return the shape of a map with text keys."""
     shape = ValueShape("dict", forms={dict})
     word = SCALARS[str]
 

@@ -1,19 +1,19 @@
-"""Typed messages: dataclasses and TypedDicts, carried as the map of their fields, and checked on both sides.
+"""Typed messages: dataclasses and TypedDicts, sent as maps of their fields and validated at both ends.
 
 | type of a field                     | in JSON                                                          |
 |-------------------------------------|------------------------------------------------------------------|
-| `float`                             | a number; `null` is NaN, because that is how JSON carries it     |
-| `int`, `str`, `bool`, `None`        | itself; `int` has 64 bits                                        |
-| `list[T]`, `tuple[T, ...]`, `tuple[A, B]` | a list; numpy's arrays are published, too                  |
-| `dict[str, T]`                      | a map                                                            |
-| a dataclass, a TypedDict            | a map of its fields                                              |
-| `A | B`, `Optional[T]`              | what fits; two that are the same in JSON are refused             |
-| `Literal`, an `Enum`                | the value                                                        |
-| `datetime`, `date`, `time`          | text as ISO 8601 has it                                          |
-| `Any`, `object`                     | whatever it is                                                   |
+| `float`                             | number; `null` is NaN                                            |
+| `int`, `str`, `bool`, `None`        | same; `int` has 64 bits                                          |
+| `list[T]`, `tuple[T, ...]`, `tuple[A, B]` | list; numpy arrays can be published                        |
+| `dict[str, T]`                      | map                                                              |
+| dataclass, TypedDict                | map of its fields                                                |
+| `A | B`, `Optional[T]`              | the member that matches; members must differ in JSON             |
+| `Literal`, `Enum`                   | the value                                                        |
+| `datetime`, `date`, `time`          | text in ISO 8601                                                 |
+| `Any`, `object`                     | any value                                                        |
 
-What a message has beside the fields is ignored, so that fields can be added later; fields that it does not
-have take their defaults. Fields that begin with `_` are the program's own: they are not sent.
+Unknown fields of a message are ignored, so that fields can be added later; missing fields take their
+defaults. Fields whose name starts with `_` are private and not sent.
 """
 
 from __future__ import annotations
@@ -51,16 +51,16 @@ from nep.text import escaped, shortened
 __all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_codec", "value_shape"]
 
 OTHER_NAME = "nep.other_name"
-"""In a field's metadata: the name that it has in messages of other programs, which is read, too."""
+"""Key of a field's metadata: an alternative name accepted in received messages."""
 
 _LONGEST = 100
-"""Letters of a name in a sentence."""
+"""Maximum length of a name in a message."""
 _MARKS = frozenset({"Required", "NotRequired", "ReadOnly"})
 
 
 @dataclass(frozen=True)
 class MessageType:
-    """A type of messages: its name in the graph, and its form. `kind` is what payloads are instances of."""
+    """Declared message type: its name in the graph, its shape, and the class of its payloads."""
 
     name: str
     shape: ValueShape
@@ -69,10 +69,10 @@ class MessageType:
 
 @cache
 def message_type(declared: type) -> MessageType:
-    """The type of messages that a dataclass or a TypedDict declares.
+    """Return the message type that a dataclass or TypedDict declares.
 
-    Its name is the class's attribute `MSG_TYPE`, else the name of the class. Raises `ValueError` for another
-    class, and when a field is of a type that has no form in JSON.
+    Its name is the attribute `MSG_TYPE`, or the name of the class. Raises `ValueError` for other classes, and
+    when the type of a field can't be represented in JSON.
     """
     is_map = _is_typed_dict(declared)
     if not is_map and not is_dataclass(declared):
@@ -93,9 +93,9 @@ def message_type(declared: type) -> MessageType:
 
 
 def value_shape(declared: type) -> ValueShape | None:
-    """The shape of a dataclass, a TypedDict or an Enum, whose values are no messages; None for another class.
+    """Return the shape of a dataclass, TypedDict or Enum for parameters, or None for other classes.
 
-    Raises `ValueError` when a field is of a type that has no form in JSON.
+    Raises `ValueError` when the type of a field can't be represented in JSON.
     """
     if not (is_dataclass(declared) or _is_typed_dict(declared) or issubclass(declared, Enum)):
         return None
@@ -113,11 +113,11 @@ def _whole_shape(declared: type) -> ValueShape:
         ) from None
 
 
-# ---- publishing and reading
+# ---- encoding and decoding
 
 
 def typed_codec(declared: MessageType, base: Codec) -> Codec:
-    """Encodes instances of the type as `base` does the map of their fields."""
+    """Return a codec of instances of the type, based on the codec of plain values."""
     write, kind = declared.shape.write, Mapping if declared.kind is dict else declared.kind
 
     def check(payload: object) -> None:
@@ -142,14 +142,14 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
 
 
 class TypedReader:
-    """Makes messages whose payloads are instances of a type, of those that a back end hands out."""
+    """Converter of received messages to messages with payloads of a type."""
 
     def __init__(self, declared: MessageType) -> None:
         self._declared = declared
         self._kinds: tuple[MessageKind, MessageKind] | None = None
 
     def typed(self, message: Message) -> Message:
-        """The same message; its payload is decoded when it is first asked for. Others may have `message`."""
+        """Return a copy whose payload is decoded to the type at its first access. `message` may be shared."""
         source, kinds = message.kind, self._kinds
         if kinds is None or kinds[0] is not source:
             kinds = self._kinds = (source, source._replace(decode=self._decoder(source.decode)))
@@ -183,11 +183,11 @@ class TypedReader:
         return typed
 
 
-# ---- one shape for each type
+# ---- shapes of annotations
 
 
 def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
-    """The shape of an annotation; `where` is the field that has it. Raises `ValueError`."""
+    # `where` names the field for errors. Raises `ValueError`.
     hint = _bare(hint)
     try:
         hash(hint)
@@ -230,7 +230,7 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
 
 
 def _bare(hint: Any) -> Any:  # noqa: ANN401 - any annotation
-    """Without what tells nothing of the values: `Annotated`, `NewType`, `NotRequired`, names of types."""
+    # Strips wrappers without effect on values: `Annotated`, `NewType`, `NotRequired`, type aliases.
     while True:
         origin = typing.get_origin(hint)
         if origin is typing.Annotated or _mark_of(hint):
@@ -244,14 +244,15 @@ def _bare(hint: Any) -> Any:  # noqa: ANN401 - any annotation
 
 
 def _mark_of(hint: Any) -> str:  # noqa: ANN401 - any annotation
-    """`Required` and the like; they may be those of typing_extensions."""
+    # `Required` and the like, also of typing_extensions.
     name = getattr(typing.get_origin(hint), "_name", None)
     return name if name in _MARKS else ""
 
 
 def _is_typed_dict(hint: object) -> bool:
-    """Also one of typing_extensions."""
-    if not isinstance(hint, type) or typing.get_origin(hint) is not None:  # `list[int]` is a class in 3.10
+    # Also of typing_extensions.
+    # `list[int]` is a class in Python 3.10
+    if not isinstance(hint, type) or typing.get_origin(hint) is not None:
         return False
     return issubclass(hint, dict) and hasattr(hint, "__required_keys__")
 
@@ -300,7 +301,7 @@ def _hints(declared: type) -> dict[str, Any]:
 
 
 class _Entry(NamedTuple):
-    """A field that is read."""
+    """Field of a received map."""
 
     name: str
     other_name: str
@@ -309,7 +310,7 @@ class _Entry(NamedTuple):
 
 
 def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) -> dict[str, Any]:
-    """What a map has of the fields. Raises `Misfit` for what it must have and has not."""
+    # Raises `Misfit` for a missing required field.
     if not isinstance(value, Mapping):
         raise wrong(value, _("a map of the fields of '{name}'").format(name=whole.name))
     made: dict[str, Any] = {}
@@ -362,7 +363,7 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
 
 
 def _check_constructor(declared: type, given: Collection[str]) -> None:
-    """Raises `ValueError` when no instance can be made of the fields alone."""
+    # Raises `ValueError` if the constructor needs more than the fields.
     for each in inspect.signature(declared).parameters.values():
         is_open = each.kind in {each.VAR_POSITIONAL, each.VAR_KEYWORD} or each.default is not each.empty
         if not is_open and (each.name not in given or each.kind is each.POSITIONAL_ONLY):
@@ -377,7 +378,7 @@ def _made(declared: type, given: Mapping[str, object]) -> object:
     try:
         return declared(**given)
     except Exception as error:
-        raise Misfit(  # `__post_init__` is the program's own
+        raise Misfit(  # `__post_init__` may raise anything
             _("is refused by '{name}': {error}").format(
                 name=declared.__name__, error=escaped(shortened(str(error), 2 * _LONGEST))
             )
@@ -389,7 +390,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
     entries: list[_Entry] = []
     for name, hint in hints.items():
-        mark = _mark_of(hint)  # what the class says of them is wrong where annotations are text
+        mark = _mark_of(hint)  # __required_keys__ is wrong with string annotations
         is_required = mark == "Required" or (name in required and mark != "NotRequired")
         shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known)
         entries.append(_Entry(name, name, shape_of_it, is_required))

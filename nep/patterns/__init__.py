@@ -1,1 +1,1 @@
-"""What nodes do beside topics: services and surveys, parameters."""
+"""Patterns beyond topics: services, surveys and parameters."""

@@ -1,1 +1,1 @@
-"""Parameters: values of a node that others may read and set while it runs."""
+"""Parameters: named values of a node that others can read and set at run time."""

@@ -1,6 +1,6 @@
-"""ParameterForm: parameters that are instances of a dataclass, TypedDict or Enum. Others see plain values.
+"""Parameters of a class: instances of a dataclass, TypedDict or Enum, sent to others as plain values.
 
-What a class declares is looked at in `nep.messages.typed`, which is imported when the first one is given.
+`nep.messages.typed`, which analyses the declarations, is imported when the first class is used.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ __all__ = ["ParameterForm", "form_of"]
 
 
 class ParameterForm:
-    """How values of a class, of this shape, become plain ones and come back."""
+    """Conversion between instances of a class and plain values."""
 
     def __init__(self, declared: type, shape: shapes.ValueShape) -> None:
         self._shape = shape
         self._kind = declared
         members = list(declared) if issubclass(declared, Enum) else []
         self.choices: tuple[object, ...] = tuple(each.value for each in members)
-        """The plain values there are; none: any that fit."""
+        """Plain values of an Enum's members; empty if any value of the shape is allowed."""
         kinds = {type(each).__name__ for each in self.choices}
         if len(kinds) > 1:
             kinds = {"mixed"}
         self.plain_kind = kinds.pop() if kinds else "dict"
-        """What plain values are, in the word of a parameter's type."""
+        """Name of the plain values' type, as in `NodeParameter.kind`."""
 
     def plain(self, value: object) -> object:
-        """An instance, or a plain value that fits, as a plain one. Raises `ValueError` that says where."""
+        """Return the plain value of an instance, or validate a plain value.
+
+        Raises `ValueError` with the path.
+        """
         try:
             if not issubclass(self._kind, dict) and isinstance(value, self._kind):
                 value = self._shape.write(value)
@@ -51,14 +54,14 @@ class ParameterForm:
         return plain
 
     def instance(self, plain: object) -> object:
-        """A plain value that fitted, as a new instance."""
+        """Return a new instance for a validated plain value."""
         return self._shape.read(plain)
 
 
 def form_of(declared: type) -> ParameterForm | None:
-    """The form of a class; None for one that is no dataclass, TypedDict or Enum.
+    """Return the form of a class, or None for a class that is not a dataclass, TypedDict or Enum.
 
-    Raises `ValueError` when a field is of a type that has no form in JSON.
+    Raises `ValueError` when the type of a field can't be represented in JSON.
     """
     shape = typed.value_shape(declared)
     return None if shape is None else ParameterForm(declared, shape)

@@ -1,4 +1,4 @@
-"""Parameters: those of a node, which it declares and others may set. `Node.parameters`."""
+"""Parameters of this node, which others can read and set. See `Node.parameters`."""
 
 from __future__ import annotations
 
@@ -15,40 +15,42 @@ from nep.text import bounded_str, escaped
 __all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
 
 MSG_TYPE = "nep/patterns/parameters"
-"""The type of the topic on which a node tells its parameters, latched."""
+"""Message type of the latched topic that publishes a node's parameters."""
 _MOST = 1_000
 
 OnChange = Callable[[Mapping[str, object]], "str | None"]
-"""Is asked before values change, with those that are to; a sentence refuses all of them."""
+"""Callback invoked before values change; a returned string rejects the change."""
 
 
 class StateTopic(Protocol):
-    """Where the parameters are told."""
+    """Publisher of the parameters."""
 
     def publish(self, payload: object) -> None:
-        """Tell them."""
+        """Publish the parameters."""
 
 
 class ParameterHost(Protocol):
-    """The node, as its parameters need it."""
+    """Node as its parameters use it."""
 
     name: str
     id: str
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> StateTopic:
-        """Let others call `answer`, where the back end has services, and read the topic of this name."""
+        """Offer the service `place` with the callback `answer`, if possible, and open the topic `place`."""
 
 
 def place_of(node_id: str) -> str:
-    """The name of the service, and of the topic, of a node's parameters."""
+    """Return the name of the service and topic of a node's parameters."""
     return f"/nep/parameters/{node_id}"
 
 
 class Parameters:
-    """The parameters of a node, by name. May be used from any thread.
+    """Parameters of a node by name. Thread-safe. See `Node.parameters`.
 
-    Others see them from the first `declare` on, which raises as `Node.new_pub` does. Where a back end has no
-    services they can be read from outside, and not set.
+    Others can read them from the first `declare` on, and set them where the back end has services.
+
+        node.parameters.declare("speed", 0.3, min=0.0, max=1.0, description="m/s")
+        node.parameters["speed"] = 0.5
     """
 
     def __init__(self, host: ParameterHost) -> None:
@@ -65,21 +67,30 @@ class Parameters:
         name: str,
         default: object,
         *,
-        type: type | str | None = None,  # noqa: A002 - what everybody calls it
+        type: type | str | None = None,  # noqa: A002 - the usual name
         description: str = "",
-        min: float | None = None,  # noqa: A002 - the same
-        max: float | None = None,  # noqa: A002 - the same
+        min: float | None = None,  # noqa: A002 - the usual name
+        max: float | None = None,  # noqa: A002 - the usual name
         choices: Sequence[object] = (),
         read_only: bool = False,
     ) -> object:
-        """A new parameter with this value, which is returned; `type` is that of `default` when it is None.
+        """Declare a parameter and return its value.
 
-        `type`: bool, int, float, str, list or dict, or a dataclass, TypedDict or Enum of the program's own:
-        then values are instances of that here, and others see and set the map of its fields, or the member's
-        value, which have to fit. `description`: for people. `min`: the least number, itself included. `max`:
-        the greatest. `choices`: the only values there are. `read_only`: others cannot set it. Raises
-        `ParameterError` for a value that its own limits refuse, and for a name that there is already, and as
-        `Node.new_pub`.
+        Args:
+            name: Name of the parameter; the rules of topic names apply.
+            default: Initial value.
+            type: bool, int, float, str, list or dict; or a dataclass, TypedDict or Enum, whose instances are
+                the values here. Others see and set the map of its fields, or the value of the member.
+                Default: the type of `default`.
+            description: Text for people.
+            min: Minimum of a number, inclusive.
+            max: Maximum of a number, inclusive.
+            choices: Allowed values; empty for any value.
+            read_only: Reject changes by others.
+
+        Raises:
+            ParameterError: The name is declared already, or the default is not allowed.
+            NepError: As `Node.new_pub` does, at the first parameter of a node.
         """
         made = declared(
             name,
@@ -105,18 +116,21 @@ class Parameters:
         return made.typed_value
 
     def get(self, name: str) -> object:
-        """The value of a parameter. Raises `ParameterError` when there is none of this name."""
+        """Return the value of a parameter. Raises `ParameterError` for an unknown name."""
         return self.describe(name).typed_value
 
     def describe(self, name: str) -> NodeParameter:
-        """A parameter with all that is known of it. Raises as `get` does."""
+        """Return a parameter with its type, limits and description.
+
+        Raises `ParameterError` for an unknown name.
+        """
         try:
             return self._known[name]
         except KeyError:
             raise self._unknown(name) from None
 
     def list(self) -> tuple[NodeParameter, ...]:
-        """All parameters, in the order in which they were declared."""
+        """Return all parameters in the order of their declaration."""
         return tuple(self._known.values())
 
     def __getitem__(self, name: str) -> object:
@@ -131,18 +145,18 @@ class Parameters:
     # ---- changing
 
     def set(self, name: str, value: object) -> None:
-        """Give a parameter another value. Raises `ParameterError` when it cannot have it, or is refused."""
+        """Set a parameter. Raises `ParameterError` if the value is invalid or a callback rejects it."""
         self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, object]) -> None:
-        """Give several parameters other values: all of them, or none. Raises as `set` does."""
+        """Set several parameters: all of them, or none. Raises `ParameterError` as `set` does."""
         self._set(values, is_own=True)
 
     def on_change(self, callback: OnChange) -> None:
-        """Ask `callback` whenever values are to change, with those that are, by name; before they do.
+        """Call `callback` with the new values by name before values change.
 
-        What it returns, a sentence, refuses all of them; None lets them pass. It is asked in the thread that
-        sets: for others that is a thread of the node's own. What it raises comes out of `set`, and refuses.
+        The callback rejects the whole change by returning a string, the reason, or by raising. It runs in the
+        thread that calls `set`; for requests of others that is a thread of the node.
         """
         with self._changing:
             self._watchers = (*self._watchers, callback)
@@ -177,24 +191,24 @@ class Parameters:
 
     def _tell(self) -> None:
         if self._topic is not None:
-            with suppress(ClosedError):  # the node is closed: nobody looks
+            with suppress(ClosedError):  # the node is closed
                 self._topic.publish(self._state())
 
     def _state(self) -> dict[str, object]:
         return {"node": self._host.name, "parameters": [each.as_map() for each in self._known.values()]}
 
     def _answer(self, request: object) -> object:
-        """To a call of another program, in a thread of the server's."""
+        # Runs in a thread of the server.
         values = request.get("set", {}) if isinstance(request, Mapping) else None
         if not isinstance(values, Mapping) or not all(isinstance(each, str) for each in values):
             return {"refused": _("a call of parameters is a map; 'set' in it maps names to values")}
         try:
             self._set(values, is_own=False)
-        except Exception as error:  # noqa: BLE001 - what a callback raises refuses, in the words of the error
+        except Exception as error:  # noqa: BLE001 - an exception of a callback rejects the change
             return {"refused": str(error) or type(error).__name__}
         return self._state()
 
     def forked(self) -> None:
-        """In a child that was forked: they are the parent's, and told to nobody. Takes no lock."""
+        """Detach from the host in a forked child process. Takes no lock."""
         self._changing = threading.RLock()
         self._topic = None

@@ -1,4 +1,4 @@
-"""NodeParameter: a value with a name, a type and limits. Pure."""
+"""NodeParameter: a value with a name, a type and limits. Free of input and output."""
 
 from __future__ import annotations
 
@@ -34,11 +34,19 @@ _MOST = 2**63 - 1
 
 @dataclass(frozen=True)
 class NodeParameter:
-    """A parameter of a node as it is now.
+    """State of a parameter.
 
-    `kind` is "bool", "int", "float", "str", "list" or "dict". `minimum` and `maximum` bound numbers, both
-    included; `choices` are the only values there are, if there are any. `is_read_only`: only its own node
-    may set it. `value` and `default` are plain, as JSON has them, also where the parameter has a class.
+    Attributes:
+        name: Name of the parameter.
+        value: Current value, as plain JSON value.
+        kind: "bool", "int", "float", "str", "list" or "dict".
+        default: Initial value, as plain JSON value.
+        description: Text for people.
+        minimum: Minimum of a number, inclusive, or None.
+        maximum: Maximum of a number, inclusive, or None.
+        choices: Allowed values; empty for any value.
+        is_read_only: True if only the own node may set it.
+        form: Conversion to a class, or None for plain values.
     """
 
     name: str
@@ -54,11 +62,11 @@ class NodeParameter:
 
     @property
     def typed_value(self) -> object:
-        """The value as a new instance of its class; of a parameter without one the value itself."""
+        """Value as a new instance of the parameter's class, or the plain value without a class."""
         return self.value if self.form is None else self.form.instance(self.value)
 
     def with_value(self, value: object) -> NodeParameter:
-        """The same with another value. Raises `ParameterError` for one that it cannot have."""
+        """Return a copy with another value. Raises `ParameterError` if the value is not allowed."""
         return replace(self, value=self._checked(value))
 
     def _checked(self, value: object) -> object:
@@ -80,7 +88,7 @@ class NodeParameter:
             raise self._error(value, str(error)) from error
 
     def _of_kind(self, value: object) -> object:
-        """`value` as one of this kind; whole numbers are numbers, and 2.0 is a whole one."""
+        # ints are accepted as floats, and 2.0 as an int
         if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
             return self._number(value)
         if type(value) is not KINDS[self.kind]:
@@ -97,7 +105,7 @@ class NodeParameter:
         return int(value)
 
     def _copied(self, value: object) -> object:
-        """As others will read it: what JSON has, and a copy, so that nobody changes it in place."""
+        # Round trip through JSON: validates the value, and protects it from changes in place.
         try:
             data = orjson.dumps(value)
         except (TypeError, ValueError) as error:
@@ -113,7 +121,7 @@ class NodeParameter:
         return ParameterError(self.name, shown(value), reason)
 
     def as_map(self) -> dict[str, object]:
-        """For others, as JSON has it."""
+        """Return the parameter as sent to others, in JSON types."""
         return {
             "name": self.name,
             "value": self.value,
@@ -138,7 +146,7 @@ def declared(
     choices: Sequence[object],
     is_read_only: bool,
 ) -> NodeParameter:
-    """A new parameter that has its default. Raises `ValueError` for what cannot be one."""
+    """Return a new parameter with its default value. Raises `ValueError` for invalid arguments."""
     form = _form_of(name, type(default) if kind is None else kind, default)
     word = kind if isinstance(kind, str) else (type(default) if kind is None else kind).__name__
     if form is not None:
@@ -164,7 +172,6 @@ def declared(
 
 
 def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
-    """The form of a class of a program's own. Raises `ParameterError` for one that cannot be carried."""
     if not isinstance(kind, type) or kind in KINDS.values():
         return None
     try:
@@ -185,9 +192,9 @@ def _is_finite(value: object) -> bool:
 
 
 def shown(value: object) -> str:
-    """As a program writes it, for a sentence; what is long is shortened."""
+    """Return the shortened `repr` of a value for a message."""
     try:
         written = repr(value)
-    except Exception:  # noqa: BLE001 - a value may be of any class, or have more digits than are written
+    except Exception:  # noqa: BLE001 - `repr` of any class may raise; ints may have too many digits
         written = f"a '{type(value).__name__}'"
     return escaped(shortened(written, _SHOWN))

@@ -1,4 +1,4 @@
-"""RemoteParameters: those of another node. Made by `Node.parameters_of`."""
+"""Parameters of another node. Opened by `Node.parameters_of`."""
 
 from __future__ import annotations
 
@@ -19,20 +19,30 @@ __all__ = ["RemoteParameters", "node_with_parameters"]
 
 
 class RemoteParameters:
-    """Reads and sets another node's parameters; a context manager. `Node.parameters_of` makes one."""
+    """Client of another node's parameters. Usable as a context manager. Opened by `Node.parameters_of`.
+
+    with node.parameters_of("camera") as parameters:
+        parameters.set("exposure", 20)
+    """
 
     def __init__(self, client: Client) -> None:
         self._client = client
 
     def list(self) -> tuple[Mapping[str, object], ...]:
-        """All of them, each as a map: name, value, type, default, description, min, max, choices, read_only.
+        """Return all parameters as maps.
 
-        Raises as `Client.call` does.
+        The keys are name, value, type, default, description, min, max, choices and read_only.
+
+        Raises the exceptions of `Client.call`.
         """
         return self._asked({})
 
     def get(self, name: str) -> object:
-        """The value of one. Raises `NepError` when there is none of this name, and as `list` does."""
+        """Return the value of a parameter.
+
+        Raises:
+            NepError: The name is unknown, or the call failed as `Client.call` describes.
+        """
         found = {bounded_str(each.get("name")): each for each in self.list()}
         if name not in found:
             said = did_you_mean(name, tuple(found)) if found else _("there are none")
@@ -40,11 +50,16 @@ class RemoteParameters:
         return found[name].get("value")
 
     def set(self, name: str, value: object) -> None:
-        """Give one another value. Raises `RequestRefusedError` with what the node says, and as `list`."""
+        """Set a parameter.
+
+        Raises:
+            RequestRefusedError: The node rejected the value; the reason is its message.
+            NepError: The call failed as `Client.call` describes.
+        """
         self.set_all({name: value})
 
     def set_all(self, values: Mapping[str, object]) -> None:
-        """Give several other values: all of them, or none. Raises as `set` does."""
+        """Set several parameters: all of them, or none. Raises as `set` does."""
         self._asked({"set": dict(values)})
 
     def _asked(self, request: Mapping[str, object]) -> tuple[Mapping[str, object], ...]:
@@ -56,7 +71,7 @@ class RemoteParameters:
         return tuple(each for each in found if isinstance(each, Mapping)) if isinstance(found, list) else ()
 
     def close(self) -> None:
-        """End the client."""
+        """Close the client."""
         self._client.close()
 
     def __enter__(self) -> Self:
@@ -67,9 +82,9 @@ class RemoteParameters:
 
 
 def node_with_parameters(graph: GraphView, name: str) -> str:
-    """The id of the node of this name (or id) that has parameters.
+    """Return the id of the node with parameters that has this name or id.
 
-    Raises `NepError` when there is none, or more than one.
+    Raises `NepError` when no node or several nodes match.
     """
     able = {each.id: each.name for each in graph.nodes.values() if place_of(each.id) in graph.services}
     found = [id_ for id_, known in able.items() if name in {id_, known}]

@@ -1,4 +1,4 @@
-"""Services: a client calls, a server answers; a surveyor asks all respondents."""
+"""Services (a client calls, a server replies) and surveys (a surveyor asks all respondents)."""
 
 from nep.patterns.services.client import Client as Client
 from nep.patterns.services.server import Server as Server

@@ -1,4 +1,4 @@
-"""Client: calls a service. Made by `Node.new_client`."""
+"""Client of a service. Created by `Node.new_client`."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ if TYPE_CHECKING:
 __all__ = ["Client", "Limit"]
 
 Limit = float | Literal["default"] | None
-"""Seconds, None for ever, or what the client was made with."""
+"""Time limit in seconds, None for no limit, or the client's default."""
 
 SLICE_S = 0.1
-"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
 _LOOK_S = 0.5
-"""So long the master is asked which services there are, when one was not found."""
+"""Time limit for querying the existing services when one was not found."""
 _JOIN_S = 2.0
 
 
 class Client:
-    """Calls a service, from any thread, as many calls at once as one likes.
+    """Client of a service. Thread-safe; calls may run concurrently. Usable as a context manager.
 
-    A call waits until there is a server, and for its answer, `timeout_s` seconds in all (None: for ever). It
-    raises `NoServerError`, `ServiceTimeoutError`, `ServerGoneError`, `ServiceError` with what the server's
-    callback raised, `RequestRefusedError` when the server would not carry it out, `ClosedError`,
-    `EncodeError` for what cannot be sent, and `DecodeError` for an answer that cannot be read.
+    A call waits for a server and its reply. Created by `Node.new_client`.
+
+        with node.new_client("add", timeout_s=2.0) as add:
+            print(add.call({"a": 1, "b": 2}))
     """
 
     def __init__(
@@ -71,23 +71,39 @@ class Client:
 
     @property
     def is_connected(self) -> bool:
-        """Whether a server was there a moment ago."""
+        """True if a server was connected a moment ago."""
         return self._transport.is_connected
 
     @property
     def late(self) -> int:
-        """Answers that came when nobody waited for them any more; they were dropped."""
+        """Number of replies dropped because they arrived after the time limit."""
         return self._transport.late
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True if the client or its node was closed."""
         return self._transport.is_closed
 
     # ---- calling
 
     def call(self, request: object, timeout_s: Limit = "default") -> object:
-        """The answer. Raises as told above."""
+        """Call the service and return its reply.
+
+        Args:
+            request: Value of the request.
+            timeout_s: Time limit in seconds, for the server to appear and reply; None for no limit. Default:
+                the client's.
+
+        Raises:
+            NoServerError: No server was found in time.
+            ServiceTimeoutError: The server did not reply in time.
+            ServerGoneError: The server stopped during the call.
+            ServiceError: The server's callback raised an exception.
+            RequestRefusedError: The server rejected the request.
+            ClosedError: The client is closed.
+            EncodeError: The request can't be encoded.
+            DecodeError: The reply can't be decoded.
+        """
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         call = self._begin(request, self._limit(timeout_s), outcomes.put)
         try:
@@ -97,7 +113,7 @@ class Client:
                     break
                 if self._is_forked:
                     raise self._closed_error()
-        except BaseException:  # also Ctrl+C
+        except BaseException:  # also KeyboardInterrupt
             self._transport.forget(call)
             raise
         try:
@@ -106,9 +122,11 @@ class Client:
             raise self._with_known(error) from None
 
     def call_async(self, request: object, timeout_s: Limit = "default") -> Future[object]:
-        """A future of the answer, at once. It can be cancelled; its callbacks run in the client's own thread.
+        """Call the service and return a future of the reply.
 
-        What cannot be sent at all is raised here.
+        The future can be cancelled. Its callbacks run in a thread of the client. Raises `EncodeError` or
+        `ClosedError` if the request can't be sent; other errors are set on the future. Arguments and errors
+        are those of `call`.
         """
         with self._lock:
             if self._ends is None:
@@ -122,12 +140,12 @@ class Client:
         return future
 
     async def acall(self, request: object, timeout_s: Limit = "default") -> object:
-        """The answer, awaited: the event loop goes on meanwhile. Raises as told above."""
+        """Call the service from a coroutine. Arguments and errors are those of `call`."""
         loop = asyncio.get_running_loop()
         future: asyncio.Future[Outcome] = loop.create_future()
 
         def then(outcome: Outcome) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits
+            with contextlib.suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(_set, future, outcome)
 
         call = self._begin(request, self._limit(timeout_s), then)
@@ -141,16 +159,19 @@ class Client:
         except NoServerError as error:
             raise await loop.run_in_executor(None, self._with_known, error) from None
 
-    # ---- as the original NEP has it
+    # ---- API of the original NEP
 
     def send_info(self, request: object) -> None:
-        """Call; `listen_info` gives the answer. Raises `NepError` when the last one was not taken."""
+        """Send a request; `listen_info` returns the reply.
+
+        Raises `NepError` if the last reply was not read.
+        """
         if self._sent is not None:
             raise NepError(_("take the last answer first; use 'listen_info'"))
         self._sent = self.call_async(request)
 
     def listen_info(self) -> object:
-        """The answer to what `send_info` sent. Raises as `call` does."""
+        """Return the reply to `send_info`. Raises the exceptions of `call`."""
         sent, self._sent = self._sent, None
         if sent is None:
             raise NepError(_("nothing was sent; call 'send_info' first"))
@@ -161,7 +182,7 @@ class Client:
                 raise self._closed_error()
         return sent.result()
 
-    # ---- how it ends
+    # ---- outcome
 
     def _begin(self, request: object, timeout_s: float | None, then: Callable[[Outcome], None]) -> OpenCall:
         if self._transport.is_closed:
@@ -188,7 +209,7 @@ class Client:
         )
 
     def _with_known(self, error: NoServerError) -> NoServerError:
-        """The same error, with what there is instead."""
+        # Adds the existing services to the error.
         if error.address:
             return error
         return NoServerError(error.service, error.timeout_s, self._transport.known(_LOOK_S))
@@ -198,15 +219,15 @@ class Client:
             return
         try:
             answer = self._answer(outcome)
-        except Exception as error:  # noqa: BLE001 - it is raised where the answer is asked for
+        except Exception as error:  # noqa: BLE001 - raised when the result is read
             future.set_exception(error)
         else:
             future.set_result(answer)
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
-        """Unregister and end; calls that are under way raise `ClosedError`. May be called twice."""
+        """Unregister and close. Running calls raise `ClosedError`. Idempotent."""
         if self._is_forked:
             return
         self._transport.close()
@@ -214,14 +235,14 @@ class Client:
         self._on_close(self)
 
     def join(self) -> None:
-        """End its own thread, when its calls have ended."""
+        """Stop the thread of futures, when its calls have ended."""
         with self._lock:
             ends, self._ends = self._ends, None
         if ends is not None:
             ends.close()
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the client as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
         self._lock = threading.Lock()
         self._ends = None
@@ -241,7 +262,7 @@ class Client:
 
 
 class _Ends:
-    """A thread that ends futures: what is attached to them may take its time, and holds up no socket."""
+    """Thread that resolves futures, so that their slow callbacks don't block a socket."""
 
     def __init__(self, name: str) -> None:
         self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
@@ -249,7 +270,6 @@ class _Ends:
         self._thread.start()
 
     def add(self, job: Callable[[], None]) -> None:
-        """Run this soon."""
         self._jobs.put(job)
 
     def _run(self) -> None:
@@ -257,7 +277,6 @@ class _Ends:
             job()
 
     def close(self) -> None:
-        """End when all is done; wait for that a moment."""
         self._jobs.put(None)
         if self._thread is not threading.current_thread():
             self._thread.join(_JOIN_S)

@@ -1,4 +1,4 @@
-"""OwnedServices: the servers and clients of one node. Part of `Node`."""
+"""Servers and clients of one node."""
 
 from __future__ import annotations
 
@@ -26,10 +26,15 @@ S = TypeVar("S", bound=Server)
 
 
 class OwnedServices:
-    """Makes them through the node's transport, and ends them with the node. May be used from any thread.
+    """Factory and registry of a node's servers and clients, which are closed with the node. Thread-safe.
 
-    `new_id` gives the id of each, and the number that proves it. `wake` wakes who spins. `closed_error` makes
-    what is raised when the node was closed meanwhile.
+    Args:
+        transport: The node's transport.
+        backend: The node's back end.
+        wait_s: Time limit for the master in seconds.
+        new_id: Returns a new id, and the number that proves it.
+        wake: Wakes the spinning thread.
+        closed_error: Returns the exception to raise when the node was closed.
     """
 
     def __init__(
@@ -52,7 +57,7 @@ class OwnedServices:
         self._servers: tuple[Server, ...] = ()
         self._clients: tuple[Client | Surveyor, ...] = ()
         self.has_servers = False
-        """Whether there are any; asked for every message of a node that spins."""
+        """True if the node has servers; read for every message of a spinning node."""
 
     def server(
         self,
@@ -63,7 +68,7 @@ class OwnedServices:
         msg_type: str,
         types: CallTypes,
     ) -> Server:
-        """See `Node.new_server`. Raises as the transport does, and `NepError` when that has no services."""
+        """Create a server. See `Node.new_server`. Raises `NepError` if the back end has no services."""
         text("msg_type", msg_type)
         return self._serve(
             Server, check_service(service), callback, configuration, threads, types, msg_type=msg_type
@@ -77,7 +82,7 @@ class OwnedServices:
         threads: int,
         types: CallTypes,
     ) -> Respondent:
-        """See `Node.new_respondent`. Raises as `server` does."""
+        """Create a respondent. See `Node.new_respondent`."""
         self._able_to_survey()
         return self._serve(Respondent, check_survey(survey), callback, configuration, threads, types)
 
@@ -105,7 +110,7 @@ class OwnedServices:
             self._servers = (*self._servers, made)
             self.has_servers = True
         self._check_open(made)
-        self._wake()  # who spins already answers its calls now
+        self._wake()  # a spinning thread serves its calls from now on
         return made
 
     def client(
@@ -116,7 +121,7 @@ class OwnedServices:
         timeout_s: float | None,
         types: CallTypes,
     ) -> Client:
-        """See `Node.new_client`. Raises as `server` does."""
+        """Create a client. See `Node.new_client`."""
         spec = self._client_spec(check_service(service), configuration, msg_type)
         limit_s = seconds("timeout_s", timeout_s)
         made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget, types)
@@ -133,7 +138,7 @@ class OwnedServices:
         timeout_s: float | None,
         types: CallTypes,
     ) -> Surveyor:
-        """See `Node.new_surveyor`. Raises as `server` does."""
+        """Create a surveyor. See `Node.new_surveyor`."""
         spec = self._client_spec(check_survey(survey), configuration, msg_type)
         limit_s = seconds("timeout", timeout_s)
         able = self._able_to_survey()
@@ -144,7 +149,8 @@ class OwnedServices:
         return made
 
     def _check_open(self, made: Server | Client | Surveyor) -> None:
-        """Close what was made while the node was closed, which may not know of it. Raises `ClosedError`."""
+        # Raises `ClosedError`. The node may have been closed concurrently, without this object in its
+        # registry.
         if self._is_closed:
             made.close()
             raise self._closed_error()
@@ -180,15 +186,15 @@ class OwnedServices:
             self.has_servers = bool(self._servers)
             self._clients = tuple(each for each in self._clients if each is not closed)
 
-    # ---- for who spins
+    # ---- spinning
 
     @property
     def queues(self) -> list[CallQueue]:
-        """What to wait for."""
+        """Queues of calls that the spinning thread serves."""
         return [queue for each in self._servers if (queue := each.spun) is not None and not each.is_closed]
 
     def run(self, node_ends: threading.Event) -> bool:
-        """One call for each server that has one; whether there was any. Stops when the node does."""
+        """Serve one call per server; return True if there was any. Stops when `node_ends` is set."""
         has_run = False
         for server in self._servers:
             if node_ends.is_set():
@@ -197,10 +203,10 @@ class OwnedServices:
                 has_run = server.run_one() or has_run
         return has_run
 
-    # ---- the end
+    # ---- closing
 
     def finish_calls(self, timeout_s: float) -> None:
-        """The transport takes no calls any more: wait for those that threads of the servers carry out."""
+        """Wait for calls running in threads of the servers; the transport accepts no more calls."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._is_closed = True
@@ -208,7 +214,7 @@ class OwnedServices:
             server.join(max(0.0, deadline - time.monotonic()))
 
     def end(self, timeout_s: float) -> None:
-        """The transport has closed their sockets: end their threads."""
+        """Stop all threads; the transport has closed its sockets."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             servers, self._servers = self._servers, ()
@@ -220,7 +226,7 @@ class OwnedServices:
                 client.join()
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark everything as closed in a forked child process. See `nep.system.forks`."""
         self._lock = threading.Lock()
         self._is_closed = True
         for server in self._servers:
@@ -231,9 +237,9 @@ class OwnedServices:
 
 
 def codec_checked(codec: Codec) -> Codec:
-    """`codec` itself when calls can have it. Raises `NepError`."""
+    """Return a codec if calls can use it. Raises `NepError`."""
     if codec.name == "image":
         raise NepError(_("a call cannot be a picture; publish it on a topic"))
-    if codec_numbered(codec.number) is not codec:  # of a back end's own, which has no number of its own
+    if codec_numbered(codec.number) is not codec:  # a back end's codec without a number
         raise NepError(_("'{name}' is no type for calls; use 'json' or 'msgpack'").format(name=codec.name))
     return codec

@@ -1,4 +1,4 @@
-"""Server: answers the calls of a service. Made by `Node.new_server`."""
+"""Server of a service. Created by `Node.new_server`."""
 
 from __future__ import annotations
 
@@ -27,24 +27,27 @@ __all__ = ["Callback", "Server"]
 _logger = logging.getLogger("nep.patterns.services")
 
 SLICE_S = 0.1
-"""Waits are cut into slices of this length, because Windows does not interrupt a wait for Ctrl+C."""
+"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
 _END_S = 2.0
 
 Callback = Callable[[object], object]
-"""Takes the request and returns the answer, or a `concurrent.futures.Future` with the answer.
+"""Function of the request that returns the reply, or a `concurrent.futures.Future` of it.
 
 None is sent as an empty map.
 """
 
 
 class Server:
-    """Answers calls: by its callback, or by `listen_info` and `send_info`. May be used from any thread.
+    """Server of a service, with a callback or with `listen_info` and `send_info`. Thread-safe.
 
-    A callback runs in the thread that spins its node, or with `threads` in so many threads of the server's
-    own. What it raises becomes the client's `ServiceError`, and is logged. A callback that returns a
-    `concurrent.futures.Future` does not block the next call: the call is answered when the future is done,
-    by the thread that ends it. With types of its own a request that does not fit is refused, which the client
-    gets as `RequestRefusedError`, and no callback is called.
+    The callback runs in the thread that spins the node, or in the server's own threads. An exception is
+    logged and raised at the client as `ServiceError`. A callback that returns a `concurrent.futures.Future`
+    does not block the next call: the reply is sent when the future is done, by the thread that completes it.
+    A request that doesn't match the declared type is rejected (`RequestRefusedError` at the client) without
+    calling the callback.
+
+        node.new_server("add", lambda request: {"sum": request["a"] + request["b"]})
+        node.spin()
     """
 
     def __init__(
@@ -74,43 +77,41 @@ class Server:
 
     @property
     def calls(self) -> int:
-        """Calls that were answered, also with an error."""
+        """Number of answered calls, including errors."""
         return self._transport.tally.calls
 
     @property
     def errors(self) -> int:
-        """Calls that were answered with an error."""
+        """Number of calls answered with an error."""
         return self._transport.tally.errors
 
     @property
     def refused(self) -> int:
-        """Calls that were not carried out: there was no room, nobody waited any more, or it closed."""
+        """Number of rejected calls (queue full, time limit passed, or server closing)."""
         return self._transport.tally.refused
 
     @property
     def unreadable(self) -> int:
-        """What came and was no call at all; each reason is logged."""
+        """Number of received frames that were not valid calls; the reasons are logged."""
         return self._transport.tally.unreadable
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is reached."""
+        """Addresses of the server."""
         return self._transport.endpoints
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True if the server or its node was closed."""
         return self._transport.is_closed
 
     @property
     def spun(self) -> CallQueue | None:
-        """The calls that are answered by who spins its node; None when others answer them."""
+        """Queue of calls that the spinning thread serves, or None if the calls are served elsewhere."""
         return self._transport.calls if self._callback is not None and not self._threads else None
 
-    # ---- with a callback
-
     def run_one(self) -> bool:
-        """Answer the oldest call that waits; whether there was one. For who spins its node."""
+        """Serve the oldest waiting call; return True if there was one. Called by the spinning thread."""
         call = self._transport.calls.take()
         if call is not None:
             self._carry_out(call)
@@ -123,7 +124,7 @@ class Server:
                 continue
             try:
                 self._carry_out(call)
-            except BaseException:  # also SystemExit: its client was told, and the thread goes on
+            except BaseException:  # also SystemExit: the client has its reply, and the thread must go on
                 _logger.exception("a thread of the server of '%s' was to end; it goes on", self.service)
 
     def _carry_out(self, call: IncomingCall) -> None:
@@ -143,13 +144,12 @@ class Server:
             reply = self._encoded(answer, call.codec)
         except Exception as error:  # noqa: BLE001 - sent to the client
             reply = self._failure(error)
-        except BaseException as error:  # Ctrl+C: who waits is told, and it comes out of `spin`
+        except BaseException as error:  # KeyboardInterrupt: reply, then let it propagate out of `spin`
             call.answer(_failed(error))
             raise
         call.answer(reply)
 
     def _answer_later(self, call: IncomingCall, done: Future[object]) -> None:
-        """Answer a call whose callback returned a future."""
         try:
             reply = self._encoded(done.result(), call.codec)
         except BaseException as error:  # noqa: BLE001 - includes CancelledError
@@ -181,12 +181,17 @@ class Server:
         given = {} if answer is None and its.is_any else answer
         return Reply(CallKind.ANSWER, its.codec(codec).encode(given).data, number)
 
-    # ---- without one, as the original NEP has it
+    # ---- without a callback: API of the original NEP
 
     def listen_info(self, timeout_s: float | None = None) -> object:
-        """The next request; `send_info` answers it. Waits for ever, or `timeout_s` seconds; then None.
+        """Return the next request, or None after the time limit. Reply to it with `send_info`.
 
-        Raises `ClosedError`, and `NepError` when a callback answers, or the last request is not answered.
+        Args:
+            timeout_s: Time limit in seconds; None waits without limit.
+
+        Raises:
+            ClosedError: The server is closed.
+            NepError: The server has a callback, or the last request is not answered yet.
         """
         seconds("timeout_s", timeout_s)
         if self._callback is not None:
@@ -216,7 +221,13 @@ class Server:
         raise self._closed_error()
 
     def send_info(self, answer: object) -> None:
-        """Answer the request that `listen_info` gave. Raises `EncodeError`, `ClosedError`, `NepError`."""
+        """Reply to the request that `listen_info` returned.
+
+        Raises:
+            EncodeError: The reply can't be encoded.
+            ClosedError: The server is closed.
+            NepError: No request is open.
+        """
         if self._transport.is_closed:
             raise self._closed_error()
         with self._asked_lock:
@@ -227,12 +238,13 @@ class Server:
             self._asked = None
         call.answer(reply)
 
-    # ---- the end
+    # ---- closing
 
     def close(self, timeout_s: float = _END_S) -> None:
-        """Unregister and end; calls that wait are refused. May be called twice.
+        """Unregister and close; waiting calls are rejected. Idempotent.
 
-        A callback that runs in a thread of the server's own is waited for, `timeout_s` at most.
+        Args:
+            timeout_s: Time limit in seconds for callbacks running in the server's own threads.
         """
         limit("timeout_s", timeout_s)
         if self._is_forked:
@@ -244,14 +256,14 @@ class Server:
         self._on_close(self)
 
     def join(self, timeout_s: float) -> None:
-        """Wait for its own threads, whose queue is closed, `timeout_s` at most."""
+        """Wait at most `timeout_s` seconds for the server's own threads, whose queue is closed."""
         deadline = time.monotonic() + timeout_s
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the server as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
         self._asked = None
         self._threads = ()
@@ -272,9 +284,9 @@ class Server:
 
 
 def _failed(error: BaseException) -> Reply:
-    """What its client is told: what it is called, and what it says; never where in the program."""
+    # The client gets the class and the message, but no traceback.
     try:
         reason = str(error)
-    except Exception:  # noqa: BLE001 - an error that cannot even be told must not hold up its client
+    except Exception:  # noqa: BLE001 - `str` of an exception may raise, and the client must still get a reply
         reason = ""
     return failure(CallKind.ERROR, type(error).__name__, reason)

@@ -1,4 +1,4 @@
-"""ServiceNode: what `Node` makes of services."""
+"""Methods of `Node` for services and surveys."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ __all__ = ["ServiceNode"]
 
 
 class ServiceNode(ABC):
-    """A node's servers, clients, respondents and surveyors."""
+    """Methods of a node for services and surveys."""
 
     _services: OwnedServices
 
     @abstractmethod
     def _open_transport(self) -> Transport:
-        """Raises `ClosedError`."""
+        """Return the open transport. Raises `ClosedError`."""
 
     @abstractmethod
     def _configured(self, configuration: object) -> Configuration:
-        """The node's own one for None. Raises `ValueError` for what is none."""
+        """Return the configuration, or the node's default for None. Raises `ValueError`."""
 
     def new_server(
         self,
@@ -40,15 +40,26 @@ class ServiceNode(ABC):
         request: type | None = None,
         answer: type | None = None,
     ) -> Server:
-        """A server of a service: `callback(request)` gives the answer, in the thread that calls `spin`.
+        """Create a server of a service.
 
-        With `threads` it runs in so many threads of the server's own instead, and nobody needs to spin. What
-        it raises is raised at the client, as `ServiceError`. Without a callback, `Server.listen_info` and
-        `send_info` answer. With `node.direct(ip, port)` it serves the original NEP's `client` at that port.
-        `msg_type` is for back ends whose services have types ("ros": "std_srvs/SetBool"); others answer each
-        client in its own. `request`: a dataclass or TypedDict (docs/types.md), of which the callback is given
-        instances; a request that does not fit is refused. `answer`: one of which it gives instances. Raises
-        as `new_pub` does.
+            node.new_server("add", lambda request: {"sum": request["a"] + request["b"]})
+            node.spin()
+
+        Args:
+            service: Name of the service.
+            callback: Function of the request that returns the reply, called by `spin`. Exceptions are raised
+                at the client as `ServiceError`. None: use `Server.listen_info` and `send_info`.
+            configuration: Result of `hybrid` or `direct`; with `direct` it also serves the original NEP's
+                `client`. Default: the node's master.
+            threads: Number of threads that run the callback; 0 runs it in the thread that calls `spin`.
+            msg_type: Service type of back ends with typed services ("ros": "std_srvs/SetBool"). Other back
+                ends reply in the type of the request.
+            request: Dataclass or TypedDict of the requests (docs/types.md); others are rejected.
+            answer: Dataclass or TypedDict of the replies.
+
+        Raises:
+            NepError: As `Node.new_pub` does.
+            ValueError: An argument is invalid.
         """
         self._open_transport()
         types = call_types(request=request, answer=answer)
@@ -65,13 +76,23 @@ class ServiceNode(ABC):
         request: type | None = None,
         answer: type | None = None,
     ) -> Client:
-        """A client of a service; a server need not be there yet.
+        """Create a client of a service. The server may start later.
 
-        `timeout_s` is how long its calls wait for a server and their answer, unless they say otherwise.
-        `msg_type="msgpack"` carries bytes, too. With `node.direct(ip, port)` it calls the original NEP's
-        `server` at that port. `request`: a dataclass or TypedDict (docs/types.md), of which it is called with
-        instances; all else is an `EncodeError`. `answer`: one of which the answers are instances; what does
-        not fit is a `DecodeError`. Raises as `new_pub` does.
+            with node.new_client("add", timeout_s=2.0) as add:
+                print(add.call({"a": 1, "b": 2}))
+
+        Args:
+            service: Name of the service.
+            configuration: Result of `hybrid` or `direct`; with `direct` it also calls the original NEP's
+                `server`. Default: the node's master.
+            msg_type: "json", or "msgpack" for requests with bytes; or the service type of the back end.
+            timeout_s: Default time limit of calls in seconds; None for no limit.
+            request: Dataclass or TypedDict of the requests (docs/types.md); others raise `EncodeError`.
+            answer: Dataclass or TypedDict of the replies; others raise `DecodeError`.
+
+        Raises:
+            NepError: As `Node.new_pub` does.
+            ValueError: An argument is invalid.
         """
         self._open_transport()
         types = call_types(request=request, answer=answer)
@@ -87,10 +108,20 @@ class ServiceNode(ABC):
         question: type | None = None,
         answer: type | None = None,
     ) -> Respondent:
-        """Answers the questions of a survey, as `new_server` answers calls: there may be any number of them.
+        """Create a respondent of a survey. A survey may have any number of respondents.
 
-        Without a callback, `Respondent.listen_json` and `send_json` answer. `question`: what questions are
-        instances of. `answer`: what answers are. Both as for `new_server`. Raises as `new_pub` does.
+        Args:
+            survey: Name of the survey.
+            callback: Function of the question that returns the answer. None: use `Respondent.listen_json` and
+                `send_json`.
+            configuration: As for `new_server`.
+            threads: As for `new_server`.
+            question: Dataclass or TypedDict of the questions.
+            answer: Dataclass or TypedDict of the answers.
+
+        Raises:
+            NepError: As `Node.new_pub` does.
+            ValueError: An argument is invalid.
         """
         self._open_transport()
         types = call_types(question=question, answer=answer)
@@ -106,11 +137,23 @@ class ServiceNode(ABC):
         question: type | None = None,
         answer: type | None = None,
     ) -> Surveyor:
-        """Asks all respondents of a survey at once; see `Surveyor.ask`.
+        """Create a surveyor, which asks all respondents of a survey at once.
 
-        `timeout`: so many milliseconds, as in the original NEP, it waits for answers, unless a question says
-        otherwise; None: until all have answered. `question`: what questions are instances of. `answer`: what
-        answers are; one that does not fit counts as none. Raises as `new_pub` does.
+            surveyor = node.new_surveyor("battery", timeout=500)
+            print(surveyor.ask({"unit": "%"}))
+
+        Args:
+            survey: Name of the survey.
+            timeout: Default time limit in **milliseconds**, as in the original NEP; None waits for all
+                respondents.
+            configuration: As for `new_client`.
+            msg_type: As for `new_client`.
+            question: Dataclass or TypedDict of the questions.
+            answer: Dataclass or TypedDict of the answers; others are counted as failures.
+
+        Raises:
+            NepError: As `Node.new_pub` does.
+            ValueError: An argument is invalid.
         """
         self._open_transport()
         types = call_types(question=question, answer=answer)

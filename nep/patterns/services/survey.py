@@ -1,4 +1,4 @@
-"""Surveys: a surveyor asks all respondents at once. Made by `Node.new_surveyor` and `Node.new_respondent`."""
+"""Surveys: a surveyor asks all respondents. See `Node.new_surveyor` and `Node.new_respondent`."""
 
 from __future__ import annotations
 
@@ -29,10 +29,13 @@ _logger = logging.getLogger("nep.patterns.services")
 
 
 class Surveyor:
-    """Asks all respondents of a survey; gives the answers that come until the time is up. From any thread.
+    """Surveyor: asks all respondents of a survey and collects their answers within a time limit. Thread-safe.
 
-    Respondents are those that were registered when it asks; when all of them have answered it waits no
-    longer. One that fails, refuses or ends has no answer: it is counted in `failures` and logged.
+    It asks the respondents registered at the time of the question, and returns early when all have answered.
+    Errors of respondents are counted in `failures` and logged. Usable as a context manager.
+
+        for answer in surveyor.answers({"unit": "%"}, timeout_s=0.5):
+            print(answer)
     """
 
     def __init__(
@@ -53,36 +56,47 @@ class Surveyor:
         self._is_forked = False
         self._sent: Iterator[object] | None = None
         self.failures = 0
-        """Respondents that were asked and had no answer but an error."""
+        """Number of respondents that replied with an error or stopped."""
 
     @property
     def respondents(self) -> int:
-        """How many there are now."""
+        """Number of registered respondents."""
         return self._transport.respondents
 
     @property
     def late(self) -> int:
-        """Answers that came after their time; they were dropped."""
+        """Number of answers dropped because they arrived after the time limit."""
         return self._transport.late
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True if the surveyor or its node was closed."""
         return self._transport.is_closed
 
     def ask(
         self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
     ) -> list[object]:
-        """The answers, in the order in which they came; of `expect` respondents at most.
+        """Ask a question and return the answers in the order of their arrival.
 
-        Raises `EncodeError`, `ClosedError`, and `NepError` when too much is under way.
+        Args:
+            question: Value of the question.
+            timeout_s: Time limit in seconds; None waits for all respondents. Default: the surveyor's.
+            expect: Return after this number of answers.
+
+        Raises:
+            EncodeError: The question can't be encoded.
+            ClosedError: The surveyor is closed.
+            NepError: Too many calls are in flight.
         """
         return list(self.answers(question, timeout_s, expect=expect))
 
     def answers(
         self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
     ) -> Iterator[object]:
-        """Each answer as it comes. The question is sent before this returns. Raises as `ask` does."""
+        """Ask a question and iterate over the answers as they arrive. See `ask`.
+
+        The question is sent before this method returns.
+        """
         limit_s = self.timeout_s if timeout_s == "default" else seconds("timeout_s", timeout_s)
         if expect is not None:
             at_least("expect", expect, 1)
@@ -124,7 +138,7 @@ class Surveyor:
             self._transport.forget_all(calls)
 
     def _read(self, outcome: Outcome) -> object:
-        """The answer. Raises `NepError` when it is none."""
+        # Raises `NepError` for a failure.
         try:
             if isinstance(outcome, NepError):
                 raise outcome
@@ -135,7 +149,7 @@ class Surveyor:
             if codec is None:
                 raise NepError(_("this version has no such codec; update nep"))
             return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
-        except WaitTimeoutError:  # it may be slow: that is no failure
+        except WaitTimeoutError:  # slow, but not a failure
             raise
         except NepError as error:
             self.failures += 1
@@ -145,31 +159,31 @@ class Surveyor:
                 )
             raise
 
-    # ---- as the original NEP has it
+    # ---- API of the original NEP
 
     def send_json(self, question: object) -> None:
-        """Ask; `listen_json` gives the answers. What has not come of the last question is forgotten."""
+        """Ask a question; `listen_json` returns the answers. Discards open answers of the last question."""
         self._sent = self.answers(question)
 
     def listen_json(self) -> tuple[bool, object]:
-        """(True, the next answer), or (False, {}) when the time is up or all have answered."""
+        """Return (True, next answer), or (False, {}) after the time limit or the last answer."""
         if self._sent is None:
             raise NepError(_("nothing was asked; call 'send_json' first"))
         for answer in self._sent:
             return True, answer
         return False, {}
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
-        """Unregister and end. May be called twice."""
+        """Unregister and close. Idempotent."""
         if self._is_forked:
             return
         self._transport.close()
         self._on_close(self)
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Mark the surveyor as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
         self._transport.forked()
 
@@ -187,23 +201,27 @@ class Surveyor:
 
 
 class Respondent(Server):
-    """Answers a survey's questions: by its callback, or by `listen_json` and `send_json`. See `Server`."""
+    """Respondent of a survey, with a callback or with `listen_json` and `send_json`. See `Server`."""
 
     @property
     def survey(self) -> str:
-        """The survey's name."""
+        """Name of the survey."""
         return self.service.removeprefix(SURVEY)
 
     def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
-        """(True, the next question), or (False, {}) when none is there. With `block_mode` it waits for one.
+        """Return (True, next question), or (False, {}) without one. Reply with `send_json`.
 
-        `send_json` answers it. Raises as `listen_info` does.
+        Args:
+            block_mode: Wait without limit.
+
+        Raises:
+            NepError: As `listen_info` does.
         """
         question = self.listen_info(None if block_mode else 0.0)
         return (False, {}) if self._asked is None else (True, question)
 
     def send_json(self, answer: object) -> None:
-        """Answer the question that `listen_json` gave. Raises as `send_info` does."""
+        """Answer the question that `listen_json` returned. Raises as `send_info` does."""
         self.send_info(answer)
 
     def __repr__(self) -> str:

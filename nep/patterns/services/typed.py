@@ -1,6 +1,6 @@
-"""Typed calls: requests and answers may be dataclasses or TypedDicts, and are checked where they go and come.
+"""Typed calls: requests and replies may be dataclasses or TypedDicts, validated at both ends.
 
-What a type declares is looked at in `nep.messages.typed`, which is imported when the first one is given.
+`nep.messages.typed`, which analyses the declarations, is imported when the first type is used.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _SHOWN = 60
 
 
 class PayloadType:
-    """What requests, or answers, are instances of. None: anything.
+    """Declared type of requests or replies; None accepts any value.
 
-    Raises `ValueError` for a class that cannot be carried.
+    Raises `ValueError` for a class that can't be sent.
     """
 
     def __init__(self, declared: type | None) -> None:
@@ -35,15 +35,15 @@ class PayloadType:
 
     @property
     def is_any(self) -> bool:
-        """Whether nothing is checked."""
+        """True if values are not validated."""
         return self._declared is None
 
     def codec(self, base: Codec) -> Codec:
-        """Encodes instances as `base` does the map of their fields; all else is an `EncodeError`."""
+        """Return a codec of instances of the type, based on the codec of plain values."""
         return base if self._declared is None else typed.typed_codec(self._declared, base)
 
     def read(self, plain: object, size_bytes: int) -> object:
-        """The instance of a payload that was decoded. Raises `DecodeError` that names what does not fit."""
+        """Return the instance of a decoded payload. Raises `DecodeError` with the path of the misfit."""
         if self._declared is None:
             return plain
         try:
@@ -57,7 +57,7 @@ class PayloadType:
 
 @dataclass(frozen=True)
 class CallTypes:
-    """Those of a service: of its requests and of its answers."""
+    """Types of a service's requests and replies."""
 
     request: PayloadType
     answer: PayloadType
@@ -67,7 +67,7 @@ UNTYPED = CallTypes(PayloadType(None), PayloadType(None))
 
 
 def call_types(**given: object) -> CallTypes:
-    """Of what a program gives as the types of requests and answers, in this order. Raises `ValueError`."""
+    """Return the types of requests and replies, given in this order. Raises `ValueError`."""
     declared: list[PayloadType] = []
     for name, each in given.items():
         if each is not None and not isinstance(each, type):
