@@ -1,4 +1,4 @@
-"""What nodes and the master say to each other, as values and as bytes: the specification is `docs/wire.md`.
+"""Messages between nodes and the master, as values and as bytes. Specification: `docs/wire.md`.
 
-Pure functions and frozen values; nothing here has a socket or a clock.
+Pure functions and frozen values, without sockets or clocks.
 """

@@ -1,8 +1,8 @@
-"""A batch: several small messages of one publisher in one part. Pure functions; see `docs/wire.md`.
+"""Batches: several small messages of one publisher in one part. Pure functions; see `docs/wire.md`.
 
-After topic and header come the number of messages (u32), the size of each (u32), the stamp of each (u64), and
-then their payloads, one behind the other. The header has the flag `BATCH`, the seq of the first, which those
-that follow count on from, and as size all that comes after it.
+After topic and header follow the number of messages (u32), their sizes (u32 each), their time stamps (u64
+each) and their payloads. The header has the flag `BATCH`, the sequence number of the first message (the
+others count on from it), and the size of everything after the header.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ __all__ = [
 ]
 
 BATCH_FORM = BATCH << 16
-"""The flag in `form_of`."""
+"""Flag `BATCH` at its position in `form_of`."""
 BATCH_MAX = 256
-"""Whoever sends more in one part is refused."""
+"""Maximum number of messages in a batch; larger batches are rejected."""
 _COUNT = struct.Struct("<I")
 
 
 class BatchEntry(NamedTuple):
-    """One message of a batch: its number in it, when it was published, and where its payload is."""
+    """Message of a batch: its index, time stamp, and the range of its payload."""
 
     number: int
     stamp_ns: int
@@ -48,7 +48,7 @@ class BatchEntry(NamedTuple):
 
 @cache
 def table_of(count: int) -> struct.Struct:
-    """The table of a batch of so many messages: their number, all sizes, all stamps."""
+    """Return the table of a batch: number of messages, all sizes, all time stamps."""
     return struct.Struct(f"<I{count}I{count}Q")
 
 
@@ -60,7 +60,16 @@ def batch_part(
     stamps_ns: Sequence[int],
     payloads: Sequence[bytes],
 ) -> bytes:
-    """The part. `topic` is the topic part, `form` that of each message, `seq` the number of the first."""
+    """Return a batch as one part.
+
+    Args:
+        topic: Topic part.
+        form: `form_of` each message.
+        seq: Sequence number of the first message.
+        publisher: Id of the publisher.
+        stamps_ns: Time stamps of the messages.
+        payloads: Payloads of the messages.
+    """
     sizes = [*map(len, payloads)]
     count = len(sizes)
     table = table_of(count).pack(count, *sizes, *stamps_ns)
@@ -69,7 +78,7 @@ def batch_part(
 
 
 def entries(body: bytes) -> list[BatchEntry]:
-    """The messages in what follows the header. Raises `WireError`."""
+    """Return the entries of a batch's body. Raises `WireError`."""
     count = _COUNT.unpack_from(body)[0] if len(body) >= _COUNT.size else 0
     if not 1 <= count <= BATCH_MAX:
         raise WireError(

@@ -1,4 +1,4 @@
-"""ClockSamples: how far this computer's clock is from the master's, by the times in renewals. No sockets."""
+"""Clock offset between this computer and the master, estimated from renewals. No sockets."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
 __all__ = ["ClockSamples", "Moment"]
 
 _KEPT = 8
-"""Of the last so many renewals, the one that was answered soonest tells most."""
+"""Number of renewals kept; the one with the shortest round trip is used."""
 _STEP_NS = 50_000
 _SLEW_PARTS = 2_000
-"""Who adjusts a clock slowly does it by one part of so many; what is more, and `_STEP_NS`, was set."""
+"""Reciprocal of the fastest slew of a clock; a larger change (plus `_STEP_NS`) is a step."""
 
 
 class Moment(NamedTuple):
-    """One moment by both clocks: `steady_ns` is the middle of two readings, `slack_ns` apart from either."""
+    """Simultaneous readings of both clocks: `steady_ns` is the middle of two readings, ± `slack_ns`."""
 
     wall_ns: int
     steady_ns: int
@@ -36,14 +36,16 @@ class _Sample(NamedTuple):
 
 
 class ClockSamples:
-    """Knows `offset`: what to add to this computer's time, and it is the master's.
+    """Estimator of the clock offset to the master, from the four time stamps of NTP.
 
-    The four times of NTP: a renewal is sent (this clock), received and answered (the master's), and its
-    answer is here (this clock). The way there or the way back may have taken all of the time between, so
-    half of it is the uncertainty. When one of the clocks was set, all that was known is forgotten.
+    A renewal is sent (this clock), received and answered (the master's clock), and its reply arrives (this
+    clock). The network delay may be entirely on one way, so half of it is the uncertainty. When one of the
+    clocks is set, all samples are discarded.
 
-    `wall` is the clock that messages are stamped with (ns since 1970), `steady` one that nobody sets (ns),
-    and `resolution_s` the step in which `wall` goes on.
+    Args:
+        wall: Clock of message time stamps, in ns since 1970.
+        steady: Monotonic clock in ns.
+        resolution_s: Resolution of `wall` in seconds.
     """
 
     def __init__(
@@ -60,10 +62,13 @@ class ClockSamples:
         self._samples: deque[_Sample] = deque(maxlen=_KEPT)
         self._seen: Moment | None = None
         self.steps = 0
-        """How often one of the two clocks was seen to be set."""
+        """Number of detected clock steps."""
 
     def now(self) -> Moment:
-        """This moment. What was known is forgotten when this computer's clock was set since the last one."""
+        """Return the current moment.
+
+        Discards all samples if this computer's clock was set in the meantime.
+        """
         before = self._steady()
         wall_ns = self._wall()
         after = self._steady()
@@ -74,9 +79,13 @@ class ClockSamples:
         return moment
 
     def add(self, sent: Moment, received_ns: int, answered_ns: int, now: Moment | None = None) -> bool:
-        """A renewal that was sent at `sent` was received and answered at these times; whether it is of use.
+        """Add a renewal; return True if it is usable.
 
-        `now` is when its answer came, this moment if left out.
+        Args:
+            sent: Moment of sending.
+            received_ns: Time of receipt by the master's clock.
+            answered_ns: Time of the reply by the master's clock.
+            now: Moment of the reply's arrival; default: now.
         """
         now = now or self.now()
         taken_ns = now.steady_ns - sent.steady_ns
@@ -93,12 +102,12 @@ class ClockSamples:
         if best is not None:
             apart_ns = abs(offset_ns - best.offset_ns)
             if apart_ns > uncertainty_ns + best.uncertainty_at(now.steady_ns):
-                self._stepped()  # both cannot be true: it was the master's that was set
+                self._stepped()  # contradiction: the master's clock was set
         self._samples.append(sample)
         return True
 
     def offset(self, now: Moment | None = None) -> tuple[int, int] | None:
-        """What to add to this computer's time to have the master's, and how surely (ns); None: not known."""
+        """Return the offset to add to this computer's time and its uncertainty in ns, or None if unknown."""
         now = now or self.now()
         best = self._best(now.steady_ns)
         if best is None or best.uncertainty_at(now.steady_ns) > UNCERTAINTY_MAX_NS:
@@ -106,14 +115,14 @@ class ClockSamples:
         return best.offset_ns, best.uncertainty_at(now.steady_ns)
 
     def forget(self) -> None:
-        """Another master may have another clock."""
+        """Discard all samples: another master may have another clock."""
         self._samples.clear()
 
     def _best(self, steady_ns: int) -> _Sample | None:
         return min(self._samples, key=lambda each: each.uncertainty_at(steady_ns), default=None)
 
     def _fits(self, then: Moment, now: Moment) -> bool:
-        """Whether both clocks went on by as much since then."""
+        # True if both clocks advanced equally.
         by_steady = now.steady_ns - then.steady_ns
         allowed = _STEP_NS + then.slack_ns + now.slack_ns + 2 * self._resolution_ns
         return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_PARTS

@@ -1,8 +1,8 @@
-"""The form on the wire of what nodes and the master say. Pure functions; the specification is `docs/wire.md`.
+"""Wire encoding of requests, replies and pushes. Pure functions; specification: `docs/wire.md`.
 
-A body is one msgpack map. Requests carry `do` (what is asked) and `call` (a number that the reply repeats as
-`re`); replies and pushes carry `is`; `what` holds the fields. Values become maps with `write`, and maps are
-parsed with `read`, once, at the edge; a graph has its own way out, which keeps what has not changed.
+A body is one msgpack map. Requests have `do` (the operation) and `call` (a number repeated as `re` in the
+reply); replies and pushes have `is`; `what` holds the fields. `write` converts values to maps, `read` parses
+and validates them once, at the edge. Graphs have an encoder of their own that caches unchanged parts.
 """
 
 from __future__ import annotations
@@ -98,9 +98,9 @@ _NO_MAP = lazy("'{field}' is a '{given}', not a map")
 _LARGE_BYTES = 50_000
 _SMALL_BYTES = 4096
 _LISTS_MAX, _LONGEST = 50_000, 20_000
-"""A request has fewer lists and maps, and none is longer: a node that joins has 5 000 records at most."""
+"""Limits of lists and maps in a request: a joining node has at most 5,000 records."""
 _VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
-"""How an answer with a graph begins that `AnswerEncoder` made."""
+"""First bytes of a graph reply from `AnswerEncoder`."""
 
 
 class ReceivedRequest(NamedTuple):
@@ -111,12 +111,12 @@ class ReceivedRequest(NamedTuple):
 
 
 def encode_request(request: Request, call: int) -> bytes:
-    """The body of a request."""
+    """Return the body of a request."""
     return pack_saturated({"do": _REQUEST_NAMES[type(request)], "call": call, "what": write(request)})
 
 
 def decode_request(body: bytes) -> ReceivedRequest:
-    """The request in a body; never raises, so that every sender gets an answer."""
+    """Decode a request. Never raises, so that every sender gets a reply."""
     call = 0
     try:
         if len(body) < _SMALL_BYTES:
@@ -124,7 +124,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
         else:
             envelope = _envelope(body, lambda body: unpack_bounded(body, _LISTS_MAX, _LONGEST))
         number = envelope.get("call", 0)
-        # Negative ones are those of the master's own process: nobody else may take their replies.
+        # negative numbers are reserved for calls inside the master's process
         call = number if type(number) is int and number >= 0 else 0
         name = envelope.get("do")
         kind = _REQUESTS.get(name) if isinstance(name, str) else None
@@ -136,17 +136,14 @@ def decode_request(body: bytes) -> ReceivedRequest:
 
 
 class AnswerEncoder:
-    """Makes the bodies of replies and pushes.
-
-    Of a graph it keeps the bytes of each node and topic as long as its value is the same.
-    """
+    """Encoder of replies and pushes. Caches the encoding of a graph's unchanged nodes and topics."""
 
     def __init__(self) -> None:
         self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
     def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
-        """The body of a reply to `call`, or of a push."""
+        """Return the body of a reply to `call`, or of a push."""
         if isinstance(answer, Seen):
             return self._seen(answer, call)
         return pack_saturated({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
@@ -160,14 +157,14 @@ class AnswerEncoder:
             "alerts": write(view.alerts),
             "listens": view.listens,
         }
-        if view.services:  # which an older node does not look for
+        if view.services:  # unknown to older nodes
             rest["services"] = write(view.services)
         if view.patterns:
             rest["patterns"] = write(view.patterns)
         nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
         topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
         if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:
-            self._parts.clear()  # many have gone
+            self._parts.clear()  # many were removed
         return b"".join(
             (
                 header(3),
@@ -187,29 +184,29 @@ class AnswerEncoder:
 
     def _part(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
         kept = self._parts.get(name)
-        # A topic that has not changed is the same value; comparing two that are not takes as long as packing.
+        # unchanged topics are the same object; comparing different ones takes as long as encoding them
         if kept is not None and (kept[0] is value or (isinstance(value, NodeInfo) and kept[0] == value)):
             return kept[1]
-        # All fields, also those that have their default: to look for these takes longer.
+        # includes default values: omitting them takes longer
         packed: bytes = self._pack(key) + self._pack(vars(value))
         self._parts[name] = (value, packed)
         return packed
 
 
 def _packable(value: object) -> object:
-    """What msgpack does not know: our own values, and numbers beyond its own."""
+    # Called for types unknown to msgpack: dataclasses, and ints beyond its range.
     return saturated(value) if isinstance(value, int) else vars(value)
 
 
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
-    """The body of a reply to `call`, or of a push."""
+    """Return the body of a reply to `call`, or of a push."""
     return AnswerEncoder().encode(answer, call)
 
 
 def call_of_view(body: bytes) -> int | None:
-    """The number of the call that a body answers with a graph; None when it is another answer, or unusual.
+    """Return the call number of a graph reply without decoding it, or None for other bodies.
 
-    It takes no time, while decoding a graph of thousands of topics takes a tenth of a second.
+    Decoding a graph of thousands of topics takes 0.1 s.
     """
     if not body.startswith(_VIEW_BEGINS):
         return None
@@ -221,7 +218,7 @@ def call_of_view(body: bytes) -> int | None:
 
 
 def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
-    """(call, answer) in a body; call is 0 for a push. Raises `WireError`."""
+    """Decode a reply or push. Return (call, answer); call is 0 for a push. Raises `WireError`."""
     if len(body) < _LARGE_BYTES:
         return _decode_answer(body)
     with collecting_later():
@@ -250,7 +247,10 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
 
 @contextmanager
 def collecting_later() -> Iterator[None]:
-    """Makes a large graph in half of the time. For milliseconds only: it holds for the whole process."""
+    """Disable garbage collection, which halves the time to build a large graph.
+
+    It affects the whole process: use it for milliseconds only.
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -260,11 +260,11 @@ def collecting_later() -> Iterator[None]:
             gc.enable()
 
 
-# ---- frozen dataclasses ↔ maps and lists. The classes have no `__post_init__` and no slots.
+# ---- frozen dataclasses to maps and back; the classes have neither `__post_init__` nor slots
 
 
 def write(value: object) -> object:
-    """`value` as maps, lists and plain values; fields that have their default are left out."""
+    """Convert a value to maps, lists and scalars, without fields that have their default value."""
     if type(value) in _PLAIN:
         return value
     if is_dataclass(value) and not isinstance(value, type):
@@ -290,9 +290,9 @@ def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
 
 
 def read(kind: type[T], value: object) -> T:
-    """A `kind` from what `write` made of one. Unknown fields are ignored (newer peers may send more).
+    """Parse a `kind` from the result of `write`. Unknown fields are ignored: newer peers may send more.
 
-    Raises `WireError` that names the field when something is missing or of another type.
+    Raises `WireError` with the name of a missing or invalid field.
     """
     hint: Any = kind
     try:
@@ -304,9 +304,9 @@ def read(kind: type[T], value: object) -> T:
 
 
 class _MisfitError(Exception):
-    """A value that is none of its type. The way to it is noted on the way out: there is one rarely.
+    """Validation error; its path is collected while the exception propagates, because errors are rare.
 
-    ``words`` is the sentence for it, with the holes ``field`` and ``values``; who tells it fills them.
+    ``words`` is the message with the placeholder ``field`` and those in ``values``.
     """
 
     def __init__(self, words: str, **values: str) -> None:
@@ -316,9 +316,9 @@ class _MisfitError(Exception):
 
 
 def make_frozen(kind: type[T], every_field: dict[str, object]) -> T:
-    """A frozen `kind` of all its fields, in a fifth of the time: its own way to set them is slow.
+    """Return a frozen dataclass from all its fields, in a fifth of the constructor's time.
 
-    It keeps `every_field`, which nobody else may change from now on.
+    It takes ownership of `every_field`, which must not be changed afterwards.
     """
     value = object.__new__(kind)
     object.__setattr__(value, "__dict__", every_field)
@@ -374,7 +374,7 @@ def _of_mapping(key: Reader, item: Reader) -> Reader:
 
 def _of_dataclass(kind: type) -> Reader:
     hints = get_type_hints(kind)
-    # The type that a value has nearly always: then nothing needs to be called for it.
+    # the usual type of a value, which needs no further call
     readers = [
         (each.name, hints[each.name] if hints[each.name] in _PLAIN else None, _reader(hints[each.name]), each)
         for each in fields(kind)
@@ -406,16 +406,14 @@ def _of_dataclass(kind: type) -> Reader:
 
 
 def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
-    """Makes a `kind` of a map with just its fields, each of just its type: nearly all are so in a graph.
-
-    None for all others, also for those with something wrong deeper down: who asks finds out what.
-    """
+    # Returns a function for the common case in graphs: a map of exactly the fields, each of its type. It
+    # returns None for any other map, which the general parser then handles or rejects.
     plain = {name: _plain_types(hint) for name, hint in hints.items()}
     names = [name for name, types in plain.items() if types]
     others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
     of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
     known: set[tuple[type, ...]] = set()
-    """Combinations of types that were found right; there are two for each field that may be None."""
+    """Combinations of types found valid; two for each optional field."""
 
     def quickly(value: dict[str, object]) -> object | None:
         if len(value) != len(plain):
@@ -438,7 +436,7 @@ def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object
 
 
 def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is any object
-    """The types of which values are taken as they are; none when values have to be looked into."""
+    # Types whose values are used unchanged; empty if values must be parsed.
     if hint in _PLAIN:
         return frozenset({hint})
     if get_origin(hint) in {UnionType, Union} and set(get_args(hint)) <= _PLAIN:

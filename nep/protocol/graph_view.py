@@ -1,4 +1,4 @@
-"""What the master knows, as frozen values: nodes, topics, publishers, subscribers, services, alerts."""
+"""Snapshot of the graph as frozen values: nodes, topics, publishers, subscribers, services, alerts."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ __all__ = [
 ]
 
 BRIDGES_TOPIC = "/nep/bridges"
-"""Bridges tell here what they join and how many messages they have carried: who publishes here is one."""
+"""Topic of the bridges' state (connected networks, message counts); its publishers are bridges."""
 
 
 @dataclass(frozen=True)
 class Alert:
-    """A present problem, for people.
+    """Current problem of the network, for people.
 
-    `id`: what it is about, such as "type:/camera". `sentence`: what is wrong. `hint`: what to do.
+    Attributes:
+        id: Kind and subject, such as "type:/camera".
+        sentence: Description of the problem.
+        hint: What to do about it.
     """
 
     id: str
@@ -37,16 +40,21 @@ class Alert:
 
 @dataclass(frozen=True)
 class NodeInfo:
-    """A program, or a part of one.
+    """Node of the graph.
 
-    `id`: 16 hexadecimal digits. `host`: its computer's name. `pid`: its process, None if not known.
-    `since_ns`: when it was made, in nanoseconds since 1970 by its own clock. `generation` is "native",
-    "gateway", or the original NEP's "A", "B".
-
-    `cpu_ratio` is the share of one core that its process used between its last two renewals (0.5 is half a
-    core), None until known; nodes of one process have the same. `clock_offset_ns`: what to add to its
-    computer's clock for the master's, known to `clock_uncertainty_ns` to both sides; 0 and 0 on the
-    master's own computer, None until known.
+    Attributes:
+        id: 16 hexadecimal digits, new at each start.
+        name: Name of the node; need not be unique.
+        host: Name of its computer.
+        pid: Process id, or None if unknown.
+        language: Programming language.
+        generation: "native", "gateway", or the original NEP's "A" or "B".
+        since_ns: Start time by its own clock, in nanoseconds since 1970.
+        cpu_ratio: CPU usage of its process between the last two renewals (1.0 is one core), or None if
+            unknown. Nodes of one process have the same value.
+        clock_offset_ns: Nanoseconds to add to its clock for the master's; 0 on the master's computer, None if
+            unknown.
+        clock_uncertainty_ns: Uncertainty (±) of `clock_offset_ns`.
     """
 
     id: str
@@ -63,12 +71,19 @@ class NodeInfo:
 
 @dataclass(frozen=True)
 class PublisherInfo:
-    """A publisher. Its counters are those of its last renewal, one second old at most; in large graphs more.
+    """Publisher of a topic. Counters are as of the last renewal: 1 s old at most, more in large graphs.
 
-    `endpoints` is empty for the original NEP's. `latched`: it keeps messages for who comes later. `count`:
-    messages so far. `bytes`: of their payloads. `last_seq`: the number of the newest. `last_stamp_ns`: its
-    time, in nanoseconds since 1970 by the publisher's clock. `rate_hz`: messages a second, None until known.
-    `bandwidth_Bps`: bytes a second, None until known.
+    Attributes:
+        id: Id of the publisher.
+        node_id: Id of its node.
+        endpoints: Addresses; empty for publishers of the original NEP.
+        latched: True if it keeps its newest message for later subscribers.
+        count: Number of messages.
+        bytes: Total size of the payloads.
+        last_seq: Sequence number of the newest message.
+        last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970 by the publisher's clock.
+        rate_hz: Messages per second, or None if unknown.
+        bandwidth_Bps: Bytes per second, or None if unknown.
     """
 
     id: int
@@ -85,10 +100,13 @@ class PublisherInfo:
 
 @dataclass(frozen=True)
 class SubscriberInfo:
-    """A subscriber.
+    """Subscriber of a topic.
 
-    `received`: messages that arrived. `lost`: messages that did not. Both are None where nobody can count
-    them (the original NEP).
+    Attributes:
+        id: Id of the subscriber.
+        node_id: Id of its node.
+        received: Number of received messages; None for the original NEP.
+        lost: Number of lost messages; None for the original NEP.
     """
 
     id: int
@@ -99,11 +117,19 @@ class SubscriberInfo:
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """A topic with everybody on it. Rates are sums over its publishers; loss over its subscribers.
+    """Topic with its publishers and subscribers. Values that are unknown are None.
 
-    `codec`: how its publishers encode, empty when there is none. `rate_hz`: messages a second.
-    `bandwidth_Bps`: bytes a second. `last_stamp_ns`: of the newest message, in nanoseconds since 1970.
-    `loss_ratio`: lost ones of all that should have arrived, 0 to 1. What nobody knows is None.
+    Attributes:
+        name: Name of the topic.
+        msg_type: Message type.
+        codec: Codec of the publishers, or "" without one.
+        publishers: Publishers.
+        subscribers: Subscribers, without those with patterns.
+        rate_hz: Messages per second of all publishers.
+        bandwidth_Bps: Bytes per second of all publishers.
+        last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970.
+        lost: Lost messages of all subscribers.
+        loss_ratio: Share of messages lost, 0 to 1.
     """
 
     name: str
@@ -120,7 +146,13 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class PatternInfo:
-    """Subscribers whose topic has wildcards, such as "/robot/*/camera": they hear many topics, it is none."""
+    """Subscribers with a pattern, such as "/robot/*/camera". The pattern itself is not a topic.
+
+    Attributes:
+        name: The pattern.
+        msg_type: Message type.
+        subscribers: Subscribers.
+    """
 
     name: str
     msg_type: str
@@ -129,10 +161,15 @@ class PatternInfo:
 
 @dataclass(frozen=True)
 class ServerInfo:
-    """A server of a service.
+    """Server of a service.
 
-    `calls`: those that were answered. `errors`: of these, those answered with an error. `bytes`: the size of
-    the answers.
+    Attributes:
+        id: Id of the server.
+        node_id: Id of its node.
+        endpoints: Addresses.
+        calls: Number of answered calls.
+        errors: Number of calls answered with an error.
+        bytes: Total size of the replies.
     """
 
     id: int
@@ -145,10 +182,13 @@ class ServerInfo:
 
 @dataclass(frozen=True)
 class ClientInfo:
-    """A client of a service.
+    """Client of a service.
 
-    `answered`: calls that were, also with an error. `failed`: those that ended without an answer. Both are
-    None until known.
+    Attributes:
+        id: Id of the client.
+        node_id: Id of its node.
+        answered: Number of answered calls, including errors, or None if unknown.
+        failed: Number of calls without a reply, or None if unknown.
     """
 
     id: int
@@ -159,7 +199,16 @@ class ClientInfo:
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """A service with all its servers, the one that is called first, and its clients. Counts are sums."""
+    """Service with its servers (the first is called first) and clients.
+
+    Attributes:
+        name: Name of the service.
+        msg_type: Service type.
+        servers: Servers.
+        clients: Clients.
+        calls: Answered calls of all servers.
+        errors: Calls answered with an error.
+    """
 
     name: str
     msg_type: str
@@ -171,11 +220,20 @@ class ServiceInfo:
 
 @dataclass(frozen=True)
 class GraphView:
-    """The whole graph at one moment.
+    """Snapshot of the whole graph. Returned by `Node.graph`.
 
-    `epoch`: another number after the master was started again. `revision`: grows when somebody comes or goes,
-    not with statistics. `nodes`: by id. `topics`: by name. `services`: by name. `alerts`: what is wrong now.
-    `listens`: the addresses at which the master serves other computers; none when it serves its own only.
+        for topic in node.graph().topics.values():
+            print(topic.name, topic.rate_hz)
+
+    Attributes:
+        epoch: Changes when the master is restarted.
+        revision: Increases when nodes, publishers or subscribers are added or removed, not with statistics.
+        nodes: Nodes by id.
+        topics: Topics by name.
+        alerts: Current problems.
+        listens: Addresses at which the master serves other computers; empty if it serves only its own.
+        services: Services by name.
+        patterns: Subscriptions with wildcards by pattern.
     """
 
     epoch: int
@@ -188,7 +246,7 @@ class GraphView:
     patterns: Mapping[str, PatternInfo] = field(default_factory=dict)
 
     def to_plain(self) -> dict[str, object]:
-        """The view as maps and lists, for the wire and for `--json`."""
+        """Return the graph as maps and lists, for the wire and for `--json`."""
         return {
             "epoch": self.epoch,
             "revision": self.revision,

@@ -1,11 +1,11 @@
-"""What nodes and the master say to each other, as values. Their form on the wire: `nep.protocol.encoding`.
+"""Requests, replies and pushes of nodes and the master. Wire encoding: `nep.protocol.encoding`.
 
-Every reply and push carries the master's `epoch`, which changes when the master is restarted, and the graph's
-`revision`.
+Every reply and push has the master's `epoch`, which changes when the master is restarted, and the `revision`
+of the graph.
 
-A node has a *key*, which only it and its masters know, and its id comes from the key: nobody else can
-register that id, whether the node is there, is unlisted or comes back to a master that was started again.
-Ids of publishers and subscribers come from the key and a number. See docs/adr/0014-who-speaks-for-a-node.md.
+A node has a secret *key*, shared only with its masters, from which its id is derived. No other program can
+register that id, whether the node is registered, unlisted or returns to a restarted master. Ids of publishers
+and subscribers are derived from the key and a number. See docs/adr/0014-who-speaks-for-a-node.md.
 """
 
 from __future__ import annotations
@@ -17,23 +17,31 @@ from hashlib import sha256
 from nep.protocol.graph_view import Alert, GraphView
 
 COUNT_MAX = 2**63 - 1
-"""Counters stop here: every language and every encoding has room for it."""
+"""Maximum of counters, which every language and encoding can represent."""
 
 RENEW_S = 1.0
-"""How often a node renews, unless the master says otherwise."""
+"""Default interval of renewals; the master may ask for another."""
 
 
 def as_count(value: int) -> int:
-    """A number that somebody told as a counter: 0 to `COUNT_MAX`, whatever it was."""
+    """Clamp a received counter to 0 … `COUNT_MAX`."""
     return value if 0 <= value <= COUNT_MAX else 0 if value < 0 else COUNT_MAX
 
 
 @dataclass(frozen=True)
 class NodeRecord:
-    """A node as it presents itself. `since_ns` is its own clock when it was made.
+    """Node as it registers itself.
 
-    `key` is known to the node and its masters only and proves its id: see `is_proven`. Nodes with the same
-    `computer` read the same clock; "" if that is not known.
+    Attributes:
+        id: Derived from the key.
+        name: Name of the node.
+        host: Name of its computer.
+        pid: Process id, or None if unknown.
+        language: Programming language.
+        generation: See `NodeInfo`.
+        since_ns: Start time by its own clock.
+        key: Secret that proves the id (`is_proven`).
+        computer: Id of the computer; nodes with the same value share a clock. "" if unknown.
     """
 
     id: str
@@ -49,11 +57,18 @@ class NodeRecord:
 
 @dataclass(frozen=True)
 class PublisherRecord:
-    """A publisher as its node presents it. `endpoints` is empty when nobody can connect to it directly.
+    """Publisher as its node registers it.
 
-    `local` says that it is bound to the name of this computer that goes with its loopback endpoint, too.
-    `number` proves its id: see `is_proven`. `history`: so many messages it keeps for subscribers that come
-    late, when these may be more than the last one.
+    Attributes:
+        id: Derived from the node's key and `number` (`is_proven`).
+        topic: Name of the topic.
+        msg_type: Message type.
+        codec: Name of the codec.
+        endpoints: Addresses; empty if subscribers can't connect directly.
+        latched: True if it keeps messages for later subscribers.
+        local: True if it is also bound to the local (ipc) name of its loopback endpoint.
+        number: Proves the id.
+        history: Number of messages kept for later subscribers, if more than one.
     """
 
     id: int
@@ -69,9 +84,9 @@ class PublisherRecord:
 
 @dataclass(frozen=True)
 class SubscriberRecord:
-    """A subscriber as its node presents it. `number` proves its id: see `is_proven`.
+    """Subscriber as its node registers it. `number` proves its id (`is_proven`).
 
-    With `pattern` it hears all topics that match its own: see `nep.protocol.topic_pattern`.
+    With `pattern` its topic is a pattern: see `nep.protocol.topic_pattern`.
     """
 
     id: int
@@ -82,18 +97,18 @@ class SubscriberRecord:
 
 
 def node_id_from(key: str) -> str:
-    """The id of the node that has this key: 16 hexadecimal digits."""
+    """Return the node id derived from a key: 16 hexadecimal digits."""
     return sha256(key.encode("utf-8", "replace")).hexdigest()[:16]
 
 
 def id_from(key: str, number: int) -> int:
-    """The id of the publisher or subscriber with this number (from 1) of the node that has this key."""
+    """Return the publisher or subscriber id derived from a node's key and a number (from 1)."""
     digest = sha256(f"{key}/{number}".encode("utf-8", "replace")).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1
 
 
 def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | None = None) -> bool:
-    """Whether the node's id comes from its key; with a record, whether that one's id does, too."""
+    """Return True if the node's id is derived from its key and, with a record, the record's id, too."""
     if not node.key or node_id_from(node.key) != node.id:
         return False
     return record is None or (record.number > 0 and id_from(node.key, record.number) == record.id)
@@ -101,10 +116,10 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
 
 @dataclass(frozen=True)
 class PublisherCount:
-    """A publisher's statistics: all messages and bytes so far, and the newest message.
+    """Statistics of a publisher: totals and the newest message.
 
-    `problem` is a sentence about payloads that cannot be sent, or empty. A server counts its calls and the
-    bytes of its answers, and those calls that ended with `errors`.
+    `problem` describes payloads that can't be encoded, or is "". A server counts its calls, the bytes of its
+    replies, and calls with `errors`.
     """
 
     id: int
@@ -118,7 +133,7 @@ class PublisherCount:
 
 @dataclass(frozen=True)
 class SubscriberCount:
-    """A subscriber's statistics. `problem` is a sentence about messages that it could not read, or empty."""
+    """Statistics of a subscriber. `problem` describes messages that it can't decode, or is ""."""
 
     id: int
     received: int | None
@@ -128,10 +143,7 @@ class SubscriberCount:
 
 @dataclass(frozen=True)
 class RemotePublisher:
-    """A publisher with the node that it belongs to: what a subscriber needs to connect.
-
-    `computer` is the node's: see `NodeRecord`.
-    """
+    """Publisher with its node: everything a subscriber needs to connect. `computer` as in `NodeRecord`."""
 
     publisher: PublisherRecord
     node_id: str
@@ -141,7 +153,7 @@ class RemotePublisher:
 
 @dataclass(frozen=True)
 class Expected:
-    """A subscriber that a new publisher waits for."""
+    """Subscriber that a new publisher waits for."""
 
     id: int
     node_id: str
@@ -153,10 +165,10 @@ class Expected:
 
 @dataclass(frozen=True)
 class Join:
-    """Register a node with all that it has, replacing what the master knew of it.
+    """Register a node with everything it has, replacing its previous registration.
 
-    `epoch` is that of the master the node was registered with before, 0 if there was none. A `managed` node
-    (an original program) has no connection of its own and no lease: who registered it says when it leaves.
+    `epoch` is that of its previous master, or 0. A `managed` node (a program of the original NEP) has neither
+    connection nor lease: its manager reports its end.
     """
 
     node: NodeRecord
@@ -168,7 +180,7 @@ class Join:
 
 @dataclass(frozen=True)
 class AddPublisher:
-    """Register one publisher (and its node, if the master does not know it). Answered by `Added`."""
+    """Register a publisher, and its node if unknown. Reply: `Added`."""
 
     node: NodeRecord
     publisher: PublisherRecord
@@ -176,7 +188,7 @@ class AddPublisher:
 
 @dataclass(frozen=True)
 class AddSubscriber:
-    """Register one subscriber (and its node, if the master does not know it). Answered by `Found`."""
+    """Register a subscriber, and its node if unknown. Reply: `Found`."""
 
     node: NodeRecord
     subscriber: SubscriberRecord
@@ -184,7 +196,7 @@ class AddSubscriber:
 
 @dataclass(frozen=True)
 class RemovePublisher:
-    """A publisher closes; its last message was `last_seq`."""
+    """Unregister a publisher; `last_seq` is its last message."""
 
     node_id: str
     id: int
@@ -193,7 +205,7 @@ class RemovePublisher:
 
 @dataclass(frozen=True)
 class RemoveSubscriber:
-    """A subscriber closes."""
+    """Unregister a subscriber."""
 
     node_id: str
     id: int
@@ -201,18 +213,24 @@ class RemoveSubscriber:
 
 @dataclass(frozen=True)
 class Leave:
-    """A node closes, with all that it has."""
+    """Unregister a node with everything it has."""
 
     node_id: str
 
 
 @dataclass(frozen=True)
 class Renew:
-    """A node lives; its statistics. `revision` is the one of the last `Renewed` or `Joined` that it got.
+    """Renew a lease and report statistics.
 
-    `cpu_ratio`: the share of one core that its program used since the last renewal; None if it is not known.
-    `clock`: what to add to its clock for the master's and how surely (ns), empty as long as it does not know;
-    None from nodes that do not compare clocks.
+    Attributes:
+        node_id: Id of the node.
+        epoch: Epoch of the master.
+        revision: Revision of the last reply.
+        publishers: Statistics of its publishers.
+        subscribers: Statistics of its subscribers.
+        cpu_ratio: CPU usage of its process since the last renewal, or None if unknown.
+        clock: Offset to add to its clock for the master's, and the uncertainty, in ns; empty if unknown yet;
+            None from nodes that don't compare clocks.
     """
 
     node_id: str
@@ -226,7 +244,7 @@ class Renew:
 
 @dataclass(frozen=True)
 class ReportMissing:
-    """These subscribers did not answer a new publisher in time."""
+    """Report subscribers that did not answer a new publisher in time."""
 
     node_id: str
     publisher_id: int
@@ -235,9 +253,9 @@ class ReportMissing:
 
 @dataclass(frozen=True)
 class ReportAlerts:
-    """All alerts of something attached to the master (`source`) that are present now; earlier ones are cured.
+    """Report all current alerts of an attachment (`source`), replacing its previous ones.
 
-    Only for `Master.submit`: it has no form on the wire.
+    Only for `Master.submit`; has no wire encoding.
     """
 
     source: str
@@ -246,9 +264,9 @@ class ReportAlerts:
 
 @dataclass(frozen=True)
 class Listen:
-    """Serve other computers at these addresses of this one; none: serve this computer only.
+    """Serve other computers at these addresses of the master's computer; none: only its own.
 
-    Answered by `Done`. Refused when it comes from another computer.
+    Reply: `Done`. Rejected from other computers.
     """
 
     hosts: tuple[str, ...]
@@ -256,12 +274,12 @@ class Listen:
 
 @dataclass(frozen=True)
 class Look:
-    """Ask for the whole graph. Answered by `Seen`."""
+    """Request the whole graph. Reply: `Seen`."""
 
 
 @dataclass(frozen=True)
 class Ping:
-    """Ask whether a master is there. Answered by `Done`."""
+    """Check that a master is running. Reply: `Done`."""
 
 
 Request = (
@@ -285,7 +303,7 @@ Request = (
 
 @dataclass(frozen=True)
 class _FromMaster:
-    """A reply or push: `epoch` is another one after the master was started again, `revision` its graph's."""
+    """Base of replies and pushes: `epoch` changes when the master is restarted; `revision` of the graph."""
 
     epoch: int
     revision: int
@@ -293,15 +311,15 @@ class _FromMaster:
 
 @dataclass(frozen=True)
 class Done(_FromMaster):
-    """It is done; also the answer to a ping."""
+    """Success; also the reply to a ping."""
 
 
 @dataclass(frozen=True)
 class Added(_FromMaster):
-    """A publisher is registered. It waits for `expected`; `hung` are known not to answer at present.
+    """Publisher registered. It waits for `expected`; `hung` are known not to respond at present.
 
-    `hosts` (here and below) are the addresses at which the master serves other computers: publishers on the
-    master's own computer serve there, too.
+    `hosts` (here and below) are the addresses at which the master serves other computers; publishers on the
+    master's computer serve there, too.
     """
 
     expected: tuple[Expected, ...] = ()
@@ -311,9 +329,9 @@ class Added(_FromMaster):
 
 @dataclass(frozen=True)
 class Found(_FromMaster):
-    """A subscriber is registered, or a node has joined: the publishers to connect to.
+    """Subscriber registered, or node joined: the publishers to connect to.
 
-    `pattern`: the master knows that the subscriber hears all topics that match; an older one does not.
+    `pattern`: the master supports patterns; older ones don't.
     """
 
     publishers: tuple[RemotePublisher, ...] = ()
@@ -323,7 +341,7 @@ class Found(_FromMaster):
 
 @dataclass(frozen=True)
 class TopicPublishers:
-    """All publishers of one topic, now."""
+    """All publishers of one topic."""
 
     topic: str
     publishers: tuple[RemotePublisher, ...]
@@ -331,15 +349,18 @@ class TopicPublishers:
 
 @dataclass(frozen=True)
 class Renewed(_FromMaster):
-    """A lease is renewed. `again`: the master does not know this node as it is, it shall join again.
+    """Lease renewed.
 
-    `topics` are those of the node's subscribers that changed since its revision; `last_seqs` are the newest
-    messages of the publishers it subscribes to, as of their last renewal. The next renewal is due in `next_s`
-    seconds: the master lets the nodes of a large graph renew less often.
-
-    `times` are when the renewal was received and answered, by the master's clock (ns since 1970); nothing
-    for nodes with the same clock. `clocks`: by the id of a node on another computer that the node hears,
-    what to add to its times for the node's own clock, and how surely that is known (ns).
+    Attributes:
+        again: True if the master does not know the node as it is: it must join again.
+        topics: Publishers of topics that changed since the node's revision.
+        last_seqs: Newest messages of the publishers that the node subscribes to, by publisher id.
+        hosts: Addresses at which the master serves other computers.
+        next_s: Time until the next renewal in seconds; longer in large graphs.
+        times: Receipt and reply of the renewal by the master's clock (ns since 1970); empty for nodes with
+            the same clock.
+        clocks: By node id of publishers on other computers: offset to add to their times for the node's
+            clock, and its uncertainty (ns).
     """
 
     again: bool = False
@@ -360,7 +381,7 @@ class Seen(_FromMaster):
 
 @dataclass(frozen=True)
 class Refused(_FromMaster):
-    """Refusal of a request; `reason` is a sentence in the master's language.
+    """Rejection of a request; `reason` is a sentence in the master's language.
 
     `code` is language-independent: see the table of codes in docs/wire.md. Empty from older masters.
     """
@@ -377,9 +398,9 @@ Reply = Done | Added | Found | Renewed | Seen | Refused
 
 @dataclass(frozen=True)
 class PublisherCame(_FromMaster):
-    """A topic that the node subscribes to has one more publisher, or one with other endpoints.
+    """New publisher of a subscribed topic, or one with new endpoints.
 
-    `is_new`: it has just been created, so it has sent nothing before; it did not rejoin or move.
+    `is_new`: it was just created and has not sent anything; it did not rejoin or move.
     """
 
     publisher: RemotePublisher
@@ -388,10 +409,10 @@ class PublisherCame(_FromMaster):
 
 @dataclass(frozen=True)
 class PublisherGone(_FromMaster):
-    """A publisher of such a topic is no longer listed.
+    """Publisher of a subscribed topic no longer registered.
 
-    `is_closed`: it said so itself, and `last_seq` was its last message; else its node is silent or dead, and
-    the connection stays, because the publisher may only be suspended.
+    `is_closed`: it unregistered, and `last_seq` was its last message. Otherwise its node does not respond,
+    and the connection stays, because the publisher may only be suspended.
     """
 
     id: int
@@ -402,14 +423,14 @@ class PublisherGone(_FromMaster):
 
 @dataclass(frozen=True)
 class Probe(_FromMaster):
-    """Sent to a node that has been silent, to find out whether its connection is still there. Ignored."""
+    """Probe of a silent node's connection. Ignored by the receiver."""
 
 
 Push = PublisherCame | PublisherGone | Probe
 
 
 def node_of(request: Request) -> str | None:
-    """The id of the node that a request speaks for; None when it speaks for nobody."""
+    """Return the id of the node that a request speaks for, or None."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
     if isinstance(request, ReportAlerts | Listen | Look | Ping):

@@ -1,11 +1,11 @@
-"""The wire of services: calls and answers ↔ parts. Pure functions; the specification is `docs/services.md`.
+"""Wire format of service calls. Pure functions; specification: `docs/services.md`.
 
-A native call or answer is two parts: a header of 16 bytes and the payload. Programs of the original NEP send
-one part of JSON, which REQ and REP put an empty part before; their answers carry no number and come in the
+A native call or reply is two parts: a header of 16 bytes and the payload. Programs of the original NEP send
+one part of JSON, which REQ and REP prefix with an empty part; their replies have no number and arrive in the
 order of the calls.
 
-The master lists servers and clients of a service as publishers and subscribers of a topic whose name begins
-with `PREFIX`. So masters that know nothing of services let them find each other, too.
+The master lists servers and clients as publishers and subscribers of a topic that starts with `PREFIX`, so
+that older masters without services also connect them.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ __all__ = [
 
 PREFIX = "nep.service:"
 SURVEY = "survey:"
-"""Before a survey's name: its respondents are listed as the servers of a service that is called so."""
+"""Prefix of a survey's service name; its respondents are listed as servers of that service."""
 SERVICE_TYPE = "service"
-"""Type and codec under which the master lists servers and clients."""
+"""Message type and codec under which the master lists servers and clients."""
 ORIGINAL_CODEC = "original"
-"""Codec of servers that speak `ORIGINAL`: programs of the original NEP, listed by the gateway."""
+"""Codec of servers with `ORIGINAL` framing: programs of the original NEP, listed by the gateway."""
 PAYLOAD_MAX_BYTES = 64 * 2**20
-"""Whoever sends a larger call or answer is disconnected."""
+"""Maximum size of a call or reply; a peer that sends more is disconnected."""
 
 _VERSION = 1
 _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
@@ -64,7 +64,7 @@ _FAILURE = b'{"nep_error":'
 
 
 class CallKind(IntEnum):
-    """What two parts are. REFUSED: the server did not carry the call out."""
+    """Kind of a frame. REFUSED: the server did not execute the call."""
 
     CALL = 1
     ANSWER = 2
@@ -73,7 +73,7 @@ class CallKind(IntEnum):
 
 
 class Reply(NamedTuple):
-    """What a server gives back: the payload of an answer, or a `failure`."""
+    """Reply of a server: the payload of an answer, or a `failure`."""
 
     kind: CallKind
     data: bytes | memoryview
@@ -81,7 +81,7 @@ class Reply(NamedTuple):
 
 
 class CallHeader(NamedTuple):
-    """A call as a server reads it: who waits, and for how long (None: for ever)."""
+    """Call as a server parses it; `timeout_s` None means no limit."""
 
     number: int
     codec: int
@@ -90,32 +90,32 @@ class CallHeader(NamedTuple):
 
 
 class ReadAnswer(NamedTuple):
-    """An answer as a client reads it; `number` is None when it answers the oldest call."""
+    """Reply as a client parses it; `number` None means that it answers the oldest call."""
 
     number: int | None
     reply: Reply
 
 
 class Framing(Protocol):
-    """How calls and answers become parts."""
+    """Conversion of calls and replies to parts."""
 
     @property
     def in_order(self) -> bool:
-        """Whether answers have no numbers and come in the order of the calls."""
+        """True if replies have no numbers and arrive in the order of the calls."""
 
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
-        """The parts of a call."""
+        """Return the parts of a call."""
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
-        """A call from its parts. Raises `WireError`."""
+        """Parse a call. Raises `WireError`."""
 
     def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
-        """The parts of an answer."""
+        """Return the parts of a reply."""
 
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
-        """An answer from its parts. Raises `WireError`."""
+        """Parse a reply. Raises `WireError`."""
 
 
 class _Native:
@@ -124,7 +124,7 @@ class _Native:
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
-        # 0 is none: who waits for less than a millisecond waits for one.
+        # 0 means no limit, so shorter limits are rounded up to 1 ms
         limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
         return [_HEADER.pack(_VERSION, CallKind.CALL, codec, limit_ms, number), data]
 
@@ -162,9 +162,9 @@ class _Original:
 
     def call(
         self,
-        number: int,  # noqa: ARG002 - has no place in it
-        codec: int,  # noqa: ARG002 - it is always JSON
-        timeout_s: float | None,  # noqa: ARG002 - has no place in it
+        number: int,  # noqa: ARG002 - not in this format
+        codec: int,  # noqa: ARG002 - always JSON
+        timeout_s: float | None,  # noqa: ARG002 - not in this format
         data: bytes | memoryview,
     ) -> list[bytes | memoryview]:
         return [b"", data]
@@ -172,7 +172,8 @@ class _Original:
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         return CallHeader(0, _JSON, None, _only(parts))
 
-    def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002 - has no place
+    # not in this format
+    def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
         return [b"", reply.data]
 
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
@@ -192,12 +193,12 @@ def _only(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
 NATIVE: Framing = _Native()
 """Header and payload."""
 ORIGINAL: Framing = _Original()
-"""JSON between REQ and REP, as the original NEP's `client` and `server` have it."""
+"""JSON over REQ/REP, as the original NEP's `client` and `server`."""
 
 
 def failure(kind: CallKind, name: str, reason: str) -> Reply:
-    """Why there is no answer: the name of the error's class (none when it is REFUSED), and a sentence."""
-    # Halves of letters, which JSON has no form for, become "?".
+    """Return an error reply: class name of the exception ("" for REFUSED) and message."""
+    # lone surrogates become "?"
     said = {"nep_error": _bounded(name, _CLASS_LETTERS), "reason": _bounded(reason, _REASON_LETTERS)}
     return Reply(kind, orjson.dumps(said))
 
@@ -207,7 +208,7 @@ def _bounded(text: str, most: int) -> str:
 
 
 def read_failure(data: bytes | memoryview) -> tuple[str, str]:
-    """The name of the error's class, and the sentence; whatever a stranger sent."""
+    """Return class name and message of an error reply; accepts any untrusted data."""
     try:
         said = orjson.loads(data)
     except ValueError:
@@ -219,7 +220,7 @@ def read_failure(data: bytes | memoryview) -> tuple[str, str]:
 
 
 def check_service(name: str) -> str:
-    """`name` itself when a service may have it: as a topic, a dozen bytes shorter. Raises `BadTopicError`."""
+    """Validate a service name and return it. Raises `BadTopicError`."""
     check_topic(name)
     if name.startswith(PREFIX):
         raise BadTopicError(name, _("'{prefix}' is put before it by nep itself").format(prefix=PREFIX))
@@ -230,17 +231,17 @@ def check_service(name: str) -> str:
 
 
 def check_survey(name: str) -> str:
-    """The service that a survey of this name is. Raises `BadTopicError`."""
+    """Validate a survey's name and return the name of its service. Raises `BadTopicError`."""
     check_service(name)
     check_topic(topic_of(f"{SURVEY}{name}"))
     return f"{SURVEY}{name}"
 
 
 def topic_of(service: str) -> str:
-    """The topic under which the master lists who serves and calls it."""
+    """Return the topic under which the master lists the servers and clients of a service."""
     return f"{PREFIX}{service}"
 
 
 def service_of(topic: str) -> str | None:
-    """The service whose servers and clients are listed under this topic; None for any other topic."""
+    """Return the service listed under a topic, or None for any other topic."""
     return topic.removeprefix(PREFIX) if topic.startswith(PREFIX) and len(topic) > len(PREFIX) else None

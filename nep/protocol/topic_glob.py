@@ -1,7 +1,8 @@
-"""Patterns of topics as people type them, such as `/*/odom` or `/cam?`. Pure.
+"""Glob patterns of topics for people, such as `/*/odom` or `/cam?`. Pure functions.
 
-`*` is any letters between slashes, `?` is one, `**` is any parts or none. Subscribers know wildcards for
-whole levels only (`nep.protocol.topic_pattern`): `widened` makes of a pattern one that hears no less.
+`*` matches any characters within a level, `?` one character, `**` any number of levels. Subscribers know
+wildcards for whole levels only (`nep.protocol.topic_pattern`): `widened` returns a pattern for them that
+matches at least as much.
 """
 
 from __future__ import annotations
@@ -12,23 +13,23 @@ __all__ = ["glob_matches", "is_glob", "widened"]
 
 
 def is_glob(word: str) -> bool:
-    """Whether there is a wildcard in it."""
+    """Return True if a word contains a wildcard."""
     return any(letter in word for letter in "*?")
 
 
 def widened(pattern: str) -> str:
-    """The pattern for a subscriber that hears all topics that match, and maybe others.
+    """Return a subscriber's pattern that matches at least all topics of a glob pattern.
 
-    Only topics with nothing between two slashes in their middle, which nobody has, may be missing.
+    Exception: topics with an empty level in the middle, which are not used.
     """
     first, *others = ("*" if is_glob(each) and each != "**" else each for each in pattern.split("/"))
-    if first == "*":  # which is nothing before the first slash, too
+    if first == "*":  # also matches the empty level before the first slash
         first = "**"
     return "/".join((first, *others))
 
 
 def glob_matches(pattern: str, topic: str) -> bool:
-    """Whether a topic matches: `*` is any letters between slashes, `?` is one, `**` is any parts or none."""
+    """Return True if a topic matches a glob pattern."""
     parts = pattern.split("/")
     at = _with_empty(parts, {0})
     for part in topic.split("/"):
@@ -39,7 +40,7 @@ def glob_matches(pattern: str, topic: str) -> bool:
 
 
 def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
-    """The places in a pattern, and those behind each `**` there, which may stand for nothing."""
+    # Adds the positions after each reachable `**`, which may match nothing.
     found = set(at)
     for each in range(len(parts)):
         if each in found and parts[each] == "**":
@@ -48,7 +49,7 @@ def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
 
 
 def _is_part(pattern: str, part: str) -> bool:
-    """From left to right, back to the last `*` alone: an expression takes minutes for `*a*a*a*a*a*b`."""
+    # Linear backtracking to the last `*` only: a regular expression takes minutes for `*a*a*a*a*a*b`.
     at = begin = after = 0
     star = -1
     while begin < len(part):
@@ -58,7 +59,7 @@ def _is_part(pattern: str, part: str) -> bool:
         elif letter and letter in {"?", part[begin]}:
             at, begin = at + 1, begin + 1
         elif star >= 0:
-            after += 1  # the star stands for one letter more
+            after += 1  # let the star match one more character
             at, begin = star + 1, after
         else:
             return False

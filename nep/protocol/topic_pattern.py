@@ -1,7 +1,7 @@
-"""Topics with wildcards: `/robot/*/camera`. Levels are what stands between slashes.
+"""Topic patterns: `/robot/*/camera`. Levels are separated by slashes.
 
-`*` as a whole level is any one level that is not empty, `**` any number of levels or none, as in the key
-expressions of zenoh. A `*` inside a level, as in `a*b`, is a letter as any other.
+`*` as a whole level matches one non-empty level, `**` any number of levels, as in zenoh's key expressions. A
+`*` inside a level (`a*b`) is an ordinary character.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ _ONE, _ANY = "*", "**"
 
 
 def is_pattern(topic: str) -> bool:
-    """Whether a level of it is a wildcard."""
+    """Return True if a level of the topic is a wildcard."""
     return "*" in topic and not {_ONE, _ANY}.isdisjoint(topic.split("/"))
 
 
 def matches(pattern: str, topic: str) -> bool:
-    """Whether a topic matches. Takes no longer than both have levels, multiplied."""
+    """Return True if a topic matches a pattern. The cost is the product of their numbers of levels."""
     return pattern == topic or levels_match(pattern.split("/"), topic.split("/"))
 
 
 def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
-    """As `matches`, when both are split into levels already."""
+    """Return True if levels match the levels of a pattern; see `matches`."""
     if _ANY not in parts and len(parts) != len(levels):
         return False
     at = _with_none(parts, {0})
@@ -42,7 +42,7 @@ def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
 
 
 def _with_none(parts: Sequence[str], at: set[int]) -> set[int]:
-    """These places in a pattern, and those behind each `**` there, which may be nothing."""
+    # Adds the positions after each reachable `**`, which may match nothing.
     found = set(at)
     for each, part in enumerate(parts):
         if part == _ANY and each in found:

@@ -1,10 +1,10 @@
-r"""The native wire: parts ↔ messages. Pure functions; the specification is `docs/wire.md`.
+r"""Native wire format of messages. Pure functions; specification: `docs/wire.md`.
 
-A message is three parts, or four: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map when
-the header's flag says so. Small ones travel with the first three in one part, to subscribers whose hello says
-that they read it. Beside messages three notices travel, all under a subscriber's own hello topic
-`\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: "I have seen you; my messages are counted from
-here"), *bye* (the same with the flag BYE: "nothing comes after this") and messages for it alone (all parts).
+A message has three or four parts: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map if the
+header has the flag EXTENSION. Small messages combine the first three in one part, for subscribers whose hello
+announces it. Three notices are sent under a subscriber's own hello topic `\xffhello/<subscriber id>/<topic>`:
+*echo* (topic and header: the subscriber's messages are counted from here), *bye* (echo with the flag BYE: the
+last message was sent) and messages for this subscriber only (all parts).
 """
 
 from __future__ import annotations
@@ -62,46 +62,52 @@ HEADER_BYTES = 32
 TOPIC_MAX_BYTES = 200
 NODE_NAME_MAX_BYTES = 200
 SUBSCRIPTION_MAX_BYTES = 4096
-"""Whoever subscribes more is disconnected: libzmq keeps some forty bytes for each of them."""
+"""Maximum size of a subscription; a peer that sends more is disconnected. libzmq stores 40 bytes per byte."""
 
 LATCHED = 1
-"""Flag: the publisher keeps this message and sends it to whoever comes late."""
+"""Flag: the publisher keeps this message for later subscribers."""
 EXTENSION = 2
 """Flag: a fourth part follows, a msgpack map."""
 BYE = 4
 """Flag of a notice: the publisher is closing and has sent everything."""
 BATCH = 8
-"""Flag: one part has several messages. Sent only to subscribers whose hello has level 3."""
+"""Flag: one part with several messages. Sent only to subscribers with hello level 3."""
 SHARED = 16
-"""Flag: the payload lies in memory that publisher and subscriber share; its part is the number, u64."""
+"""Flag: the payload is in shared memory; its part is the number (u64)."""
 OFFER = 32
-"""Flag of a notice: payloads may lie in shared memory, of which the header's size says the generation."""
+"""Flag of a notice: offer of shared memory, whose generation is the header's size."""
 
 HELLO = b"\xffhello/"
-"""How a hello filter starts. 0xff sorts behind all of UTF-8, so it is installed after the topic filter."""
+"""Prefix of a hello filter. 0xff sorts after all UTF-8, so it is installed after the topic filter."""
 HELLO_ONE = b"\xffhello1/"
-"""The same of a subscriber that also reads messages of one part."""
+"""Prefix of a hello filter, level 1: also reads messages of one part."""
 HELLO_TELLS = b"\xffhello2/"
-"""The same of one that besides answers every later echo with what it has read."""
+"""Prefix of a hello filter, level 2: also acknowledges echoes with the last message read."""
 HELLO_BATCHES = b"\xffhello3/"
-"""The same of one that besides reads batches: see `nep.protocol.batch`."""
+"""Prefix of a hello filter, level 3: also reads batches (`nep.protocol.batch`)."""
 _HELLOS = (HELLO_BATCHES, HELLO_TELLS, HELLO_ONE, HELLO)
 READ = b"\xffread/"
-"""How a filter starts that answers an echo. It is taken back at once."""
+"""Prefix of the filter that acknowledges an echo. It is removed at once."""
 SHARES = b"\xffshares/"
-"""How a filter starts that answers an offer. It is taken back at once."""
+"""Prefix of the filter that accepts an offer of shared memory. It is removed at once."""
 
 _HEX = re.compile(rb"[0-9a-fA-F]{16}")
-"""`int` would take a sign and underscores, too."""
+"""Stricter than `int`, which accepts signs and underscores."""
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
-_QUICKLY = struct.Struct("<IIQQQ")  # the first three in one
+_QUICKLY = struct.Struct("<IIQQQ")  # the first three fields in one
 SIZE_MAX = 2**32 - 1
 
 
 class Header(NamedTuple):
-    """The second part. `stamp_ns` is the publisher's clock, `publisher` its id; `seq` counts from 1.
+    """Message header, the second part.
 
-    `size` is that of the payload in bytes, 0 when it is not told.
+    Attributes:
+        codec: Number of the codec.
+        flags: Flags.
+        seq: Sequence number, counted from 1.
+        stamp_ns: Time of publication by the publisher's clock.
+        publisher: Id of the publisher.
+        size: Size of the payload in bytes; 0 if not stated.
     """
 
     codec: int
@@ -112,27 +118,30 @@ class Header(NamedTuple):
     size: int = 0
 
     def pack(self) -> bytes:
-        """The 32 bytes, little-endian."""
+        """Return the 32 bytes, little-endian."""
         return _HEADER.pack(
             VERSION, self.codec, self.flags, self.size, self.seq, self.stamp_ns, self.publisher
         )
 
 
 def form_of(codec: int, flags: int) -> int:
-    """The first four bytes of a header of this version, as a number: what many messages have in common."""
+    """Return the first four bytes of a header as a number, which many messages share."""
     return VERSION | codec << 8 | flags << 16
 
 
 pack_quickly: Callable[[int, int, int, int, int], bytes] = _QUICKLY.pack
-"""The 32 bytes of (form, size, seq, stamp_ns, publisher). A size beyond `SIZE_MAX` is told as 0."""
+"""Fast encoder of a header: (form, size, seq, stamp_ns, publisher). Sizes beyond `SIZE_MAX` are sent as 0."""
 unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _QUICKLY.unpack
-"""(form, size, seq, stamp_ns, publisher) of a header, unchecked. Raises `struct.error`."""
+"""Fast decoder of a header without validation: (form, size, seq, stamp_ns, publisher).
+
+Raises `struct.error`.
+"""
 unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _QUICKLY.unpack_from
-"""The same of a header that begins at an offset."""
+"""Fast decoder of a header at an offset."""
 
 
 def check_topic(topic: str) -> str:
-    """`topic` itself when the grammar allows it: 1 to 200 bytes of UTF-8, no white space, control or `{`.
+    """Validate a topic name and return it: 1 to 200 bytes of UTF-8, no white space, control character or `{`.
 
     Raises `BadTopicError` with the reason.
     """
@@ -159,7 +168,7 @@ def check_topic(topic: str) -> str:
 
 
 def check_node_name(name: str) -> str:
-    """`name` itself when a node may have it: 1 to 200 bytes of UTF-8 and nothing that controls.
+    """Validate a node name and return it: 1 to 200 bytes of UTF-8 without control characters.
 
     Raises `BadNameError` with the reason.
     """
@@ -177,15 +186,14 @@ def check_node_name(name: str) -> str:
 
 
 def topic_part(topic: str) -> bytes:
-    """The first part of a topic's messages, and the filter of its subscribers: the name and a zero byte."""
+    """Return a topic's first part, which is also the filter of its subscribers: name and zero byte."""
     return topic.encode("utf-8") + b"\0"
 
 
 class Hello(NamedTuple):
-    """What a hello filter says: who subscribes to what.
+    """Parsed hello filter of a subscriber.
 
-    `one_part`: messages may come to it in one part. `tells`: it tells what it has read. `batches`: several
-    may come to it in one part.
+    `one_part`, `tells` and `batches` are its abilities: messages of one part, acknowledged echoes, batches.
     """
 
     subscriber: int
@@ -196,7 +204,7 @@ class Hello(NamedTuple):
 
 
 class Read(NamedTuple):
-    """What a subscriber has read of a publisher: everything up to `seq`. It wants `bound_bytes` under way."""
+    """Acknowledgement of a subscriber: everything up to `seq` is read; it accepts `bound_bytes` in flight."""
 
     subscriber: int
     publisher: int
@@ -205,7 +213,7 @@ class Read(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """A subscriber reads a publisher's memory of this generation from now on."""
+    """Acceptance of a publisher's shared memory of one generation."""
 
     subscriber: int
     publisher: int
@@ -215,16 +223,16 @@ class Shares(NamedTuple):
 def hello_part(
     subscriber: int, topic: str, *, one_part: bool = False, tells: bool = False, batches: bool = False
 ) -> bytes:
-    """The hello filter of a subscriber, and the first part of what is sent to it alone.
+    """Return the hello filter of a subscriber, which is also the first part of messages for it alone.
 
-    Who reads batches also tells, and who tells also reads messages of one part.
+    Each ability includes the ones before: `one_part`, `tells`, `batches`.
     """
     begin = HELLO_BATCHES if batches else HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
     return begin + f"{subscriber:016x}/{topic}".encode()
 
 
 def parse_hello(part: bytes) -> Hello | None:
-    """What a hello filter says; None for anything else."""
+    """Parse a hello filter; return None for anything else."""
     begin = next((each for each in _HELLOS if part.startswith(each)), None)
     if begin is None:
         return None
@@ -239,23 +247,23 @@ def parse_hello(part: bytes) -> Hello | None:
 
 
 def read_part(read: Read) -> bytes:
-    """The filter that answers an echo."""
+    """Return the filter that acknowledges an echo."""
     return READ + b"/".join(b"%016x" % number for number in read)
 
 
 def parse_read(part: bytes) -> Read | None:
-    """What such a filter says; None for anything else."""
+    """Parse an acknowledgement; return None for anything else."""
     numbers = _numbers_behind(READ, part, 4)
     return None if numbers is None else Read(*numbers)
 
 
 def shares_part(shares: Shares) -> bytes:
-    """The filter that answers an offer."""
+    """Return the filter that accepts an offer of shared memory."""
     return SHARES + b"/".join(b"%016x" % number for number in shares)
 
 
 def parse_shares(part: bytes) -> Shares | None:
-    """What such a filter says; None for anything else."""
+    """Parse an acceptance of shared memory; return None for anything else."""
     numbers = _numbers_behind(SHARES, part, 3)
     return None if numbers is None else Shares(*numbers)
 
@@ -268,7 +276,7 @@ def _numbers_behind(begin: bytes, part: bytes, count: int) -> list[int] | None:
 
 
 def read_header(part: bytes) -> Header:
-    """The header in a second part. Raises `WireError`; an unknown version is named in it."""
+    """Parse a header. Raises `WireError`, also for an unknown version."""
     if len(part) != HEADER_BYTES:
         raise WireError(
             _("a header has {size} bytes, this one has {count}").format(size=HEADER_BYTES, count=len(part)),
@@ -288,7 +296,7 @@ def read_header(part: bytes) -> Header:
 
 
 def extension_part(extension: Mapping[str, object]) -> bytes:
-    """The fourth part. Raises `WireError` when a value has no form in msgpack."""
+    """Return the extension part. Raises `WireError` if a value can't be encoded in msgpack."""
     try:
         return pack(dict(extension))
     except ValueError as error:
@@ -297,7 +305,7 @@ def extension_part(extension: Mapping[str, object]) -> bytes:
 
 
 def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
-    """The map in a fourth part. Raises `WireError`."""
+    """Parse an extension part. Raises `WireError`."""
     try:
         value = unpack(part)
     except ValueError as error:
@@ -316,7 +324,7 @@ def join(
     payload: bytes | memoryview,
     extension: Mapping[str, object] | None = None,
 ) -> tuple[bytes | memoryview, ...]:
-    """All parts of a message; the EXTENSION flag is set here when there is one."""
+    """Return all parts of a message; sets the flag EXTENSION if needed."""
     if not extension:
         return topic_part(topic), header.pack(), payload
     flagged = header._replace(flags=header.flags | EXTENSION)
@@ -324,7 +332,7 @@ def join(
 
 
 def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
-    """Topic, header and payload of a message in one part. Raises `WireError` when it is too short."""
+    """Split a message of one part into topic, header and payload. Raises `WireError` if it is too short."""
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
         raise WireError(_("a message has 3 or 4 parts, this one has 1"), len(part), code="part-count")
@@ -332,7 +340,7 @@ def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 class Parts(NamedTuple):
-    """A message as read from its parts."""
+    """Parsed message."""
 
     topic: str
     header: Header
@@ -388,7 +396,6 @@ def split_rest(
 
 
 def _topic_in(part: bytes) -> str:
-    """The topic in a first part."""
     try:
         if part[-1:] != b"\0":
             raise WireError(_("its topic does not end with a zero byte"), len(part), code="topic-end")
