@@ -1,4 +1,4 @@
-"""The master: who is there, who publishes, who subscribes. Data never pass through it.
+"""Master: registry of nodes, publishers and subscribers. Messages never pass through it.
 
-The server's thread, the graph with its leases, and how a master is found and started.
+The server thread, the graph with its leases, and functions to find and start a master.
 """

@@ -1,4 +1,4 @@
-"""BadRequests: what came to the master and is no request, by sender: counted, logged rarely, an alert."""
+"""Malformed requests at the master by sender: counted, logged at increasing intervals, reported as alerts."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ __all__ = ["BadRequests", "who_sends"]
 
 _logger = logging.getLogger("nep.master")
 _LINES, _LINES_A_S = 10.0, 0.2
-"""So many lines of log at once, and so many a second after them: each connection may be another sender."""
+"""Burst and rate (per second) of log lines: each connection may be another sender."""
 _SENDERS = 100
-"""So many senders are remembered; beyond that the one that was quiet for longest is forgotten."""
+"""Maximum number of senders; beyond it the one inactive for longest is evicted."""
 _SHOWN = 5
-"""So many senders have an alert of their own."""
+"""Number of senders with an alert of their own."""
 _SHOWN_S = 10.0
-"""An alert is there for so long after the newest bad request of its sender."""
+"""Duration of an alert after the newest malformed request."""
 _SAME_S = 1.0
-"""Alerts change no sooner: everybody who looks hears of each change."""
+"""Minimum time between changes of the alerts, each of which is sent to all observers of the graph."""
 _LONGEST = 200
-"""Letters of a reason: it may repeat what a stranger wrote."""
+"""Maximum length of a reason, which may quote untrusted input."""
 _HINT = lazy(
     "It may be of another version of nep, or no nep program; see what connects to the master's port."
 )
@@ -40,7 +40,7 @@ class _Sender:
 
 
 class BadRequests:
-    """For the master's thread only. `now` is in seconds, of a clock that does not jump."""
+    """Malformed requests by sender. Only for the master's thread. `now` is a monotonic time in seconds."""
 
     def __init__(self) -> None:
         self._senders: OrderedDict[str, _Sender] = OrderedDict()
@@ -49,7 +49,7 @@ class BadRequests:
         self._may_log, self._counted_at = _LINES, 0.0
 
     def add(self, sender: str, name: str, reason: str, now: float) -> None:
-        """One more of `sender`, in words `name`. Logged: the first, the tenth, ... of each."""
+        """Count a request of `sender`, called `name` in messages. Logs the first, tenth, … of each sender."""
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
         known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _LONGEST)), now
@@ -63,7 +63,7 @@ class BadRequests:
             self._senders.popitem(last=False)
 
     def alerts(self, now: float) -> tuple[Alert, ...]:
-        """One for each of the newest senders, and one for all others. The same for a second."""
+        """Return an alert for each of the newest senders, and one for all others. Constant for a second."""
         if (self._senders or self._alerts) and now >= self._told_at + _SAME_S:
             self._told_at = now
             self._alerts = self._tell(now)
@@ -87,10 +87,10 @@ class BadRequests:
 
 
 def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
-    """Under what name to count what came from there, and how to say it.
+    """Return the key to count a sender by, and its name for messages.
 
-    Only connections that speak for a node (`node_id` is not empty) count by node: strangers are another one
-    with each connection, so they count by their computer, `peer`.
+    Connections that speak for a node (`node_id`) are counted by node. Others are counted by computer
+    (`peer`), because each connection would be another sender.
     """
     if node_id:
         return node_id, f"“{node_name}”"

@@ -1,4 +1,4 @@
-"""Clocks: how far the clocks of nodes on other computers are from the master's, as their renewals tell."""
+"""Clock offsets of nodes on other computers, as reported in renewals."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from nep.messages.clocks import drift_ns, is_clock
 __all__ = ["Clocks", "Differences"]
 
 Differences = dict[str, tuple[int, int]]
-"""By node: what to add to its times for the clock of who asks, and how surely that is known (ns)."""
+"""By node id: offset to add to its times for the requester's clock, and its uncertainty (ns)."""
 _HERE = NodeClock(0, 0, None)
 
 
 class Clocks:
-    """For the nodes of `registry`; `computer` is the master's own, "" if that is not known.
+    """Clocks of the nodes in `registry`. `computer` is the master's own, or "" if unknown.
 
-    `now` is in seconds of a clock that does not jump.
+    `now` is a monotonic time in seconds.
     """
 
     def __init__(self, registry: Registry, computer: str) -> None:
@@ -26,13 +26,13 @@ class Clocks:
         self._computer = computer
 
     def is_here(self, member: RegisteredNode) -> bool:
-        """Whether the node has the master's own clock."""
+        """Return True if the node shares the master's clock."""
         return bool(self._computer) and member.node.computer == self._computer
 
     def note(self, member: RegisteredNode, told: tuple[int, ...] | None, now: float) -> None:
-        """A node's word on its clock: None if it has none, empty when it does not know yet.
+        """Store a node's reported clock offset: None if it has none, empty if unknown yet.
 
-        What no clock can be counts as not known.
+        Implausible values count as unknown.
         """
         if told is not None and self.is_here(member):
             member.clock = _HERE
@@ -42,7 +42,7 @@ class Clocks:
             member.clock = None
 
     def differences(self, member: RegisteredNode, now: float) -> Differences:
-        """For all nodes on other computers whose publishers this one can hear, as far as they are known."""
+        """Return the known clock differences to remote nodes whose publishers this node receives."""
         own = member.clock
         if own is None:
             return {}
@@ -56,7 +56,7 @@ class Clocks:
     def times(
         self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
     ) -> tuple[int, ...]:
-        """When its renewal was received and is answered; nothing for who has the same clock."""
+        """Return receipt and reply time of a renewal; empty for nodes with the same clock."""
         return () if self.is_here(member) else (received_ns, (wall or time.time_ns)())
 
 

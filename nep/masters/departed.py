@@ -1,6 +1,6 @@
-"""Departed: publishers that are not listed any more, for subscribers that were cut off when they ended.
+"""Recently unregistered publishers, for subscribers that were disconnected when they closed.
 
-A subscriber that was not there to be told of the end counts what it missed by their newest messages.
+Such a subscriber counts its lost messages by their last sequence numbers.
 """
 
 from __future__ import annotations
@@ -13,35 +13,35 @@ __all__ = ["Departed"]
 _KEPT_S = 60.0
 _KEPT_MAX = 1000
 _KEPT_OF_TOPIC = 64
-"""A program that is started again and again leaves a publisher behind each time."""
+"""Limit per topic: a program that restarts repeatedly leaves a publisher behind each time."""
 
 P = TypeVar("P")
 
 
 class Departed(Generic[P]):
-    """The newest of them, each for a minute while there is room. No clock.
+    """Publishers unregistered within the last minute, bounded in number. Has no clock.
 
-    Each is found by its topic, and by the wildcards of those who heard it.
+    They are found by their topic, and by the patterns of their subscribers.
     """
 
     def __init__(self) -> None:
         self.changes = 0
-        """Grows when some are forgotten; whoever adds one knows."""
+        """Number of removals, by which callers invalidate caches; additions are known to them."""
         self._heard_as: dict[str, dict[int, P]] = {}
         self._names: dict[int, frozenset[str]] = {}
-        """By id, the oldest first."""
+        """Names by publisher id, oldest first."""
         self._ends: dict[int, float] = {}
-        """Until when each is kept, of those that `tick` has seen."""
+        """Expiry times of entries that `tick` has seen."""
 
     def __contains__(self, publisher: int) -> bool:
         return publisher in self._names
 
     def of(self, topic: str) -> dict[int, P]:
-        """Those of a topic, or of wildcards, by id. Only to be looked at."""
+        """Return the publishers of a topic or pattern by id. Read-only."""
         return self._heard_as.get(topic, {})
 
     def add(self, names: Iterable[str], publisher: int, what: P) -> None:
-        """This one is not listed any more. `names` are its topic and the wildcards by which it was heard."""
+        """Add an unregistered publisher. `names` are its topic and the patterns that matched it."""
         self._forget(publisher)
         self._names[publisher] = frozenset(names)
         for name in self._names[publisher]:
@@ -53,7 +53,7 @@ class Departed(Generic[P]):
             self._forget(next(iter(self._names)))
 
     def tick(self, now: float) -> None:
-        """Forget those that ended long ago."""
+        """Remove expired publishers."""
         for publisher in self._names:
             self._ends.setdefault(publisher, now + _KEPT_S)
         for publisher in [each for each, end in self._ends.items() if end <= now]:

@@ -1,13 +1,13 @@
-"""Graph: the master's brain. It knows who is there; it has no sockets and no clock.
+"""Graph: state of the master, without sockets or clocks.
 
-    apply(request, call, now, sender) -> what to send, in this order (pushes first, then the reply)
-    tick(now)                         -> what to send because time has passed (leases, the end of learning)
-    drop(node ids)                    -> what to send because these nodes' connections are gone
+    apply(request, call, now, sender) -> messages to send, in this order (pushes first, then the reply)
+    tick(now)                         -> messages to send after expired leases and the end of learning
+    drop(node ids)                    -> messages to send because the connections of these nodes are lost
     view()                            -> GraphView
 
-A master that has just started is *learning*: for `learn_s` seconds it lets nodes that another master knew
-come back, and keeps new publishers and subscribers waiting, so that these learn of everybody. `now` is in
-seconds of any clock that does not jump.
+A master that has just started is *learning*: for `learn_s` seconds, nodes of a previous master rejoin, and
+requests of new publishers and subscribers wait, so that their replies are complete. `now` is a monotonic time
+in seconds.
 """
 
 from __future__ import annotations
@@ -71,11 +71,11 @@ __all__ = ["Graph", "Outgoing", "with_hosts", "without"]
 
 
 _WAITING_MAX = 10_000
-"""So many wait while the master learns who is there."""
+"""Maximum number of requests that wait while the master is learning."""
 
 
 class Outgoing(NamedTuple):
-    """One thing to send: a push to the node `to` (call is None), or the reply to `call` of a connection."""
+    """Message to send: a push to the node `to` (call is None), or the reply to `call` of a connection."""
 
     to: str
     answer: Reply | Push
@@ -83,7 +83,7 @@ class Outgoing(NamedTuple):
 
 
 def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
-    """`answer` that expects nothing from these nodes: they turned out to be dead while it was on its way."""
+    """Return an answer without these nodes, which turned out to be dead."""
     if isinstance(answer, Found) and node_ids:
         return replace(
             answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
@@ -98,7 +98,7 @@ def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
 
 
 def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
-    """`answer` that tells at which addresses the master serves other computers."""
+    """Return an answer with the addresses at which the master serves other computers."""
     if not hosts:
         return answer
     if isinstance(answer, Added | Found | Renewed):
@@ -109,7 +109,7 @@ def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
 
 
 class Graph:
-    """See the module. Not thread-safe: it belongs to the master's thread."""
+    """State of a master. See the module. Not thread-safe: used by the master's thread only."""
 
     def __init__(
         self, epoch: int, now: float, learn_s: float = 1.0, lease_s: float = LEASE_S, computer: str = ""
@@ -117,36 +117,36 @@ class Graph:
         self.epoch = epoch
         self._registry = Registry()
         self.clocks = Clocks(self._registry, computer)
-        """Those of the nodes; `computer` is the master's."""
+        """Clocks of the nodes."""
         self._viewer = GraphViewer(self._registry)
         self._leases = Leases(self._registry, lease_s)
         self._learnt_at = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
 
-    # ---- what the master calls
+    # ---- called by the server
 
     @property
     def revision(self) -> int:
-        """Grows with every change of who is there."""
+        """Number that increases with every change of registrations."""
         return self._registry.revision
 
     @property
     def members(self) -> Mapping[str, RegisteredNode]:
-        """All nodes that are registered now, by their ids."""
+        """Registered nodes by id."""
         return self._registry.members
 
     @property
     def nodes(self) -> tuple[NodeRecord, ...]:
-        """All nodes that are registered now."""
+        """Records of all registered nodes."""
         return tuple(member.node for member in self._registry.members.values())
 
     def apply(
         self, request: Request, call: int, now: float, sender: str, *, is_foreign: bool = False
     ) -> tuple[Outgoing, ...]:
-        """Carry out a request of `sender`. What is wrong with it becomes a `Refused`, never an exception.
+        """Execute a request of `sender`; errors become a `Refused` reply.
 
-        `is_foreign`: it came from another program over the connection `sender`, which speaks for its own node
-        only; see `nep.masters.registry`.
+        `is_foreign`: it came over the connection `sender` from another program, which may speak for its own
+        node only; see `nep.masters.registry`.
         """
         out: list[Outgoing] = []
         try:
@@ -165,7 +165,7 @@ class Graph:
         return tuple(out)
 
     def tick(self, now: float) -> tuple[Outgoing, ...]:
-        """End learning and lapsed leases; see how often nodes shall renew."""
+        """Finish learning, expire leases, adapt the renewal interval."""
         out: list[Outgoing] = []
         if self._waiting and now >= self._learnt_at:
             waiting, self._waiting = self._waiting, []
@@ -178,20 +178,23 @@ class Graph:
 
     @property
     def learning_end(self) -> float | None:
-        """When `tick` has to be called for those who wait, None when nobody waits."""
+        """Time at which `tick` must be called for waiting requests, or None."""
         return self._learnt_at if self._waiting else None
 
     def silent(self, now: float) -> tuple[Outgoing, ...]:
-        """Probes for nodes that missed a renewal: one that cannot be sent proves that its node is dead."""
+        """Return probes for nodes that missed a renewal.
+
+        A probe that can't be sent proves that its node is dead.
+        """
         return self.probes(self._leases.late(now))
 
     def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
-        """Probes for those of these nodes that are registered."""
+        """Return probes for the registered nodes among these."""
         probe = Probe(self.epoch, self.revision)
         return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
 
     def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
-        """Unlist nodes that are dead or silent."""
+        """Unregister nodes that are dead or silent."""
         out: list[Outgoing] = []
         for node_id in node_ids:
             member = self._registry.members.get(node_id)
@@ -200,13 +203,13 @@ class Graph:
         return tuple(out)
 
     def view(self) -> GraphView:
-        """The whole graph as a value."""
+        """Return a snapshot of the graph."""
         return self._viewer.view(self.epoch)
 
     def renew_quickly(self, said: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
-        """Take over a usual renewal of `sender`; the newest messages of those that the node hears.
+        """Handle a usual renewal of `sender` and return the newest message by publisher id.
 
-        None when it has to be applied as a request; it may have been taken over in part.
+        Return None if it must be handled by `apply`; it may have been handled in part.
         """
         if said.revision < self._registry.publishers_revision:
             return None
@@ -217,13 +220,13 @@ class Graph:
         return self._registry.last_seqs(member)
 
     def node_at(self, route: str) -> RegisteredNode | None:
-        """The node that this connection speaks for."""
+        """Return the node that a connection speaks for."""
         return self._registry.speaking.get(route)
 
-    # ---- who may ask
+    # ---- authorization
 
     def _admit(self, request: Request, sender: str, out: list[Outgoing]) -> None:
-        """Raises `WireError` unless `sender` may ask for this. Who has proven an id replaces who has not."""
+        # Raises `WireError`. A proven owner of an id evicts an unproven one.
         check_request(request)
         if isinstance(request, Join | AddPublisher | AddSubscriber):
             self._admit_node(request.node, sender, out)
@@ -372,7 +375,7 @@ class Graph:
         check_record(request.publisher)
         member = self._meet(request.node, now, sender)
         id = request.publisher.id
-        # One that was unlisted for its silence may say its new endpoints before it joins again.
+        # a publisher unlisted for its silence may report new endpoints before it rejoins
         is_new = id not in member.publishers and id not in self._registry.departed
         self._place(member, request.publisher, out, is_new=is_new)
         expected: list[Expected] = []
@@ -380,7 +383,8 @@ class Graph:
         for other, subscriber in self._registry.hearing(request.publisher.topic):
             if not other.is_managed:
                 entry = Expected(subscriber.record.id, other.node.id, other.node.name)
-                # Who did not answer this node is not waited for by it; by others when it is late as well.
+                # hung for this node: not waited for. Hung for another node: waited for unless its renewal is
+                # late, too.
                 is_hung = member.node.id in other.hung or (other.hung and self._leases.is_late(other, now))
                 (hung if is_hung else expected).append(entry)
         return Added(self.epoch, self.revision, tuple(expected), tuple(hung))
@@ -394,7 +398,7 @@ class Graph:
             for topic in sorted(self._registry.topics_of(request.subscriber))
             for remote in self._registry.publishers_of(topic)
         )
-        # A probe that cannot be sent takes a dead publisher out of the reply: nobody waits for its echo.
+        # a probe that can't be sent removes a dead publisher from the reply
         out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
 
@@ -418,7 +422,7 @@ class Graph:
         return Found(self.epoch, self.revision, tuple(found))
 
     def _renewed_member(self, said: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
-        """Who has renewed; None when it has to join again: it is not registered just so over `sender`."""
+        # None: the node must join again.
         member = self._member_at(said.node_id, sender)
         if member is None or said.epoch != self.epoch:
             return None
@@ -428,7 +432,7 @@ class Graph:
         return member
 
     def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:
-        """A node, if this connection speaks for it."""
+        # None unless the connection speaks for the node.
         member = self._registry.members.get(node_id)
         return member if member is not None and member.route == sender else None
 
@@ -462,7 +466,7 @@ class Graph:
         return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks)
 
     def _unlist_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
-        """Take out a publisher that has not said that it closes."""
+        # For a publisher that did not unregister itself.
         last_seq = member.publishers[publisher].last_seq
         record = self._registry.remove_publisher(member.node.id, publisher)
         if record is not None:
@@ -481,7 +485,7 @@ class Graph:
             )
             self._tell(record, gone, out)
 
-    # ---- telling subscribers
+    # ---- notifying subscribers
 
     def _place(
         self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing], *, is_new: bool

@@ -1,7 +1,7 @@
-"""Leases: when each node renews, who is late, and who has been silent for too long.
+"""Leases: renewal schedule, late nodes and expired nodes.
 
-What every node sends every second is read and answered as it comes, without making values of it
-(`RawRenewal`). What is unusual is left to the way of all requests, which says what is wrong.
+Usual renewals, which every node sends every second, are parsed and answered without building request values
+(`RawRenewal`). Unusual ones take the general path, which reports errors.
 """
 
 from __future__ import annotations
@@ -16,36 +16,36 @@ from nep.protocol.requests import RENEW_S
 __all__ = ["LEASE_S", "Leases", "RawRenewal", "is_renewal", "read_renewal", "renewed_body"]
 
 LEASE_S = 3.0
-"""A node that renews every second and has not for so long is unlisted; others have as much longer."""
+"""Lease of a node that renews every second; nodes with longer intervals have as much more."""
 _LATE_S = 0.4
-"""A node whose renewal is late by so much is probed."""
+"""Delay of a renewal after which the node is probed."""
 _RENEWALS_A_S = 125
-"""So many renewals a second are taken from all nodes together. With more nodes each renews less often,"""
+"""Maximum renewals per second of all nodes; with more nodes the interval grows."""
 _LONGEST_RENEW_S = 5.0
-"""but at least so often."""
+"""Maximum renewal interval."""
 _SLOT_S = 0.1
-"""Nodes that renew less often do it together, so long after each other: waking up costs most of all."""
+"""Width of a slot: renewals with longer intervals are grouped, because wake-ups cost most."""
 
 _BEGINS = b"\x83\xa2do\xa5renew"
-"""How our own renewals begin. Another order of the fields is as right, and takes the usual way."""
+"""First bytes of our own renewals. Others may order the fields differently; they take the general path."""
 _SMALL_BYTES, _LISTS_MAX = 4096, 20_000
 
 
 class Leases:
-    """The leases of the nodes in `registry`; managed ones have none: who manages one says when it leaves."""
+    """Leases of the nodes in `registry`, except managed ones, whose end their manager reports."""
 
     def __init__(self, registry: Registry, lease_s: float) -> None:
         self._registry = registry
         self._grace_s = lease_s - RENEW_S
         self._renew_s = RENEW_S
         self._paced_at = 0
-        """The revision of the registry for which this was decided."""
+        """Registry revision for which the interval was computed."""
         self._slot_size = 0
         self._slots: dict[int, int] = {}
-        """How many nodes were told to renew in each slot to come."""
+        """Number of nodes per future slot."""
 
     def set_pace(self, now: float) -> None:
-        """Decide how often nodes renew from now on: each is told with its next renewal."""
+        """Compute the renewal interval; each node gets it with its next renewal."""
         self._slots = {slot: told for slot, told in self._slots.items() if slot * _SLOT_S > now}
         if self._paced_at == self._registry.revision:
             return
@@ -55,7 +55,7 @@ class Leases:
         self._slot_size = 1 + int(nodes * _SLOT_S / self._renew_s)
 
     def renew(self, member: RegisteredNode, now: float) -> float:
-        """It has renewed; in how many seconds it shall renew next."""
+        """Record a renewal; return the seconds until the next one."""
         member.renewed_at, member.renew_s = now, RENEW_S
         if self._renew_s > RENEW_S and not member.is_managed:
             slot = self._free_slot(now)
@@ -64,7 +64,7 @@ class Leases:
         return member.renew_s
 
     def _free_slot(self, now: float) -> int:
-        """The one that is due, or an earlier one when that is full; but not sooner than in a second."""
+        # The latest slot, or an earlier one if it is full; at least a second from now.
         last, first = round((now + self._renew_s) / _SLOT_S), int((now + RENEW_S) / _SLOT_S) + 1
         slots = range(last, min(first, last - 1), -1)
         for slot in slots:
@@ -73,15 +73,15 @@ class Leases:
         return min(slots, key=lambda slot: self._slots.get(slot, 0))
 
     def is_late(self, member: RegisteredNode, now: float) -> bool:
-        """Whether it missed a renewal."""
+        """Return True if the node missed a renewal."""
         return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_S
 
     def late(self, now: float) -> list[str]:
-        """The nodes that missed a renewal."""
+        """Return the nodes that missed a renewal."""
         return self._overdue(now, _LATE_S)
 
     def lapsed(self, now: float) -> list[str]:
-        """The nodes that are to be unlisted."""
+        """Return the nodes whose lease has expired."""
         return self._overdue(now, self._grace_s)
 
     def _overdue(self, now: float, by_s: float) -> list[str]:
@@ -94,7 +94,7 @@ class Leases:
 
 
 class RawRenewal(NamedTuple):
-    """A renewal as it came: of `publishers` and `subscribers` nothing is known but that they are lists."""
+    """Renewal as received; `publishers` and `subscribers` are only known to be lists."""
 
     call: int
     node_id: str
@@ -107,12 +107,12 @@ class RawRenewal(NamedTuple):
 
 
 def is_renewal(body: bytes) -> bool:
-    """Whether a body seems to be one of our own renewals: it is worth `read_renewal`."""
+    """Return True if a body looks like one of our own renewals, for `read_renewal`."""
     return body.startswith(_BEGINS)
 
 
 def read_renewal(body: bytes) -> RawRenewal | None:
-    """The renewal in a body; None when it is none, or an unusual one."""
+    """Parse a usual renewal; return None for anything else."""
     if not body.startswith(_BEGINS):
         return None
     try:
@@ -139,8 +139,8 @@ def read_renewal(body: bytes) -> RawRenewal | None:
     return said if is_usual else None
 
 
-def _clock_in(told: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - what came from the wire
-    """A node's word on its clock. Raises `ValueError` when it is unusual."""
+def _clock_in(told: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - untrusted input
+    # Raises `ValueError` for an unusual value.
     if told is None:
         return None
     if told == []:
@@ -161,7 +161,7 @@ def renewed_body(
     times: tuple[int, ...] = (),
     clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
-    """The body of a `Renewed` with which nothing has changed."""
+    """Return the body of a `Renewed` without changes."""
     what: dict[str, object] = {"epoch": epoch, "revision": revision}
     if last_seqs:
         what["last_seqs"] = last_seqs

@@ -1,4 +1,4 @@
-"""ListenAddresses: the addresses, beside the loopback one, at which a master serves other computers."""
+"""Further addresses, besides loopback, at which a master serves other computers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ _logger = logging.getLogger("nep.master")
 
 
 def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, ...]:
-    """`hosts`, each once. Raises `NepError` for what is no address of this computer (see `own_addresses`)."""
+    """Validate and deduplicate addresses.
+
+    Raises `NepError` unless they are this computer's (`own_addresses`).
+    """
     known = {own.host for own in here}
     checked = tuple(dict.fromkeys(hosts))
     for host in checked:
@@ -39,9 +42,14 @@ def check_hosts(hosts: Iterable[str], here: Iterable[OwnAddress]) -> tuple[str, 
 
 
 class ListenAddresses:
-    """Binds `router` to further addresses, all with `port`. Follows addresses that come and go.
+    """Bindings of the router to further addresses of this computer, updated as addresses change.
 
-    Belongs to the master's thread. `here` tells the addresses of this computer.
+    Only for the master's thread.
+
+    Args:
+        router: Socket of the master.
+        port: Port of all addresses.
+        here: Returns the addresses of this computer.
     """
 
     def __init__(
@@ -51,7 +59,7 @@ class ListenAddresses:
         here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
         self.hosts: tuple[str, ...] = ()
-        """What was asked for."""
+        """Requested addresses."""
         self._router = router
         self._port = port
         self._here = here
@@ -59,14 +67,14 @@ class ListenAddresses:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where the router is bound besides its own address."""
+        """Bound endpoints besides the router's own address."""
         return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
 
     def serve(self, hosts: Iterable[str]) -> None:
-        """Serve at these and no others.
+        """Serve at these addresses only.
 
-        Raises `NepError` for what is no address of this computer and `AddressInUseError` where another
-        program has the port; nothing has changed then.
+        Raises `NepError` for addresses that are not this computer's, and `AddressInUseError` for a port in
+        use; nothing is changed then.
         """
         here = self._here()
         chosen = check_hosts(hosts, here)
@@ -84,7 +92,7 @@ class ListenAddresses:
             self._unbind(host)
 
     def follow(self) -> tuple[Alert, ...]:
-        """Look which addresses this computer has now; the alerts for those that it has no more."""
+        """Update the bindings to this computer's current addresses. Return alerts for lost addresses."""
         if not self.hosts:
             return ()
         here = self._here()
@@ -92,7 +100,7 @@ class ListenAddresses:
         for host in self._bound - wanted:
             self._unbind(host)
         for host in wanted - self._bound:
-            with contextlib.suppress(AddressInUseError):  # tried again the next time
+            with contextlib.suppress(AddressInUseError):  # retried at the next call
                 self._bind(host)
         return tuple(self._lost(host, here) for host in self.hosts if host != ANY and host not in self._bound)
 
@@ -123,6 +131,6 @@ class ListenAddresses:
     def _unbind(self, host: str) -> None:
         try:
             self._router.unbind(endpoint_of(f"{host}:{self._port}"))
-        except zmq.ZMQError as error:  # its address is gone: there was nothing to give back
+        except zmq.ZMQError as error:  # the address is gone, and the binding with it
             _logger.debug("'%s' could not be unbound: %s", host, error)
         self._bound.discard(host)

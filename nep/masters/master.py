@@ -1,7 +1,7 @@
-"""Master: the program that knows who publishes and who subscribes. Data never pass through it.
+"""Master: registry of publishers and subscribers. Messages never pass through it.
 
-What is attached to a master (the gateway) lives in the same process: it is started when the master is bound
-and closed before the master is, changes the graph with `Master.submit`, and is told of every change.
+Attachments (the gateway) run in the master's process: they start when the master is bound, close before the
+master, change the graph with `Master.submit`, and are notified of every change.
 """
 
 from __future__ import annotations
@@ -30,26 +30,31 @@ __all__ = ["Attachment", "Master", "is_running", "listen", "master_address", "st
 
 
 class Attachment(Protocol):
-    """Something that lives with a master. Its methods return soon."""
+    """Component that runs with a master. Its methods must return quickly."""
 
     def start(self, master: Master) -> None:
-        """The master is bound and answers nobody yet but `submit`. An error here ends the start."""
+        """Start. The master is bound and answers only `submit`. An exception aborts the master's start."""
 
     def changed(self, view: GraphView) -> None:
-        """Who is there has changed. Called in the master's thread: take the view and return at once."""
+        """Handle a change of the graph. Called in the master's thread; must return at once."""
 
     def close(self) -> None:
-        """The master ends after this. Called once, in the thread that closes the master."""
+        """Close, before the master. Called once, in the thread that closes the master."""
 
 
 class Master:
-    """A master at `address` ("127.0.0.1:7780"; port 0 takes a free one). A context manager.
+    """Master at which nodes register and find each other. Usable as a context manager.
 
-    `start()` raises `AddressInUseError` when something is there already. `address`: as `master_address` has
-    it. `attachments`: what lives with it, such as the gateway. `lease_s`: a node that was silent for so long
-    is unlisted, in seconds. `learn_s`: how long a master that
-    has just started waits for nodes that an earlier one knew; 0 when there cannot have been one.
-    `owner_pid`: end by itself when that process is gone and no node of another process is registered.
+        with nep.master() as master:
+            print(master.address)
+
+    Args:
+        address: Address such as "127.0.0.1:7780"; port 0 chooses a free port. Default: `master_address`.
+        attachments: Components that run with the master, such as the gateway.
+        learn_s: Time after the start in seconds in which nodes of a previous master rejoin; 0 if there was
+            none.
+        lease_s: Silence in seconds after which a node is unregistered.
+        owner_pid: Stop when this process has ended and no node of another process is registered.
     """
 
     def __init__(
@@ -73,7 +78,12 @@ class Master:
         watch(self)
 
     def start(self) -> Self:
-        """Bind, start what is attached, answer. Returns itself."""
+        """Bind the address, start the attachments, serve. Return self.
+
+        Raises:
+            AddressInUseError: Another program uses the address.
+            TooManyFilesError: The process has too many open files.
+        """
         graph = Graph(self.epoch, time.monotonic(), self._learn_s, self._lease_s, computer_id())
         listeners = [attachment.changed for attachment in self._attachments]
         server = MasterServer(self.address, graph, listeners, self._owner)
@@ -95,7 +105,7 @@ class Master:
         return self
 
     def close(self) -> None:
-        """Close what is attached, then end. May be called twice and from any thread but the master's."""
+        """Close the attachments and stop. Idempotent. Call it from any thread except the master's."""
         with self._lock:
             server, self._server = self._server, None
         if server is None:
@@ -105,7 +115,7 @@ class Master:
         server.close()
 
     def forked(self) -> None:
-        """In a child that was forked: the master stays with the parent. See `nep.system.forks`."""
+        """Detach from the master in a forked child process. See `nep.system.forks`."""
         if self._server is not None:
             give_up(*self._server.endpoints)
         self._server = None
@@ -113,20 +123,28 @@ class Master:
         self._is_forked = True
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the master has ended, by itself (`owner_pid`) or by `close`; True when it has."""
+        """Wait until the master has stopped; return False after the time limit.
+
+        Args:
+            timeout_s: Time limit in seconds; None waits without limit.
+        """
         server = self._server
         if server is None:
             return True
         if timeout_s is not None:
             return server.ended.wait(timeout_s)
         while not server.ended.wait(0.1):
-            pass  # in slices: Windows does not interrupt a wait for Ctrl+C
+            pass  # slices: on Windows Ctrl+C does not interrupt a wait
         return True
 
     def submit(self, request: Request, timeout_s: float = 2.0) -> Reply:
-        """Carry out a request from inside this process; its reply may be `Refused`. From any other thread.
+        """Execute a request of this process and return the reply, which may be `Refused`.
 
-        Raises `ClosedError` when the master has ended, `WaitTimeoutError` when it does not get to it in time.
+        Call it from any thread except the master's.
+
+        Raises:
+            ClosedError: The master has stopped.
+            WaitTimeoutError: The master did not reply in time.
         """
         server = self._server
         if server is None or server.ended.is_set():
@@ -134,18 +152,22 @@ class Master:
         return server.submit(request, timeout_s)
 
     def listen(self, hosts: Sequence[str]) -> None:
-        """Serve other computers at these addresses of this one, none: no more.
+        """Serve other computers at these addresses of this one; none: serve only this computer.
 
-        Raises `RequestRefusedError` when it cannot be bound there, and as `view`.
+        Raises:
+            RequestRefusedError: An address can't be bound.
+            ClosedError: The master has stopped.
         """
         reply = self.submit(Listen(tuple(hosts)))
         if isinstance(reply, Refused):
             raise RequestRefusedError(reply.reason)
 
     def view(self) -> GraphView:
-        """The graph now.
+        """Return a snapshot of the graph.
 
-        Raises `ClosedError` when it has ended, `WaitTimeoutError` when it does not get to it in time.
+        Raises:
+            ClosedError: The master has stopped.
+            WaitTimeoutError: The master did not reply in time.
         """
         reply = self.submit(Look())
         if not isinstance(reply, Seen):

@@ -1,7 +1,7 @@
-"""PatternIndex: subscribers whose topic has wildcards, and which published topics each of them matches.
+"""Subscribers with patterns, and the published topics that match each pattern.
 
-A topic is compared with every pattern when its first publisher comes, a pattern with every topic when its
-first subscriber does; both are bounded, and nobody compares again.
+A topic is matched against every pattern when its first publisher is added, a pattern against every topic when
+its first subscriber is added; both are bounded, and the results are cached.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from nep.protocol.topic_pattern import matches
 __all__ = ["ALL_PATTERNS_MAX", "PATTERNS_MAX", "PatternIndex"]
 
 PATTERNS_MAX = 100
-"""So many subscribers with wildcards one node may have,"""
+"""Maximum number of subscribers with patterns of one node."""
 ALL_PATTERNS_MAX = 1_000
-"""and all nodes together."""
+"""Maximum number of subscribers with patterns of all nodes."""
 
 T = TypeVar("T")
 
 
 class PatternIndex(Generic[T]):
-    """By pattern, and by topic. `T` is whom a subscriber belongs to."""
+    """Index of patterns and topics. `T` is the owner of a subscriber."""
 
     def __init__(self) -> None:
         self._subscribers: dict[str, dict[int, T]] = {}
         self._topics: dict[str, set[str]] = {}
         self._patterns: dict[str, set[str]] = {}
-        """By topic."""
+        """Matching patterns by topic."""
 
     def __len__(self) -> int:
         return sum(map(len, self._subscribers.values()))
@@ -37,7 +37,7 @@ class PatternIndex(Generic[T]):
         return pattern in self._subscribers
 
     def add(self, pattern: str, subscriber: int, owner: T, published: Iterable[str]) -> None:
-        """A subscriber comes; these topics are published."""
+        """Add a subscriber; `published` are the published topics."""
         if pattern not in self._subscribers:
             self._subscribers[pattern] = {}
             self._topics[pattern] = {topic for topic in published if matches(pattern, topic)}
@@ -46,7 +46,7 @@ class PatternIndex(Generic[T]):
         self._subscribers[pattern][subscriber] = owner
 
     def remove(self, pattern: str, subscriber: int) -> None:
-        """A subscriber goes, if it is there."""
+        """Remove a subscriber. Idempotent."""
         there = self._subscribers.get(pattern)
         if there is None:
             return
@@ -57,7 +57,7 @@ class PatternIndex(Generic[T]):
                 self._take_out(topic, pattern)
 
     def topic_came(self, topic: str) -> None:
-        """A topic is published for the first time."""
+        """Add a newly published topic."""
         if topic in self._patterns:
             return
         found = {pattern for pattern in self._subscribers if matches(pattern, topic)}
@@ -67,16 +67,16 @@ class PatternIndex(Generic[T]):
                 self._topics[pattern].add(topic)
 
     def topic_went(self, topic: str) -> None:
-        """Nobody publishes a topic any more."""
+        """Remove a topic without publishers."""
         for pattern in self._patterns.pop(topic, ()):
             self._topics[pattern].discard(topic)
 
     def topics_of(self, pattern: str) -> set[str]:
-        """The published topics that match."""
+        """Return the published topics that match a pattern."""
         return self._topics.get(pattern, set())
 
     def subscribers_of(self, topic: str) -> list[tuple[T, int]]:
-        """Those that hear a topic, also one that was published until now: their owners and ids."""
+        """Return (owner, id) of the subscribers whose pattern matches a topic, even a removed one."""
         if not self._subscribers:
             return []
         found = self._patterns.get(topic)

@@ -1,4 +1,4 @@
-"""Finding a running master, and starting one as a process of its own."""
+"""Find a running master, and start one in a process of its own."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ else:
 
 _FILES = 16
 _AGAIN_S = 0.5
-"""A request without an answer is sent again after this."""
+"""Time after which an unanswered request is sent again."""
 
 _ASKED_AT_MOST_S = 4.0
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""A `creationflags`: Windows opens a window for every console program otherwise."""
+"""`creationflags` for subprocesses: Windows would open a window for every console program."""
 
 __all__ = ["NO_CONSOLE", "Owner", "is_running", "listen", "look", "start_process", "view"]
 
 
 class Owner:
-    """The process that started a master. Its number alone would not do: numbers are given out again."""
+    """Process that started a master. Identified by more than its pid, which the system reuses."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -48,7 +48,7 @@ class Owner:
             self._process = None
 
     def is_gone(self) -> bool:
-        """Whether that very process has ended."""
+        """Return True if the process has ended."""
         if self._process is None or not self._process.is_running():
             return True
         try:
@@ -58,7 +58,12 @@ class Owner:
 
 
 def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
-    """Whether a master answers at `address` (default: see `master_address`) within `timeout_s` seconds."""
+    """Return True if a master replies.
+
+    Args:
+        address: Address of the master. Default: `master_address`.
+        timeout_s: Time limit in seconds.
+    """
     chosen = master_address(address)
     try:
         return isinstance(_ask(Ping(), chosen, timeout_s), Done)
@@ -67,9 +72,9 @@ def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
 
 
 def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
-    """Who is there now, asked without a node of one's own.
+    """Return a snapshot of a master's graph, without a node.
 
-    Raises `MasterUnreachable` when no master answers in time, and `RequestRefusedError`.
+    Raises `MasterUnreachable` without a reply in time, and `RequestRefusedError`.
     """
     chosen = master_address(address)
     reply = _ask(Look(), chosen, timeout_s)
@@ -79,7 +84,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
 
 
 def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None:
-    """As `view`; None when no master answers in time, or none that this nep understands."""
+    """Return a snapshot as `view` does, or None if no (compatible) master replies in time."""
     chosen = master_address(address)
     try:
         return view(chosen, timeout_s)
@@ -88,16 +93,18 @@ def look(address: str | None = None, timeout_s: float = 0.5) -> GraphView | None
 
 
 def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 2.0) -> None:
-    """Let the master on this computer serve others at these addresses of it ("0.0.0.0": all); none: no more.
+    """Make the master on this computer serve others at these addresses ("0.0.0.0": all); none: stop.
 
-    Whoever reaches one of them may then read and command everything: there is no password. Raises
-    `RequestRefusedError` with the reason, `MasterUnreachable` when none answers within `timeout_s` seconds.
+    There is no password: every program that reaches such an address can read and send all messages.
+
+    Raises:
+        RequestRefusedError: The master rejected the request.
+        MasterUnreachable: No master replied within `timeout_s` seconds.
     """
     _ask(Listen(tuple(hosts)), master_address(address), timeout_s)
 
 
 def _ask(request: Request, address: str, timeout_s: float) -> Reply:
-    """A master's reply to one request. Raises `MasterUnreachable`, `RequestRefusedError`."""
     check_room(_FILES, "a question to the master")
     started = time.monotonic()
     name = MasterName(address, lambda _known: None)
@@ -118,7 +125,8 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
                 reply = _read(socket.recv())
                 if reply is not None:
                     return reply
-            elif time.monotonic() >= again_at:  # it may have gone to a master that ended just then
+            # the request may have been sent to a master that was just stopping
+            elif time.monotonic() >= again_at:
                 again_at += _AGAIN_S
                 _send(socket, endpoint, body)
         raise MasterUnreachable(address, timeout_s)
@@ -130,12 +138,12 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
 def _send(socket: zmq.Socket[bytes], endpoint: str, body: bytes) -> None:
     try:
         socket.send(body, zmq.DONTWAIT)
-    except zmq.Again:  # libzmq gave up: a socket that is no master's was there
+    except zmq.Again:  # libzmq disconnected: the peer was not a master's socket
         socket.connect(endpoint)
 
 
 def _read(body: bytes) -> Reply | None:
-    """The reply in a body, None for a push. Raises `RequestRefusedError`."""
+    # None for a push. Raises `RequestRefusedError`.
     try:
         answer = decode_answer(body)[1]
     except WireError as error:
@@ -154,10 +162,21 @@ def start_process(
     command: Sequence[str] | None = None,
     timeout_s: float = 10.0,
 ) -> subprocess.Popen[bytes]:
-    """Start `nep master` at `address` as a process that outlives this one, and wait until it answers.
+    """Start `nep master` in a process that outlives this one, and wait until it replies.
 
-    With `owner_pid` it ends by itself when that process is gone and nobody else needs it. `command` is what
-    runs the `nep` command line (default: this Python). Raises `MasterUnreachable` when it does not come up.
+        process = nep.start_process(owner_pid=os.getpid())
+
+    Args:
+        address: Address of the master. Default: `master_address`.
+        owner_pid: Stop the master when this process has ended and no other program uses it.
+        command: Command line of `nep`. Default: this Python interpreter.
+        timeout_s: Time limit of the start in seconds.
+
+    Returns:
+        The process.
+
+    Raises:
+        MasterUnreachable: The master did not start in time.
     """
     chosen = master_address(address)
     words = [*(command or (sys.executable, "-m", "nep")), "master"]
@@ -177,7 +196,7 @@ def start_process(
     while (left := began + timeout_s - time.monotonic()) > 0 and process.poll() is None:
         if is_running(chosen, min(asked_s, left)):
             return process
-        asked_s = min(2 * asked_s, _ASKED_AT_MOST_S)  # a busy computer may need longer for every answer
+        asked_s = min(2 * asked_s, _ASKED_AT_MOST_S)  # a busy computer may need longer for every reply
     if process.poll() is None:
         process.kill()
     process.wait(5.0)

@@ -1,4 +1,4 @@
-"""Rates from counters that are read now and then."""
+"""Rates of counters sampled at irregular intervals."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ _SHORTEST_S = 0.5
 
 
 class Meter:
-    """Messages and bytes a second, from counts that only grow.
+    """Messages and bytes per second, from increasing counters.
 
-    The window is as short as holds ten messages, ten seconds at most: fast topics show changes at once, slow
-    ones do not flicker between 0 and 1.
+    The window holds ten messages, at most ten seconds: fast topics show changes at once, slow ones don't
+    flicker.
     """
 
     def __init__(self) -> None:
         self._samples: deque[tuple[float, int, int]] = deque()
 
     def add(self, now: float, count: int, size_bytes: int) -> None:
-        """The counters stood so at `now` (seconds, monotonic)."""
+        """Add a sample of the counters at `now` (monotonic seconds)."""
         samples = self._samples
         if samples and count < samples[-1][1]:
-            samples.clear()  # the counter began anew
+            samples.clear()  # the counter was reset
         samples.append((now, count, size_bytes))
         while now - samples[0][0] > _WINDOW_S and len(samples) > 2:
             samples.popleft()
 
     def rates(self) -> tuple[float, float] | None:
-        """(messages a second, bytes a second); None before there are two readings half a second apart."""
+        """Return (messages, bytes) per second, or None without two samples at least 0.5 s apart."""
         if not self._samples:
             return None
         end, end_count, end_bytes = self._samples[-1]

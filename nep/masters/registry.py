@@ -1,6 +1,6 @@
-"""Registry: the tables behind the graph: nodes, their publishers and subscribers, and their statistics.
+"""Registry: tables of nodes, publishers and subscribers, and their statistics.
 
-What programs may register is checked here, too (`check_request`).
+Also validates registrations (`check_request`).
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ __all__ = [
 ]
 
 RECORDS_MAX = 5_000
-"""So many publishers and subscribers one node may have,"""
+"""Maximum number of publishers and subscribers of one node."""
 ALL_RECORDS_MAX = 20_000
-"""and all nodes together,"""
+"""Maximum number of publishers and subscribers of all nodes."""
 ALWAYS_ROOM = 100
-"""but so many each of them in any case: nobody keeps others out."""
+"""Number of publishers and subscribers that every node may have in any case, so that none is locked out."""
 _ENDPOINTS_MAX = 32
 _PID_MAX = 2**32 - 1
 _NODE_ID = re.compile("[0-9a-f]{16}")
@@ -63,19 +63,19 @@ _ENDPOINT = re.compile(
 _NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _HUNG_MAX = 100
-"""So many nodes are noted that one does not answer."""
+"""Maximum number of publishers' nodes recorded that a node did not answer."""
 _CORES_MAX = 100_000.0
 _PROBLEM_MAX = 500
-"""Letters of the sentence about what a subscriber cannot read."""
+"""Maximum length of a problem reported by a node."""
 FADES_S = 12.0
-"""So long after its last message a publisher's rate may still sink."""
+"""Time after its last message in which a publisher's rate may still fall."""
 Counts = Sequence[Mapping[str, Any]]
-"""Statistics of publishers or of subscribers, with the fields of `PublisherCount` or `SubscriberCount`."""
+"""Received statistics, with the fields of `PublisherCount` or `SubscriberCount`."""
 
 
 @dataclass
 class RegisteredPublisher:
-    """A publisher and what its node counted."""
+    """Registered publisher and its statistics."""
 
     record: PublisherRecord
     meter: Meter = field(default_factory=Meter)
@@ -90,7 +90,7 @@ class RegisteredPublisher:
 
 @dataclass
 class RegisteredSubscriber:
-    """A subscriber and what its node counted."""
+    """Registered subscriber and its statistics."""
 
     record: SubscriberRecord
     received: int | None = None
@@ -99,9 +99,9 @@ class RegisteredSubscriber:
 
 
 class NodeClock(NamedTuple):
-    """A node's clock: what to add for the master's, how surely (ns), and when it told so.
+    """Clock of a node: offset to the master's clock and its uncertainty (ns), and the time of the report.
 
-    That is None for nodes that have the master's clock: it cannot drift from itself.
+    The time is None for nodes with the master's clock, which can't drift.
     """
 
     offset_ns: int
@@ -111,10 +111,22 @@ class NodeClock(NamedTuple):
 
 @dataclass
 class RegisteredNode:
-    """A node with all that it has. `hung`: it did not answer publishers of the nodes with these ids.
+    """Registered node.
 
-    Its next renewal is due `renew_s` after `renewed_at`: that is what it was told. `route` is the connection
-    that speaks for it; empty for what is attached to the master.
+    Attributes:
+        node: Record of the node.
+        renewed_at: Time of the last renewal.
+        renew_s: Seconds from there to the next renewal, as requested of the node.
+        is_managed: True for nodes without a lease, managed by an attachment.
+        route: Connection that speaks for it; "" for attachments.
+        publishers: Publishers by id.
+        subscribers: Subscribers by id.
+        hung: Ids of nodes whose publishers it did not answer.
+        cpu_ratio: CPU usage of its process.
+        heard: Publishers that it receives, cached by `Registry.heard_by`.
+        heard_at: Version of the cache.
+        far: Their nodes that are not known to be on the same computer.
+        clock: Its clock, or None if unknown.
     """
 
     node: NodeRecord
@@ -127,31 +139,29 @@ class RegisteredNode:
     hung: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
     heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
-    """Whose newest messages it is told of, as of the version `heard_at`. See `Registry.heard_by`."""
     heard_at: int = -1
     far: tuple[RegisteredNode, ...] = ()
-    """Whose they are, as far as these are not known to be on the same computer."""
     clock: NodeClock | None = None
 
 
 class Registry:
-    """The tables, and the few ways in which they change."""
+    """Tables of registrations, and the operations that change them."""
 
     def __init__(self) -> None:
         self.members: dict[str, RegisteredNode] = {}
         self.speaking: dict[str, RegisteredNode] = {}
-        """By connection: the node that it speaks for."""
+        """Node by the connection that speaks for it."""
         self.publisher_owners: dict[int, RegisteredNode] = {}
-        """By the id of a publisher: the node that has it."""
+        """Node by the id of its publisher."""
         self.subscriber_owners: dict[int, RegisteredNode] = {}
-        """The same of subscribers."""
+        """Node by the id of its subscriber."""
         self.revision = 1
         self.publishers_revision = 0
-        """The revision at which the publishers of some topic changed last."""
+        """Revision of the last change of any topic's publishers."""
         self.touched: set[str] = set()
-        """Topics of which something has changed, also a count, since whoever looks emptied this.
+        """Topics changed since the last snapshot, including statistics; the snapshot clears it.
 
-        Names that nobody uses any more leave nothing behind: a program may use a new one every second.
+        Unused names are removed: a program may use a new one every second.
         """
         self._topic_revisions: dict[str, int] = {}
         self._publishing: dict[str, dict[int, RegisteredNode]] = {}
@@ -163,7 +173,7 @@ class Registry:
     # ---- reading
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
-        """The publishers of a topic that can be connected to."""
+        """Return the publishers of a topic that subscribers can connect to."""
         found = self._publishing.get(topic, {})
         return tuple(
             self.remote(member, member.publishers[known].record)
@@ -173,46 +183,46 @@ class Registry:
 
     @property
     def topics(self) -> list[str]:
-        """The names of all topics that somebody publishes or subscribes."""
+        """Names of all topics with publishers or subscribers."""
         return sorted(set(self._publishing) | set(self._subscribing))
 
     def publishing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
-        """All publishers of a topic, also those that cannot be connected to, each with its node."""
+        """Return all publishers of a topic with their nodes, including those without endpoints."""
         found = self._publishing.get(topic)
         return [(member, member.publishers[known]) for known, member in found.items()] if found else []
 
     def subscribers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
-        """The subscribers of a topic, each with its node."""
+        """Return the subscribers of a topic with their nodes."""
         found = self._subscribing.get(topic)
         return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
     def hearing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
-        """The subscribers that hear a topic: those of it, and those whose wildcards match."""
+        """Return the subscribers that receive a topic: its own and those whose pattern matches."""
         found = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
         return found + [
             (member, member.subscribers[known]) for member, known in self.patterns.subscribers_of(topic)
         ]
 
     def topics_of(self, record: SubscriberRecord) -> set[str]:
-        """The topics that a subscriber hears: with wildcards, those that are published."""
+        """Return the topics that a subscriber receives; for a pattern, the published ones that match."""
         return self.patterns.topics_of(record.topic) if record.pattern else {record.topic}
 
     def topics_heard_by(self, member: RegisteredNode) -> set[str]:
-        """The topics that the subscribers of a node hear."""
+        """Return the topics that a node's subscribers receive."""
         return {
             topic for subscriber in member.subscribers.values() for topic in self.topics_of(subscriber.record)
         }
 
     def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
-        """A publisher as subscribers have to know it."""
+        """Return a publisher as sent to subscribers."""
         return RemotePublisher(record, member.node.id, member.node.name, member.node.computer)
 
     def topic_revision(self, topic: str) -> int:
-        """The revision at which the publishers of this topic changed last."""
+        """Return the revision of the last change of a topic's publishers."""
         return self._topic_revisions.get(topic, 0)
 
     def heard_by(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
-        """Everybody who can be connected to on the topics that this node subscribes to, or could lately."""
+        """Return all publishers, also recent ones, that the node's subscribers can (or could) connect to."""
         version = self.revision + self.departed.changes
         if member.heard_at != version:
             member.heard_at = version
@@ -231,26 +241,26 @@ class Registry:
         return member.heard
 
     def far_from(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
-        """Other computers' nodes that can be connected to on the topics that this one subscribes to."""
+        """Return the nodes of these publishers that are on other computers."""
         self.heard_by(member)
         return member.far
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
-        """Publisher id → newest message, for all who can be connected to on this node's topics.
+        """Return the newest message by publisher id for all publishers of `heard_by`.
 
-        Also for those who could lately: the node may have been cut off when they ended.
+        Includes recently unregistered ones: the node may have been disconnected when they closed.
         """
         return {known: publisher.last_seq for known, publisher in self.heard_by(member).items()}
 
     # ---- changing
 
     def meet(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
-        """The member for a node, made when it is new. Its lease begins anew."""
+        """Return the member of a node, created if needed, and renew its lease."""
         member = self.members.get(node.id)
         if member is None:
             member = self.members[node.id] = RegisteredNode(node, now)
             self.revision += 1
-        elif member.node != node:  # an original's version shows only in what it sends
+        elif member.node != node:  # an original program's version is known only from its messages
             member.node = node
             self.revision += 1
         member.renewed_at = now
@@ -259,7 +269,7 @@ class Registry:
         return member
 
     def bind(self, member: RegisteredNode, route: str) -> None:
-        """From now on this connection speaks for the member."""
+        """Make a connection the one that speaks for the member."""
         if member.route != route:
             self._unbind(member)
             member.route = route
@@ -271,7 +281,7 @@ class Registry:
             del self.speaking[member.route]
 
     def add_publisher(self, member: RegisteredNode, record: PublisherRecord) -> bool:
-        """Register a publisher; False when it was registered just so before."""
+        """Register a publisher; return False if it was already registered identically."""
         known = member.publishers.get(record.id)
         if known is not None and known.record == record:
             return False
@@ -285,7 +295,7 @@ class Registry:
         return True
 
     def add_subscriber(self, member: RegisteredNode, record: SubscriberRecord) -> None:
-        """Register a subscriber, once."""
+        """Register a subscriber. Idempotent."""
         if record.id not in member.subscribers:
             member.subscribers[record.id] = RegisteredSubscriber(record)
             self.subscriber_owners[record.id] = member
@@ -296,7 +306,7 @@ class Registry:
             self.revision += 1
 
     def remove_publisher(self, node_id: str, publisher: int) -> PublisherRecord | None:
-        """Unlist a publisher; its record, or None when there was none."""
+        """Unregister a publisher; return its record, or None if unknown."""
         member = self.members.get(node_id)
         gone = member.publishers.pop(publisher, None) if member else None
         if gone is None:
@@ -312,12 +322,12 @@ class Registry:
         return gone.record
 
     def _names_of(self, topic: str) -> set[str]:
-        """A topic, and the wildcards by which it is heard."""
+        # The topic and the patterns that match it.
         heard = self.patterns.subscribers_of(topic)
         return {topic, *(member.subscribers[known].record.topic for member, known in heard)}
 
     def remove_subscriber(self, node_id: str, subscriber: int) -> None:
-        """Unlist a subscriber, if there is such a one."""
+        """Unregister a subscriber. Idempotent."""
         member = self.members.get(node_id)
         gone = member.subscribers.pop(subscriber, None) if member else None
         if gone is not None:
@@ -330,13 +340,13 @@ class Registry:
             self._forget_unused(gone.record.topic)
 
     def _forget_unused(self, topic: str) -> None:
-        """Forget what was noted of a topic that nobody publishes or subscribes: who comes is told all."""
+        # Discards data of unused topics; a new user gets the full state anyway.
         if topic not in self._publishing and topic not in self._subscribing:
             self.touched.discard(topic)
             self._topic_revisions.pop(topic, None)
 
     def forget(self, node_id: str) -> None:
-        """Unlist a node with all that it has."""
+        """Unregister a node with everything it has."""
         member = self.members[node_id]
         for publisher in list(member.publishers):
             self.remove_publisher(node_id, publisher)
@@ -354,10 +364,10 @@ class Registry:
         now: float,
         cpu_ratio: float | None = None,
     ) -> bool:
-        """Take over a node's statistics; it is alive. Numbers that can't be become the nearest.
+        """Store a node's statistics and renew its lease. Out-of-range numbers are clamped.
 
-        The maps have the fields of `PublisherCount` and `SubscriberCount`, as they came. False when they are
-        not those of just what is registered, or not of these types: some of it may have been taken over.
+        The maps have the fields of `PublisherCount` and `SubscriberCount`, unvalidated. Return False if they
+        don't match the registrations or types; some of them may have been stored then.
         """
         try:
             publishers, subscribers = member.publishers, member.subscribers
@@ -385,12 +395,12 @@ class Registry:
             member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
             if member.hung:
                 member.hung.clear()
-        except (LookupError, TypeError, AttributeError):  # a field or a publisher is missing, or no map
+        except (LookupError, TypeError, AttributeError):  # a missing field or publisher, or not a map
             return False
         return True
 
     def counted(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
-        """A publisher has sent so much until now."""
+        """Store a publisher's counters."""
         count, size_bytes = as_count(count), as_count(size_bytes)
         if count != publisher.count:
             publisher.changed_at = now
@@ -401,19 +411,19 @@ class Registry:
         publisher.meter.add(now, count, size_bytes)
 
     def reached(self, publisher: RegisteredPublisher, last_seq: int, last_stamp_ns: int | None) -> None:
-        """The number and the stamp of a publisher's newest message."""
+        """Store sequence number and time stamp of a publisher's newest message."""
         publisher.last_seq = as_count(last_seq)
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
 
     def troubled(self, publisher: RegisteredPublisher, problem: str) -> None:
-        """A publisher cannot send what it is given, and why; an empty sentence means that it can again."""
+        """Store a publisher's problem; "" when it is solved."""
         publisher.problem = escaped(shortened(problem, _PROBLEM_MAX)) if problem else ""
         self.touched.add(publisher.record.topic)
 
     def seen(
         self, subscriber: RegisteredSubscriber, received: int | None, lost: int | None, problem: str
     ) -> None:
-        """A subscriber has received so much until now."""
+        """Store a subscriber's statistics."""
         received = None if received is None else as_count(received)
         lost = None if lost is None else as_count(lost)
         if problem:
@@ -423,7 +433,7 @@ class Registry:
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 
     def report_missing(self, node_id: str, publisher: int, subscribers: Iterable[int]) -> None:
-        """These subscribers did not answer that publisher; forgotten at their next renewal."""
+        """Record that subscribers did not answer a publisher, until their next renewal."""
         reporter = self.members.get(node_id)
         known = reporter.publishers.get(publisher) if reporter else None
         if reporter is None or known is None:
@@ -434,14 +444,14 @@ class Registry:
                 member.hung.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
-        """These are all alerts of `source` now."""
+        """Replace the alerts of `source`."""
         if self._reported.get(source, ()) != alerts:
             self._reported[source] = alerts
             self.revision += 1
 
     @property
     def reported_alerts(self) -> tuple[Alert, ...]:
-        """What is attached to the master reported."""
+        """Alerts of all attachments."""
         return tuple(alert for alerts in self._reported.values() for alert in alerts)
 
     def _changed(self, topic: str) -> None:
@@ -451,7 +461,7 @@ class Registry:
 
 
 def _as_ratio(value: float | None) -> float | None:
-    """A share of a processor as somebody told it; None for what can be none."""
+    # None for an implausible CPU usage.
     return value if value is not None and 0.0 <= value < _CORES_MAX else None
 
 
@@ -462,23 +472,23 @@ def _take_out(table: dict[str, dict[int, RegisteredNode]], topic: str, known: in
         table.pop(topic, None)
 
 
-# ---- what may be registered
+# ---- validation of registrations
 
 
 def is_nanomsg_endpoint(endpoint: str) -> bool:
-    """Whether it is `nanomsg://HOST:PORT/PORT`: where subscribers of that back end reach a publisher."""
+    """Return True for `nanomsg://HOST:PORT/PORT`, the endpoint of a nanomsg publisher."""
     found = _NANOMSG_ENDPOINT.fullmatch(endpoint)
     return found is not None and all(1 <= int(port) <= 65535 for port in found.groups())
 
 
 def is_tcp_endpoint(endpoint: str) -> bool:
-    """Whether it is `tcp://HOST:PORT`: the form in which ZeroMQ's publishers say where to reach them."""
+    """Return True for `tcp://HOST:PORT`, the endpoint of a ZeroMQ publisher."""
     found = _ENDPOINT.fullmatch(endpoint)
     return found is not None and 1 <= int(found.group(1)) <= 65535
 
 
 def check_request(request: Request) -> None:
-    """Raises `WireError` for what no program may register. Everything else is the graph's to decide."""
+    """Raise `WireError` for registrations that no program may make; further checks are the graph's."""
     if not isinstance(request, Join | AddPublisher | AddSubscriber):
         return
     _check_node(request.node)
@@ -491,14 +501,14 @@ def check_request(request: Request) -> None:
 def records_of(
     request: Join | AddPublisher | AddSubscriber,
 ) -> tuple[PublisherRecord | SubscriberRecord, ...]:
-    """All publishers and subscribers that a request registers."""
+    """Return all publishers and subscribers that a request registers."""
     if isinstance(request, Join):
         return (*request.publishers, *request.subscribers)
     return (request.publisher if isinstance(request, AddPublisher) else request.subscriber,)
 
 
 def check_record(record: PublisherRecord | SubscriberRecord) -> None:
-    """Raises `WireError` unless its topic can be one."""
+    """Raise `WireError` for an invalid topic."""
     try:
         check_topic(record.topic)
     except NepError as error:

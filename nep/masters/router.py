@@ -1,4 +1,4 @@
-"""MasterRouter: the master's ROUTER socket: requests in, bodies out. For the master's thread only."""
+"""ROUTER socket of the master. Only for the master's thread."""
 
 from __future__ import annotations
 
@@ -16,37 +16,40 @@ from nep.system.descriptors import check_room
 __all__ = ["MasterRouter"]
 
 REQUEST_MAX_BYTES = 4 * 2**20
-"""Whoever sends more in one part is disconnected."""
+"""Maximum size of a part; a peer that sends more is disconnected."""
 UNREAD_MAX_BYTES = 32 * 2**20
-"""So much is kept for a program that asks for graphs and does not read them, in bodies of 4 kB and more."""
+"""Limit per connection of unread large bodies (4 kB and more)."""
 _LARGE_BYTES = 4096
 _RECEIVE_AHEAD = 16
-"""So many requests of each connection wait here; more wait where they come from."""
+"""Receive queue per connection; more requests wait at the sender."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _FILES = 16
 _RETURN_S = 0.5
-"""A node whose connection ends has so long to be back."""
+"""Time in which a node may reconnect before it is probed."""
 _SRCFD = int(zmq.SRCFD)
 _EVENT = struct.Struct("=HI")
-"""What libzmq tells of a connection: the kind of event and the connection's number."""
+"""Monitor event of libzmq: kind of event and number of the connection."""
 
 
 class MasterRouter:
-    """Raises `AddressInUseError` when `address` cannot be bound, `TooManyFilesError`."""
+    """ROUTER socket: receives requests, sends bodies, detects closed connections.
+
+    Raises `AddressInUseError` when `address` can't be bound, and `TooManyFilesError`.
+    """
 
     def __init__(self, address: str) -> None:
         check_room(_FILES, "a master")
         self._monitor: zmq.Socket[bytes] | None = None
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.socket = self._context.socket(zmq.ROUTER)
-        # Without pyzmq's layer for routing ids and groups, which takes half of the time.
+        # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, self.socket).send
         self.socket.setsockopt(zmq.LINGER, 200)
         self.socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a peer is gone
-        # No ROUTER_HANDOVER: whoever knows the routing id of a connection must not be able to end it.
+        # no ROUTER_HANDOVER: knowing a routing id must not be enough to take over a connection
         self.socket.setsockopt(
             zmq.TCP_KEEPALIVE, 1
-        )  # a computer that vanishes does not close its connections
+        )  # a computer that disappears does not close its connections
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
@@ -62,15 +65,15 @@ class MasterRouter:
         self.address = self.socket.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
         self._monitor = self._monitored()
         self._senders: dict[int, bytes] = {}
-        """Who was heard last on which connection, by its number in this process."""
+        """Last sender by the number of its connection."""
         self._ended: dict[bytes, float] = {}
-        """Whose connection has ended, and when."""
+        """Time at which each sender's connection ended."""
         self._newest: zmq.Frame | None = None
         self._unread: dict[bytes, list[tuple[zmq.MessageTracker, int]]] = {}
-        """The large bodies on their way to each connection."""
+        """Large bodies in flight by connection."""
 
     def receive(self) -> list[bytes]:
-        """The parts of a request, who asks first. Raises `zmq.Again` when there is none."""
+        """Return the parts of a request, sender first. Raises `zmq.Again` without one."""
         recv = self.socket.recv
         frames = [recv(_DONTWAIT, False)]
         while frames[-1].more:
@@ -81,7 +84,7 @@ class MasterRouter:
         return parts
 
     def peer(self) -> str:
-        """The address that the request received last came from; empty when that is not known any more."""
+        """Return the address of the last request's sender, or "" if it is unknown."""
         try:
             return "" if self._newest is None else str(self._newest.get("Peer-Address"))
         except zmq.ZMQError:
@@ -90,16 +93,16 @@ class MasterRouter:
     def _heard(self, frame: zmq.Frame, sender: bytes) -> None:
         try:
             connection = frame.get(_SRCFD)
-        except zmq.ZMQError:  # its connection ended as soon as it was there
+        except zmq.ZMQError:  # the connection has already ended
             return
         before = self._senders.get(connection)
         if before != sender:
-            if before is not None:  # so the connection that had this number has ended
+            if before is not None:  # the number was reused: its previous connection has ended
                 self._ended.setdefault(before, time.monotonic())
             self._senders[connection] = sender
 
     def ended(self, now: float) -> list[bytes]:
-        """Whose connection ended a moment ago, each once; they may have another one by now."""
+        """Return the senders whose connection ended a moment ago, each once. They may have reconnected."""
         sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
         for route in sent:
             del self._unread[route]
@@ -117,9 +120,9 @@ class MasterRouter:
         return ended
 
     def send(self, to: bytes, body: bytes) -> bool:
-        """Send a body; False when its node has no connection any more.
+        """Send a body; return False if the node has no connection.
 
-        Large ones are left out while `UNREAD_MAX_BYTES` of them have not been read.
+        Large bodies are dropped while `UNREAD_MAX_BYTES` of them are unread.
         """
         try:
             if len(body) < _LARGE_BYTES:
@@ -133,21 +136,21 @@ class MasterRouter:
             tracker = cast("zmq.MessageTracker", self._send(body, _DONTWAIT, False, True))
             self._unread[to] = [*unread, (tracker, len(body))]
         except zmq.Again:
-            pass  # it does not read; its next renewal tells it what it missed
+            pass  # a slow reader: its next renewal reports what it missed
         except zmq.ZMQError as error:
             return error.errno != zmq.EHOSTUNREACH
         return True
 
     def _monitored(self) -> zmq.Socket[bytes]:
-        """Where libzmq tells of connections that end."""
+        # Monitor socket for disconnections.
         monitor = self._context.socket(zmq.PAIR)
-        monitor.setsockopt(zmq.RCVHWM, 0)  # libzmq's thread would wait for us if this were full
+        monitor.setsockopt(zmq.RCVHWM, 0)  # unlimited: libzmq's I/O thread would block on a full queue
         self.socket.monitor("inproc://ended", zmq.EVENT_DISCONNECTED)
         monitor.connect("inproc://ended")
         return monitor
 
     def close(self) -> None:
-        """Close the socket, and wait until what was sent is on its way."""
+        """Close the socket after everything was sent."""
         if self._monitor is not None:
             self.socket.disable_monitor()
             self._monitor.close(0)

@@ -1,4 +1,4 @@
-"""MasterServer: the master's thread: its ROUTER socket, requests in, pushes and replies out."""
+"""Server thread of the master: reads requests, sends replies and pushes."""
 
 from __future__ import annotations
 
@@ -45,16 +45,19 @@ __all__ = ["MasterServer", "Submission"]
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
 _AWAY_S = 1.0
-"""A master that did not look for so long (a suspended computer, a large request) judges nobody at once."""
+"""Pause (suspended computer, large request) after which no node is judged in the next tick."""
 _REST_MS = 10
 _NODES_PER_MS = 50
-"""How long renewals may gather: not at all with fewer nodes than these, then 1 ms longer for so many each."""
+"""Renewals are collected for 1 ms per this number of nodes, up to `_REST_MS`."""
 _FOLLOW_S = 2.0
-"""How often the addresses of this computer are looked at while other computers are served."""
+"""Interval of checking this computer's addresses while other computers are served."""
 
 
 class Submission:
-    """A request from inside the master's process. `done` is set with its reply, or without when that ends."""
+    """Request of the master's own process.
+
+    `done` is set with the reply, or without one when the master stops.
+    """
 
     def __init__(self, request: Request) -> None:
         self.request = request
@@ -63,9 +66,9 @@ class Submission:
 
 
 class MasterServer:
-    """The thread with all that only it touches. `listeners` are told of every new revision.
+    """Server thread. `listeners` are called with every new revision of the graph.
 
-    Raises `AddressInUseError` when `address` cannot be bound.
+    Raises `AddressInUseError` when `address` can't be bound.
     """
 
     def __init__(
@@ -87,7 +90,7 @@ class MasterServer:
         self._encoder = AnswerEncoder()
         self._bad = BadRequests()
         self._renewals: list[tuple[bytes, bytes, int]] = []
-        """Those that are not answered yet: whose, what, and when it came (ns since 1970)."""
+        """Unanswered renewals: sender, body, and time of receipt (ns since 1970)."""
         self._tell_at = 0.0
         self._is_open = False
         self._closing = self._is_forked = False
@@ -100,19 +103,19 @@ class MasterServer:
         self._ticked_at = time.monotonic()
         watch(self)
 
-    # ---- from other threads
+    # ---- other threads
 
     def start(self) -> None:
-        """Run the thread; only submissions are answered before `open`."""
+        """Start the thread. Only submissions are served until `open`."""
         self._thread.start()
 
     def open(self) -> None:
-        """Answer everybody from now on."""
+        """Serve requests of other programs."""
         self._is_open = True
         self._waker.wake()
 
     def close(self) -> None:
-        """End the thread and give the address back."""
+        """Stop the thread and release the address."""
         self._closing = True
         self._waker.wake()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
@@ -120,15 +123,15 @@ class MasterServer:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is bound."""
+        """Bound endpoints."""
         return (endpoint_of(self.address), *self._listening.endpoints)
 
     def forked(self) -> None:
-        """In a child: if this is its thread, it ends and touches nothing. See `nep.system.forks`."""
+        """Stop without touching sockets in a forked child process. See `nep.system.forks`."""
         self._closing = self._is_forked = True
 
     def submit(self, request: Request, timeout_s: float) -> Reply:
-        """Carry out a request of this process. See `Master.submit`."""
+        """Execute a request of this process. See `Master.submit`."""
         submission = Submission(request)
         self._submitted.append(submission)
         self._waker.wake()
@@ -138,7 +141,7 @@ class MasterServer:
             raise ClosedError(f"the master at '{self.address}'")
         return submission.reply
 
-    # ---- in the master's thread
+    # ---- master's thread
 
     def _run(self) -> None:
         waker = (self._waker.fd, int(zmq.POLLIN))
@@ -157,7 +160,7 @@ class MasterServer:
                     tick_at = now + _TICK_S
                 try:
                     self._turn(waker, is_due=is_due)
-                except Exception as error:  # noqa: BLE001 - logged; one program must not end the others
+                except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
                     self._failed(error, "something in its turn")
         finally:
             if not self._is_forked:
@@ -167,7 +170,7 @@ class MasterServer:
                     submission.done.set()
 
     def _turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
-        """Serve all that came, then what time brings."""
+        # Requests first, then periodic work.
         self._serve_submissions()
         if self._is_open:
             self._serve_router()
@@ -180,14 +183,14 @@ class MasterServer:
         self._tell_listeners(now)
 
     def _failed(self, error: Exception, what: str) -> None:
-        """Log what went wrong; rarely, when it does again and again."""
+        # Logged at increasing intervals.
         self._failures += 1
         if is_logged(self._failures):
             sentence = "the master could not carry out %s (%d times so far)"
             _logger.error(sentence, what, self._failures, exc_info=error)
 
     def _rest_from_renewals(self, waker: tuple[int, int]) -> bool:
-        """With hundreds of nodes, let renewals gather: waking up costs more than answering one."""
+        # With hundreds of nodes a wake-up costs more than a reply, so renewals are collected for some ms.
         rest_ms = min(_REST_MS, len(self._graph.members) // _NODES_PER_MS)
         if rest_ms:
             zmq.zmq_poll([waker], rest_ms)
@@ -202,7 +205,7 @@ class MasterServer:
 
     def _tick(self, now: float) -> None:
         was_away, self._ticked_at = now - self._ticked_at > _AWAY_S, now
-        if not was_away:  # else it is we who were late: what they sent meanwhile may still wait here
+        if not was_away:  # otherwise this thread was late itself: renewals may still be queued
             self._send(self._graph.tick(now))
             self._send(self._graph.silent(now))
         ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
@@ -218,20 +221,20 @@ class MasterServer:
         self._graph.apply(ReportAlerts("listening", self._listening.follow()), 0, time.monotonic(), "")
 
     def _is_needed(self) -> bool:
-        """Whether a node of a process other than the owner and this one is registered."""
+        # A node of another process than the owner's and this one is registered.
         own = {os.getpid(), None if self._owner is None else self._owner.pid}
         return any(node.pid not in own for node in self._graph.nodes)
 
     def _serve_submissions(self) -> None:
         while self._submitted:
             submission = self._submitted.popleft()
-            self._calls -= 1  # calls from inside count downwards, so that they never meet a node's
+            self._calls -= 1  # negative numbers are distinct from calls of nodes
             self._pending[self._calls] = submission
             self._apply(ReceivedRequest(self._calls, submission.request), "")
 
     def _serve_router(self) -> None:
         enough_at = time.monotonic() + _TICK_S
-        for _turn in range(1000):  # then time for the rest of the loop
+        for _turn in range(1000):  # then other work
             if time.monotonic() > enough_at:
                 return
             try:
@@ -244,11 +247,11 @@ class MasterServer:
             if len(body) == 1 and is_renewal(body[0]):
                 self._renewals.append((sender, body[0], time.time_ns()))
             else:
-                self._answer_renewals()  # they came before
+                self._answer_renewals()  # in order of arrival
                 self._serve(sender, body, self._port.peer())
 
     def _answer_renewals(self) -> None:
-        """All of them, then all answers: so the network's thread is woken once, too."""
+        # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
         answers = [self._renew_safely(*renewal) for renewal in renewals]
         for (sender, body, _came_ns), answer in zip(renewals, answers, strict=True):
@@ -258,15 +261,15 @@ class MasterServer:
                 self._send(self._graph.drop(self._speaking_at(_name_of(sender))))
 
     def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
-        """As `_renew_quickly`; what fails takes the usual way, which answers it."""
+        # A failing renewal takes the general path, which replies.
         try:
             return self._renew_quickly(sender, body, came_ns)
-        except Exception as error:  # noqa: BLE001 - logged; the others are renewed
+        except Exception as error:  # noqa: BLE001 - logged; other renewals go on
             self._failed(error, "a renewal")
             return None
 
     def _renew_quickly(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
-        """The answer to a usual renewal; None when it is something else."""
+        # None if it is not a usual renewal.
         said = read_renewal(body)
         if said is None:
             return None
@@ -302,7 +305,7 @@ class MasterServer:
             self._bad.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
 
     def _apply(self, asked: ReceivedRequest, sender: str) -> str:
-        """Carry out a request, of this process when `sender` is empty; why it was refused, or ""."""
+        # An empty sender is this process. Returns the reason of a rejection, or "".
         request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:
             if isinstance(request, WireError):
@@ -318,14 +321,14 @@ class MasterServer:
                         outgoing = self._timed(outgoing, came_ns)
                     self._send(outgoing)
                 return _reason_in(outgoing)
-        except Exception as error:  # noqa: BLE001 - logged; one request must never end the master
+        except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
             self._failed(error, "a request")
             outgoing = (Outgoing(sender, self._refused(), asked.call),)
         self._send(outgoing)
         return request.reason if isinstance(request, WireError) else ""
 
     def _timed(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
-        """Answers to a renewal that came at this time of this computer's clock, with both times."""
+        # Adds receipt and reply time to replies of a renewal.
         return tuple(
             each._replace(answer=replace(each.answer, times=self._graph.clocks.times(member, came_ns)))
             if isinstance(each.answer, Renewed) and (member := self._graph.node_at(each.to)) is not None
@@ -342,7 +345,7 @@ class MasterServer:
         return Done(self._graph.epoch, self._graph.revision)
 
     def _send(self, outgoing: Sequence[Outgoing]) -> None:
-        """Send in order; nodes that turn out to be dead on the way are dropped, and nobody waits for them."""
+        # Nodes found dead on the way are dropped.
         dead: set[str] = set()
         for each in outgoing:
             if each.call is not None and each.call < 0:
@@ -359,7 +362,7 @@ class MasterServer:
             submission.done.set()
 
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
-        """Send one answer; False when there is no such connection any more."""
+        # False if the connection is gone.
         route = each.to
         if each.call is None:
             member = None if each.to in dead else self._graph.members.get(each.to)
@@ -369,7 +372,7 @@ class MasterServer:
         answer = with_hosts(without(each.answer, dead), self._listening.hosts)
         try:
             body = self._encoder.encode(answer, each.call or 0)
-        except Exception as error:  # noqa: BLE001 - logged; the others get theirs, who asked gets an answer
+        except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
             self._failed(error, "an answer")
             if each.call is None:
                 return True
@@ -377,7 +380,6 @@ class MasterServer:
         return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
     def _speaking_at(self, route: str) -> tuple[str, ...]:
-        """The id of the node that this connection speaks for."""
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
@@ -388,16 +390,16 @@ class MasterServer:
         return Refused(self._graph.epoch, self._graph.revision, error.reason, error.code)
 
     def _tell_listeners(self, now: float) -> None:
-        """With many nodes that come at once, not after each: telling shall not take most of the time."""
+        # Rate-limited, so that notifying takes at most a quarter of the time when many nodes join.
         if self._listeners and self._graph.revision != self._told_revision and now >= self._tell_at:
             self._told_revision = self._graph.revision
             view = replace(self._graph.view(), listens=self._listening.hosts)
             for changed in self._listeners:
                 try:
                     changed(view)
-                except Exception:  # the master outlives what is attached to it
+                except Exception:  # an attachment must not stop the master
                     _logger.exception("something attached to the master failed")
-            self._tell_at = 4.0 * time.monotonic() - 3.0 * now  # three times as long as it took
+            self._tell_at = 4.0 * time.monotonic() - 3.0 * now  # pause for three times the duration
 
     def _release(self) -> None:
         self._port.close()
@@ -405,7 +407,6 @@ class MasterServer:
 
 
 def _reason_in(outgoing: Sequence[Outgoing]) -> str:
-    """Why a request was refused that was answered so; "" when it was not."""
     return next((each.answer.reason for each in outgoing if isinstance(each.answer, Refused)), "")
 
 

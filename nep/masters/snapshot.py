@@ -1,4 +1,4 @@
-"""Viewing: the registry as frozen values, with the alerts that follow from it."""
+"""Snapshots of the registry as frozen values, and the alerts derived from it."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ __all__ = ["GraphViewer"]
 
 
 _NAMES = 5
-"""So many programs are named in a sentence."""
+"""Maximum number of program names in a message."""
 
 
 class GraphViewer:
-    """Looks at `registry` again and again. What has not changed is the very value of the last view."""
+    """Factory of snapshots of `registry`. Unchanged parts are the same objects as in the last snapshot."""
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
         self._topics: dict[str, TopicInfo | None] = {}
-        """None where subscribers have only wildcards of this name: it is no topic."""
+        """None for names that only occur as patterns of subscribers."""
         self._patterns: dict[str, PatternInfo] = {}
         self._alerts: dict[str, tuple[Alert, ...]] = {}
 
     def view(self, epoch: int) -> GraphView:
-        """Everything that the registry knows now."""
+        """Return a snapshot of the registry."""
         registry, touched = self._registry, self._registry.touched
         names: list[str] = []
         served: list[str] = []
@@ -84,7 +84,7 @@ class GraphViewer:
         publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
         subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
     ) -> TopicInfo | None:
-        """The topic without those whose wildcards it is, which are noted; None when nobody is left."""
+        # Separates subscribers whose pattern has this name; None if nothing else is left.
         if name in self._registry.patterns:
             wide = [each for each in subscribing if each[1].record.pattern]
             subscribing = [each for each in subscribing if not each[1].record.pattern]
@@ -122,7 +122,7 @@ def _look_at(
     publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
     subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
 ) -> TopicInfo:
-    """A topic as it is now. Plain loops: with thousands of topics this is what a look waits for."""
+    # Plain loops: this dominates the time of a snapshot with thousands of topics.
     first = publishing[0][1].record if publishing else None
     rate = bandwidth = None
     stamp_ns: int | None = None
@@ -163,7 +163,7 @@ def _look_at(
 def _counted(
     publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
 ) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
-    """Those whose messages are counted: the gateway's own publishers repeat what the originals sent."""
+    # Gateway publishers repeat messages of original programs, and would count them twice.
     has_originals = any(member.node.generation not in {"native", "gateway"} for member, _ in publishing)
     return [each for each in publishing if not (has_originals and each[0].node.generation == "gateway")]
 
@@ -198,7 +198,6 @@ def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -
 
 
 def _service(topic: str, registry: Registry) -> ServiceInfo:
-    """A service, of those that are listed under its topic."""
     publishing, subscribing = registry.publishing(topic), registry.subscribers_of(topic)
     servers = tuple(
         ServerInfo(each.record.id, member.node.id, each.record.endpoints, each.count, each.errors, each.bytes)
@@ -235,7 +234,7 @@ def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> 
 
 
 def _original_client_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> Iterator[Alert]:
-    """Programs of the original NEP connect to nothing but the port that the gateway gave to their service."""
+    # Original programs can only connect to the port that the gateway assigned to the service.
     for name, service in sorted(services.items()):
         clients = [each for each in service.clients if _is_original(each.node_id, registry)]
         servers = service.servers
@@ -325,14 +324,13 @@ def _topic_alerts(
 
 
 def _names_of(registry: Registry, node_ids: Iterable[str]) -> set[str]:
-    """The names of these nodes, as far as they are there."""
     return {registry.members[each].node.name for each in node_ids if each in registry.members} or {
         _("programs")
     }
 
 
 def _names(nodes: Iterable[str]) -> str:
-    """Some names for a sentence: all of them, or how many more there are."""
+    # Shortened list of names.
     said = sorted(set(nodes))
     names = ", ".join(f"“{name}”" for name in said[:_NAMES])
     if len(said) <= _NAMES:
