@@ -1,4 +1,4 @@
-"""What nep needs of the computer: addresses, open files, forks, terminals, streams, plug-ins, lazy imports.
+"""Operating system services: addresses, descriptors, forks, terminals, streams, plug-ins, lazy imports.
 
-Nothing here knows of messages.
+Independent of messages.
 """

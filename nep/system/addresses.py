@@ -1,4 +1,4 @@
-"""Where the master is, also behind a name; this computer's addresses, and those of publishers in reach."""
+"""Addresses of the master, of this computer, and of reachable publishers."""
 
 from __future__ import annotations
 
@@ -52,17 +52,20 @@ _PORT = re.compile(r"\d{1,5}", re.ASCII)
 _BYTE = re.compile(r"0*\d{1,3}", re.ASCII)
 _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
 
-ANY = "0.0.0.0"  # noqa: S104 - bound only where a person asked for it
-"""All addresses of a computer, now and later."""
+ANY = "0.0.0.0"  # noqa: S104 - bound only at a user's request
+"""All IPv4 addresses of a computer."""
 _AGAIN_S = 5.0
 _SLICE_S = 0.1
 _HERE = frozenset({"localhost", "*"})
-"""Names of this computer that nobody has to be asked for; a master at "*" is reached here as well."""
+"""Names of this computer that need no resolution; a master at "*" is local, too."""
 _TUNNELS = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
 
 
 def master_address(address: str | None = None) -> str:
-    """`address`, else $NEP_MASTER, else "127.0.0.1:7780"; the port 7780 is added when there is none."""
+    """Return the master's address: `address`, else $NEP_MASTER, else "127.0.0.1:7780".
+
+    The port 7780 is added if there is none. Raises `NepError` for an invalid address.
+    """
     if address is not None and not isinstance(address, str):
         raise WrongTypeError(
             _("an address is a 'str' such as '{example}', not a '{kind}'").format(
@@ -85,7 +88,7 @@ def master_address(address: str | None = None) -> str:
 
 
 def checked_host(host: object) -> str:
-    """`host` itself when it may be connected to or bound: an IPv4 address, a name, or "*".
+    """Validate a host to connect to or bind, and return it: an IPv4 address, a host name, or "*".
 
     Raises `NepError`.
     """
@@ -112,7 +115,7 @@ def checked_host(host: object) -> str:
 
 
 def _is_ipv6(address: str) -> bool:
-    """Whether it is an IPv6 address, perhaps in brackets and with a port."""
+    # Also in brackets and with a port.
     bare = address[1:].partition("]")[0] if address.startswith("[") else address
     try:
         ipaddress.IPv6Address(bare)
@@ -133,35 +136,35 @@ def _is_possible(host: str) -> bool:
 
 
 def is_endpoint(endpoint: str) -> bool:
-    """Whether it is one that a publisher of nep is reached at: tcp://HOST:PORT, or the name beside it."""
+    """Return True for an endpoint of a nep publisher: tcp://HOST:PORT, or its local ipc name."""
     found = _ENDPOINT.fullmatch(endpoint)
     return found is not None and 0 < int(found[1] or found[2]) < 65536
 
 
 def endpoint_of(address: str) -> str:
-    """The ZeroMQ endpoint of an address."""
+    """Return the ZeroMQ endpoint of an address."""
     return f"tcp://{address}"
 
 
 def host_of(address: str) -> str:
-    """The host in an address."""
+    """Return the host of an address."""
     return address.rpartition(":")[0]
 
 
 def is_loopback(address: str) -> bool:
-    """Whether only programs of this computer reach it."""
+    """Return True if only programs of this computer can reach the address."""
     return host_of(address) in {"127.0.0.1", "localhost"}
 
 
 class OwnAddress(NamedTuple):
-    """An IPv4 address of this computer and the name of its interface, such as "wlan0"."""
+    """IPv4 address of this computer and the name of its interface, such as "wlan0"."""
 
     host: str
     interface: str
 
 
 def own_addresses() -> tuple[OwnAddress, ...]:
-    """The addresses under which other computers may reach this one, best first: wire, Wi-Fi, then tunnels."""
+    """Return the addresses at which other computers may reach this one: wired, Wi-Fi, then tunnels."""
     up = {name for name, stats in psutil.net_if_stats().items() if stats.isup}
     found = [
         OwnAddress(each.address, name)
@@ -173,7 +176,7 @@ def own_addresses() -> tuple[OwnAddress, ...]:
 
 
 def has_address(host: str) -> bool:
-    """Whether this computer has that address now."""
+    """Return True if this computer currently has the address."""
     if host == ANY or ipaddress.ip_address(host).is_loopback:
         return True
     addresses = (each.address for group in psutil.net_if_addrs().values() for each in group)
@@ -181,10 +184,10 @@ def has_address(host: str) -> bool:
 
 
 def nearest(endpoints: Sequence[str], master: str) -> str:
-    """The endpoint to connect to for a program that knows its master as `master`; "" when none is in reach.
+    """Return the endpoint to connect to from a program whose master is `master`, or "" if none is reachable.
 
-    Whoever reaches the master by its loopback address is on the master's computer, where loopback endpoints
-    are. For everybody else these are nothing, and "all addresses" of that computer is the master's.
+    A program that reaches its master by loopback is on the master's computer, where loopback endpoints work.
+    Elsewhere they don't, and "all addresses" stands for the master's host.
     """
     if is_loopback(master):
         local = [each for each in endpoints if is_loopback(each.removeprefix("tcp://"))]
@@ -207,16 +210,19 @@ def _is_tunnel(interface: str) -> bool:
     return interface.lower().startswith(_TUNNELS)
 
 
-# ---- the names of computers
+# ---- name resolution
 
 
 def look_up(host: str) -> str:
-    """The first IPv4 address of a name. May wait for long; raises `OSError`, `UnicodeError`."""
+    """Resolve a host name to its first IPv4 address.
+
+    May block for long; raises `OSError` or `UnicodeError`.
+    """
     return str(socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
 
 
 def in_numbers(address: str) -> str:
-    """An address with a number as its host, asked for in the caller's thread. Raises `NepError`."""
+    """Return an address with its host resolved. Blocks; raises `NepError`."""
     host = host_of(address)
     if _is_number(host):
         return address
@@ -232,21 +238,23 @@ def in_numbers(address: str) -> str:
 
 
 class MasterName:
-    """The address behind a master's name, never looked up where sockets are served.
+    """Resolver of the master's host name, in a thread of its own.
 
-    Asking for a name can take half a minute, and libzmq asks again in its own thread with each attempt to
-    connect. So a thread of its own asks, and ends; libzmq gets numbers. It asks again only while the master
-    is not connected.
+    Resolution can take half a minute, and libzmq would resolve again in its I/O thread at each connection
+    attempt. So a short-lived thread resolves the name, only while the master is not connected, and libzmq
+    gets numeric addresses.
 
-    What in `address` is a number already is known at once. `on_change` is told a new `known`, in the thread
-    that asked.
+    Args:
+        address: Address of the master; a numeric one is known at once.
+        on_change: Called with a new `known`, in the resolver thread.
+        look_up: Resolves a host name.
     """
 
     def __init__(
         self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = look_up
     ) -> None:
         self.known = ""
-        """The address with a number as its host; "" as long as nobody knows it."""
+        """Address with a numeric host, or "" while unresolved."""
         self._host, self._port = host_of(address), address.rpartition(":")[2]
         self._on_change = on_change
         self._look_up = look_up
@@ -260,7 +268,10 @@ class MasterName:
             self._answered.set()
 
     def look(self, now: float) -> None:
-        """The master is not connected: ask again, when it is a name and the last time was long ago."""
+        """Start to resolve again, unless the host is numeric or the last attempt was recent.
+
+        Call while disconnected.
+        """
         is_asking = self._thread is not None and self._thread.is_alive()
         if _is_number(self._host) or self._host in _HERE or is_asking or now < self._again_at:
             return
@@ -269,11 +280,11 @@ class MasterName:
         try:
             thread.start()
         except RuntimeError:
-            return  # no thread can be had now
+            return  # no thread can be started now
         self._thread = thread
 
     def wait(self, timeout_s: float | None) -> bool:
-        """Wait until it is known, None without a limit; whether it is."""
+        """Wait until the address is resolved; return False after the time limit (None: no limit)."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._answered.is_set():
             left = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
@@ -288,7 +299,7 @@ class MasterName:
         except (OSError, UnicodeError) as error:
             if not self._is_told:
                 self._is_told = True
-                _logger.info(  # who waits for the master is told by `MasterUnreachable`
+                _logger.info(  # `MasterUnreachable` reports it to callers
                     "nobody knows the computer '%s' of the master (%s); asking again", self._host, error
                 )
             return

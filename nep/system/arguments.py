@@ -1,4 +1,4 @@
-"""Arguments as callers give them: what is not allowed is refused at the call, in a sentence."""
+"""Validation of arguments: invalid values are rejected at the call, with a reason."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ __all__ = [
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 _LETTERS = 200
-"""Of a type; the master takes no more."""
+"""Maximum length of a type's name, as at the master."""
 _LONGEST_S = sys.float_info.max
-"""Whole numbers go on behind it, and no clock can add them: longer is for ever."""
+"""Larger ints can't be added to a clock; they count as no limit."""
 
 
 def text(name: str, value: object) -> str:
-    """`value` itself when it is a text that can be a type's name. Raises `ValueError`."""
+    """Validate the name of a type and return it. Raises `ValueError`."""
     if not isinstance(value, str):
         raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
     if not value:
@@ -52,7 +52,7 @@ def text(name: str, value: object) -> str:
 
 
 def flag(name: str, value: object) -> bool:
-    """`value` itself when it is True or False. Raises `ValueError`."""
+    """Validate a bool and return it. Raises `ValueError`."""
     if not isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give True or False").format(name=name, value=_shown(value))
@@ -61,7 +61,7 @@ def flag(name: str, value: object) -> bool:
 
 
 def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
-    """`value` itself when it is one of the allowed. Raises `ValueError`."""
+    """Validate that a value is one of `allowed` and return it. Raises `ValueError`."""
     if value not in allowed:
         raise ValueError(
             _("{name} is {value}; use {choices}").format(
@@ -72,7 +72,7 @@ def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
 
 
 def at_least(name: str, value: object, least: int) -> int:
-    """`value` itself when it is a whole number and not below `least`. Raises `ValueError`."""
+    """Validate an int of at least `least` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give a whole number from {least} on").format(
@@ -89,7 +89,7 @@ def at_least(name: str, value: object, least: int) -> int:
 
 
 def within(name: str, value: object, least: int, most: int) -> int:
-    """`value` itself when it is a whole number from `least` to `most`. Raises `ValueError`."""
+    """Validate an int from `least` to `most` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give a whole number from {least} to {most}").format(
@@ -106,14 +106,14 @@ def within(name: str, value: object, least: int, most: int) -> int:
 
 
 def seconds(name: str, value: object) -> float | None:
-    """`value` itself when it is a time: 0 or more seconds, or None. Raises `ValueError`."""
+    """Validate a non-negative time limit in seconds, or None, and return it. Raises `ValueError`."""
     if value is None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
         )
-    if not value >= 0.0:  # also what is not a number
+    if not value >= 0.0:  # also NaN
         raise ValueError(
             _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
         )
@@ -121,12 +121,12 @@ def seconds(name: str, value: object) -> float | None:
 
 
 def period(name: str, value: object) -> float:
-    """`value` itself when it is seconds above 0, and finite. Raises `ValueError`."""
+    """Validate a positive, finite period in seconds and return it. Raises `ValueError`."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
         )
-    if not 0.0 < value <= _LONGEST_S:  # also what is not a number
+    if not 0.0 < value <= _LONGEST_S:  # also NaN
         raise ValueError(
             _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
         )
@@ -134,21 +134,21 @@ def period(name: str, value: object) -> float:
 
 
 def limit(name: str, value: object) -> float:
-    """`value` itself when it is a time that ends: 0 or more seconds. Raises `ValueError`."""
+    """Validate a non-negative time limit in seconds and return it. Raises `ValueError`."""
     if value is None:
         raise WrongTypeError(_("{name} is None; give seconds, 0 or more").format(name=name))
     return math.inf if seconds(name, value) is None else cast("float", value)
 
 
 def function(name: str, value: F) -> F:
-    """`value` itself when it can be called. Raises `ValueError`."""
+    """Validate a callable and return it. Raises `ValueError`."""
     if not callable(value):
         raise WrongTypeError(_("{name} is a '{kind}'; give a function").format(name=name, kind=_kind(value)))
     return value
 
 
 def plain_function(name: str, value: F) -> F:
-    """The same, where nobody would await what a coroutine function gives. Raises `ValueError`."""
+    """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
     if is_coroutine_function(function(name, value)):
         raise ValueError(
             _("{name} is a coroutine function, which nobody awaits here; give a plain function").format(
@@ -159,7 +159,7 @@ def plain_function(name: str, value: F) -> F:
 
 
 def is_coroutine_function(call: object) -> bool:
-    """Whether calling it makes a coroutine, as far as can be seen before."""
+    """Return True if calling `call` returns a coroutine, as far as can be determined."""
     while isinstance(call, functools.partial):
         call = call.func
     return inspect.iscoroutinefunction(call) or (
@@ -168,10 +168,10 @@ def is_coroutine_function(call: object) -> bool:
 
 
 def _shown(value: object) -> str:
-    """The value as a sentence may have it: it may be of any size, as others may have sent it."""
+    # Bounded `repr` of an untrusted value.
     try:
         return escaped(shortened(repr(value), _LETTERS))
-    except (RecursionError, ValueError):  # too deep; more digits than Python writes
+    except (RecursionError, ValueError):  # too deep, or too many digits
         return type(value).__name__
 
 

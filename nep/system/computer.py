@@ -1,4 +1,4 @@
-"""Which computer this is: programs with the same answer read the same clock."""
+"""Id of this computer: programs with the same id share a clock."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 @cache
 def computer_id() -> str:
-    """16 hexadecimal digits: the same for programs of one running system, others elsewhere; "" if not known.
+    """Return 16 hexadecimal digits that identify the running system, or "" if unknown.
 
-    Containers of one computer share its clock and have the same; a virtual machine has a clock of its own.
-    The digits are made from what the system calls itself, which stays here.
+    Containers of one computer share its clock and its id; a virtual machine has its own. The digits are a
+    hash, so that the system's identifier is not published.
     """
     name = clock_name()
     return sha256(f"nep clock {name}".encode("utf-8", "replace")).hexdigest()[:16] if name else ""
 
 
 def clock_name() -> str:
-    """What this system calls itself; "" when it does not say."""
+    """Return the identifier of this system, or "" if unknown."""
     ask = _NAMES.get(sys.platform)
     try:
         return "" if ask is None else ask()
@@ -37,12 +37,12 @@ def clock_name() -> str:
 
 
 def _boot_id() -> str:
-    """Linux: another one after each start, the same in all containers."""
+    # Linux: new at each boot, the same in all containers.
     return _BOOT_ID.read_text("ascii").strip()
 
 
 def _boot_session() -> str:
-    """MacOS: another word after each start."""
+    # macOS: new at each boot.
     answer, size = ctypes.create_string_buffer(64), ctypes.c_size_t(64)
     ask = ctypes.CDLL(None).sysctlbyname
     failed = ask(b"kern.bootsessionuuid", answer, ctypes.byref(size), None, ctypes.c_size_t(0))
@@ -50,7 +50,7 @@ def _boot_session() -> str:
 
 
 def _machine_guid() -> str:
-    """Windows: the same after each start. Copies of a machine differ by their names."""
+    # Windows: constant; copies of a machine differ by their names.
     winreg = import_module("winreg")
     with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, r"SOFTWARE\Microsoft\Cryptography") as key:
         return f"{winreg.QueryValueEx(key, 'MachineGuid')[0]} {platform.node()}"

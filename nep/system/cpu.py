@@ -1,4 +1,4 @@
-"""Load: how much of a processor core a program uses, from its own clock of work."""
+"""CPU usage of a process."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ _SHORTEST_S = 0.5
 
 
 class CpuLoad:
-    """The share of one core that a program used between two readings: 1.0 is a whole core, 2.0 are two.
+    """Meter of CPU usage between two readings, in cores: 1.0 is one core, 2.0 are two.
 
-    `used_s` tells the seconds of work so far, None when nobody knows (default: this process's own);
-    `clock` is monotonic, in seconds.
+    Args:
+        used_s: Returns the CPU time so far in seconds, or None if unknown. Default: this process's.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(
@@ -28,7 +29,7 @@ class CpuLoad:
         self._ratio: float | None = None
 
     def ratio(self) -> float | None:
-        """Since the reading before; the same again within half a second. None before there are two."""
+        """Return the usage since the last reading, or None at the first; cached for half a second."""
         now = self._clock()
         if self._before is not None and now - self._before[0] < _SHORTEST_S:
             return self._ratio

@@ -1,4 +1,4 @@
-"""Where a crash of native code was, said by the process itself while it ends."""
+"""Stack traces of native crashes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ __all__ = ["say_where_it_crashes"]
 
 
 def say_where_it_crashes() -> None:
-    """From now on a crash of this process (a wrong address, an abort) tells on stderr where each thread was.
+    """Write the stacks of all threads to stderr when this process crashes (segmentation fault, abort).
 
-    A process without such an output ends as before.
+    Does nothing if stderr is missing.
     """
     with contextlib.suppress(OSError, RuntimeError, ValueError, AttributeError):
         faulthandler.enable()

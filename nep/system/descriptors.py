@@ -1,8 +1,8 @@
-"""Descriptors: whether this process may open more files. libzmq ends the whole program where it may not.
+"""File descriptors: checks before sockets are opened, because libzmq aborts the process without them.
 
-libzmq 4.3 aborts when it cannot have a descriptor for a signal, a poll or the list of this computer's
-addresses. So room is looked for before a socket is made, with some to spare for what comes later by itself:
-connections that are accepted, and whatever else the program opens.
+libzmq 4.3 aborts when it can't get a descriptor for a signaler, a poller or the list of addresses. So the
+room is checked before a socket is created, with a reserve for descriptors opened later: accepted connections,
+and files of the program.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from nep.system.forks import in_child
 __all__ = ["SPARE", "allow_many", "check_room", "has_room", "is_lack", "limit", "opened"]
 
 SPARE = 32
-"""So many descriptors are left to the rest of the program and to connections that come."""
+"""Number of descriptors reserved for accepted connections and the rest of the program."""
 _WANTED = 8192
 _FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
 _LACKS = frozenset({errno.EMFILE, errno.ENFILE})
 
 
 def is_lack(number: int | None) -> bool:
-    """Whether an error of this number says that this process, or this computer, has too many files open."""
+    """Return True if an errno means that the process or the system has too many open files."""
     return number in _LACKS
 
 
 def opened() -> int | None:
-    """How many descriptors this process has; None where the system does not tell."""
+    """Return the number of open descriptors, or None if unknown."""
     try:
-        return len(os.listdir(_FOLDER))  # noqa: PTH208 - half the time: it is done while sockets are made
+        return len(os.listdir(_FOLDER))  # noqa: PTH208 - half the time of pathlib; called for each socket
     except OSError as error:
-        return limit() if is_lack(error.errno) else None  # listing takes one, too
+        return limit() if is_lack(error.errno) else None  # listing the folder needs a descriptor, too
 
 
 def limit() -> int | None:
-    """How many descriptors this process may have; None: no limit."""
+    """Return the limit of open descriptors, or None if unlimited."""
     if sys.platform == "win32":
         return None
     import resource  # noqa: PLC0415 - not on Windows
@@ -49,9 +49,9 @@ def limit() -> int | None:
 
 
 class _Room:
-    """Looks at the highest numbers that a descriptor may have, which are given out last: that takes 5 µs.
+    """Check for free descriptors by polling the highest numbers, which are assigned last: takes 5 µs.
 
-    Only when some of them are taken it counts all, which takes 0.1 ms for each few hundred.
+    Only if some of them are in use all are counted, which takes 0.1 ms per few hundred.
     """
 
     def __init__(self) -> None:
@@ -88,18 +88,18 @@ _room = _Room()
 
 
 def check_room(needed: int, what: str) -> None:
-    """Raises `TooManyFilesError` when `needed` more descriptors, for `what`, would not leave `SPARE`."""
+    """Raise `TooManyFilesError` if `needed` more descriptors for `what` would not leave `SPARE`."""
     _room.check(needed, what)
 
 
 def has_room(needed: int) -> bool:
-    """Whether this process may open so many files more."""
+    """Return True if this process may open this number of files."""
     return _room.has(needed)
 
 
 def _forked() -> None:
-    """In a child: count anew, whoever held the lock."""
-    global _room  # noqa: PLW0603 - there is one a process
+    # In a forked child the lock may be held for ever.
+    global _room  # noqa: PLW0603 - one per process
     _room = _Room()
 
 
@@ -107,9 +107,9 @@ in_child(_forked)
 
 
 def allow_many() -> None:
-    """Let this process open as many files as the system allows, up to 8192. For programs, not for libraries.
+    """Raise the soft limit of open files up to 8192. For programs, not for libraries.
 
-    macOS starts programs with 256, which is a dozen topics of the original NEP.
+    The default of macOS, 256, is enough for a dozen topics of the original NEP.
     """
     if sys.platform == "win32":
         return

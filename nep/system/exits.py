@@ -1,7 +1,7 @@
-"""Exits: what has to end after all nodes are closed, when the interpreter ends.
+"""Exit handlers that run after all nodes are closed.
 
-`atexit` calls first what was registered last, so a library that is loaded after `nep` would be gone before
-the nodes that use it.
+`atexit` calls handlers in reverse order, so a library that is loaded after `nep` would shut down before the
+nodes that use it.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ _calls: list[Callable[[], object]] = []
 
 
 def after_nodes(call: Callable[[], object]) -> None:
-    """Call this when the interpreter ends and all nodes are closed, instead of when `atexit` would."""
+    """Call a function at interpreter exit, after all nodes are closed, instead of by `atexit`."""
     atexit.unregister(call)
     _calls.append(call)
 
 
 def not_after_nodes(call: Callable[[], object]) -> None:
-    """Call it no more."""
+    """Remove a function added by `after_nodes`."""
     _calls[:] = [each for each in _calls if each is not call]
 
 

@@ -1,12 +1,13 @@
-"""Forks: what a child that this process forks is told to forget (Linux, macOS).
+"""Fork support: objects that must be discarded in a forked child process (Linux, macOS).
 
-A child has a copy of the memory, but no other thread than the one that forked: the threads that serve
-sockets are missing, locks stay as they were held, and every descriptor is the parent's too. So nothing that
-serves sockets can be used or even closed in a child: one byte to an inherited descriptor would reach the
-parent's threads. Objects that own such things are watched here, and told when they are in a child.
+A child has a copy of the memory, but only the thread that forked: I/O threads are missing, locks stay held,
+and descriptors are shared with the parent. So nothing with sockets can be used, or even closed, in a child:
+one byte to an inherited descriptor would wake the parent's threads. Owners of such objects are registered
+here and notified in a child.
 
-A child that lives on would hold its parent's ports and connections: nobody would see that the parent closes
-them. libzmq does not tell which descriptors are its own, so they are known by their addresses, and closed.
+A child that lives on would keep the parent's ports and connections open, and peers would not notice that the
+parent closes them. libzmq doesn't reveal its descriptors, so they are identified by their addresses, and
+closed.
 """
 
 from __future__ import annotations
@@ -24,34 +25,34 @@ __all__ = ["Inherited", "give_up", "in_child", "watch"]
 
 
 class Inherited(Protocol):
-    """Something that a forked child inherits and cannot use."""
+    """Object that a forked child inherits and can't use."""
 
     def forked(self) -> None:
-        """This is a child now: be closed, without taking a lock or touching a socket of ZeroMQ's."""
+        """Mark the object as closed in a child, without taking a lock or touching a ZeroMQ socket."""
 
 
 _watched: WeakSet[Inherited] = WeakSet()
 _calls: list[Callable[[], None]] = []
 _given_up: set[str] = set()
 _FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
-_EVERYWHERE = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound here
+_EVERYWHERE = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
 def watch(owner: Inherited) -> None:
-    """Tell `owner` in every child; it is not kept alive."""
+    """Register an object whose `forked` is called in every child. Held by a weak reference."""
     _watched.add(owner)
 
 
 def give_up(*endpoints: str) -> None:
-    """For `forked`: the child closes its sockets that are bound there, were accepted there, or lead there.
+    """Make a child close its sockets that are bound to, accepted at or connected to these endpoints.
 
-    Endpoints are ZeroMQ's, `tcp://HOST:PORT` with an address of IPv4 or `ipc://@NAME`; others are left alone.
+    Call it in `forked`. Endpoints are `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
     """
     _given_up.update(endpoints)
 
 
 def in_child(call: Callable[[], None]) -> None:
-    """Call this in every child, after all owners were told. For modules."""
+    """Call a function in every child after all owners were notified. For modules."""
     _calls.append(call)
 
 
@@ -59,7 +60,7 @@ def _tell() -> None:
     owners = list(_watched)
     _watched.clear()
     for tell in (*(owner.forked for owner in owners), *_calls):
-        with contextlib.suppress(Exception):  # one that fails must not leave the others as they were
+        with contextlib.suppress(Exception):  # a failure must not prevent the others
             tell()
     if _given_up:
         with contextlib.suppress(OSError):
@@ -68,7 +69,7 @@ def _tell() -> None:
 
 
 def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
-    """Addresses as the system writes them, and ports that belong to every address of this computer."""
+    # Addresses as the socket module represents them, and ports bound to all addresses.
     exact: set[object] = set()
     ports: set[object] = set()
     for endpoint in endpoints:
@@ -84,8 +85,8 @@ def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
 
 
 def _close_sockets(exact: set[object], ports: set[object]) -> None:
-    # With a default time-out (rospy sets one) Python would make each socket that is looked at non-blocking,
-    # and that is shared with the parent: who waits there in `accept` would get an error.
+    # With a default timeout (rospy sets one) Python makes each inspected socket non-blocking, which the
+    # parent shares: its blocking `accept` would fail.
     usual = socket.getdefaulttimeout()
     socket.setdefaulttimeout(None)
     try:
@@ -95,8 +96,8 @@ def _close_sockets(exact: set[object], ports: set[object]) -> None:
 
 
 def _close_those_at(exact: set[object], ports: set[object]) -> None:
-    for name in os.listdir(_FOLDER):  # noqa: PTH208 - numbers
-        with contextlib.suppress(OSError, ValueError):  # the list's own descriptor is gone by now
+    for name in os.listdir(_FOLDER):  # noqa: PTH208 - plain numbers
+        with contextlib.suppress(OSError, ValueError):  # the listing's own descriptor is closed already
             number = int(name)
             if stat.S_ISSOCK(os.fstat(number).st_mode) and any(
                 address in exact or (isinstance(address, tuple) and address[1] in ports)
@@ -106,7 +107,6 @@ def _close_those_at(exact: set[object], ports: set[object]) -> None:
 
 
 def _ends_of(number: int) -> list[object]:
-    """The addresses of both ends of a socket, as far as it has them."""
     ends: list[object] = []
     known = socket.socket(fileno=number)
     try:

@@ -1,9 +1,9 @@
-"""Modules that are imported when they are first used: they cost nothing before the window shows.
+"""Modules that are imported at their first use, to speed up the start.
 
 if TYPE_CHECKING:
-import psutil
+    import psutil
 else:
-psutil = lazy_module("psutil")
+    psutil = lazy_module("psutil")
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ __all__ = ["lazy_module"]
 
 
 class LazyModule:
-    """Stands for a module, and imports it when something of it is asked for. Any thread may ask."""
+    """Proxy of a module that imports it at the first access to an attribute. Thread-safe."""
 
     __slots__ = ("_name",)
 
@@ -29,5 +29,5 @@ class LazyModule:
 
 
 def lazy_module(name: str) -> LazyModule:
-    """A stand-in for the module of this name. What the import raises is raised where it is first used."""
+    """Return a proxy of a module. Import errors are raised at its first use."""
     return LazyModule(name)

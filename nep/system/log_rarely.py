@@ -1,4 +1,4 @@
-"""Rarely: the one rule for logging what happens again and again: the first, the tenth, the hundredth, ..."""
+"""Log repeated events at increasing intervals: the 1st, 10th, 100th and so on."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _TOLD = frozenset(10**n for n in range(20))
 
 
 def is_logged(count: int) -> bool:
-    """Whether to log it, when it is the `count`th time."""
+    """Return True if the `count`-th occurrence is logged."""
     return count in _TOLD
 
 
@@ -24,15 +24,15 @@ class SurvivedErrors:
     """
 
     def __init__(self, logger: logging.Logger, what: str) -> None:
-        """`what` begins the log record: "`what` failed"."""
+        """Log "`what` failed" for exceptions."""
         self.count = 0
         self._logger, self._what = logger, what
 
     def add(self, error: BaseException) -> None:
-        """Count an exception, and log it if it is its turn."""
+        """Count an exception, and log it at increasing intervals."""
         self.count += 1
         if is_logged(self.count):
-            with suppress(Exception):  # also without memory or stack for a record
+            with suppress(Exception):  # logging may fail without memory or stack
                 self._logger.error("%s failed (%d so far)", self._what, self.count, exc_info=error)
 
     def __enter__(self) -> None:

@@ -1,4 +1,4 @@
-"""Plug-ins: one module binds one description, and adding one is adding one file."""
+"""Plug-ins: a module binds one description, so that adding a plug-in is adding a file."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _logger = logging.getLogger("nep.system.plugins")
 
 
 class Named(Protocol):
-    """What can be a plug-in: something with a name."""
+    """Plug-in: an object with a name."""
 
     @property
     def name(self) -> str:
-        """The name by which it is chosen."""
+        """Name of the plug-in."""
 
 
 T = TypeVar("T", bound=Named)
 
 
 def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """As `discover`, without entry points: to find these, all that is installed is looked through."""
+    """Find plug-ins as `discover` does, without entry points, whose search reads all installed packages."""
     found: dict[str, T] = {}
     home = importlib.import_module(package)
     for info in pkgutil.iter_modules(home.__path__, f"{package}."):
@@ -49,11 +49,14 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
 
 
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Name → plug-in: what the modules of `package` bind as `attribute`, and entry points of that group.
+    """Return plug-ins by name: objects that modules of `package` bind as `attribute`, and entry points.
 
-    Modules that do not bind it are no plug-ins. A third party's entry point that fails is logged and left
-    out; it cannot replace one of ours. Raises `PluginsMissingError` when the package has none (a frozen build
-    that forgot it), `TypeError` when a module binds something else.
+    Modules without the attribute are ignored. Entry points of third parties that fail are logged and ignored;
+    they can't replace our own plug-ins.
+
+    Raises:
+        PluginsMissingError: The package has no plug-ins (left out of a frozen program).
+        TypeError: A module binds an object of another type.
     """
     found = dict(discover_own(package, attribute, kind))
     for point in metadata.entry_points(group=package):

@@ -1,4 +1,4 @@
-"""Putting a new file in the place of an old one, also while another program has the old one open."""
+"""Replace a file atomically, also while another program has it open."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["replace_file"]
 _TRIES = 20
 _PAUSE_S = 0.05
 _SHARING = frozenset({5, 32, 33})
-"""Windows' words for "somebody has it open": access denied, sharing violation, lock violation."""
+"""Windows errors of an open file: access denied, sharing violation, lock violation."""
 
 
 def replace_file(
@@ -24,10 +24,10 @@ def replace_file(
     replace: Callable[[Path, Path], object] = os.replace,
     pause: Callable[[float], object] | None = None,
 ) -> None:
-    """Let `new` be `old` from now on, at once and whole. Raises `OSError`; then `old` is untouched.
+    """Rename `new` to `old` atomically. Raises `OSError`; `old` is unchanged then.
 
-    Windows refuses while another program (a virus scanner, a synchronised folder, an editor) has the old file
-    open: it is tried again for a second. `replace` and `pause` are for tests.
+    Windows refuses while another program (virus scanner, synchronized folder, editor) has `old` open: retries
+    for a second. `replace` and `pause` are for tests.
     """
     wait = pause or threading.Event().wait
     for tried in range(1, _TRIES + 1):

@@ -1,8 +1,8 @@
-"""The standard streams of a command: every letter can be written, and an output that is gone is no crash.
+"""Standard streams of a command: encode every character, and survive a closed output.
 
-A pipe of Windows is cp1252 or cp437, one of a bare server ASCII: none of them has all the letters that
-programs and people use. A reader may leave (`| head -1`), a disk may be full, a stream may be closed before
-the program starts.
+A pipe on Windows is cp1252 or cp437, on a minimal server ASCII; none has all characters that programs and
+people use. A reader may exit (`| head -1`), a disk may be full, a stream may be closed before the program
+starts.
 """
 
 from __future__ import annotations
@@ -24,17 +24,16 @@ _PLAIN = {
 }  # fmt: skip
 _HANDLER = "nep.protocol.encoding"
 _GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
-"""What writing into a pipe gives that nobody reads any more; Windows calls it an invalid argument."""
+"""Errors of writing to a pipe without a reader; Windows reports an invalid argument."""
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
-"""What writing onto a disk gives that has no room, or is broken, and into a stream that was closed before."""
+"""Errors of writing to a full or failing disk, or to a stream closed before the start."""
 
 
 def prepare_streams() -> None:
-    """Let the standard streams take every letter; what their encoding does not have becomes a plainer one.
+    """Configure the standard streams to replace characters that their encoding lacks by similar ones.
 
-    The descriptor of a stream that was closed before the program started must not be given to a socket, which
-    would then be written to: the null device takes it. Reading and writing what is closed fails, as it does
-    for every program; what is only said beside the results goes nowhere.
+    Streams closed before the program started are opened to the null device, so that their descriptors are not
+    assigned to sockets. Reading or writing them fails as usual; messages to a closed stderr are discarded.
     """
     codecs.register_error(_HANDLER, _plainer)
     ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
@@ -42,25 +41,25 @@ def prepare_streams() -> None:
         stream = getattr(sys, name)
         if stream is None:
             mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, way)
-            setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - lives on
+            setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - stays open
         elif name != "stdin" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_HANDLER)
 
 
 def buffer_output() -> None:
-    """Give the standard output a buffer where it has none (`python -u`, PYTHONUNBUFFERED in a container).
+    """Add a buffer to an unbuffered standard output (`python -u`, PYTHONUNBUFFERED in a container).
 
-    What cannot be written is there still, then, when `output_problem` asks why. For programs that flush.
+    Unwritten text is then still available for `output_problem`. For programs that flush.
     """
     stream = sys.stdout
     if isinstance(stream, TextIOWrapper) and isinstance(stream.buffer, RawIOBase):
-        sys.stdout = open(  # noqa: SIM115 - lives on
+        sys.stdout = open(  # noqa: SIM115 - stays open
             stream.fileno(), "w", encoding=stream.encoding, errors=stream.errors, closefd=False
         )
 
 
 def words_given() -> list[str]:
-    """The words of the command line, as UTF-8 also where the system is set to ASCII ("C")."""
+    """Return the command-line arguments, decoded as UTF-8 also in the locale "C"."""
     if os.name != "posix":
         return sys.argv[1:]
     escape = "surrogateescape"
@@ -75,22 +74,22 @@ def _plainer(error: UnicodeError) -> tuple[str, int]:
 
 
 def tell(text: str) -> None:
-    """Write a line beside the results, on the error stream; without one that takes it, nothing happens."""
+    """Write a line to stderr; ignore errors."""
     with suppress(OSError, ValueError):
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - it is a command's
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - output of a command
 
 
 def output_problem(raised: OSError | None = None) -> str | None:
-    """Why the standard output takes nothing more; "" when its reader has left, None when it does take it.
+    """Return why stdout can't be written: "" if its reader has exited, None if it can.
 
-    Asked after an OSError (`raised`): what could not be written is still there, so that writing it fails
-    again. Only what is larger than the buffer is dropped, and the error alone tells of it.
+    Call it after an OSError (`raised`): unwritten text is still buffered, so that flushing fails again. Only
+    text larger than the buffer is lost; then `raised` is the only evidence.
     """
     try:
         sys.stdout.flush()
     except OSError as error:
         return _words_of(error)
-    except ValueError:  # it was closed
+    except ValueError:  # closed
         return ""
     if raised is not None and raised.filename is None and raised.errno in _GONE | _FULL:
         return _words_of(raised)
@@ -104,7 +103,7 @@ def _words_of(error: OSError) -> str:
 
 
 def close_streams() -> None:
-    """Write what is left, or drop it where that fails: the interpreter would complain at its end."""
+    """Flush the standard streams; discard text that can't be written, which would fail at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -1,8 +1,7 @@
-"""Terminal: writes to a terminal, pipe or file from a thread of its own, so that nobody else waits for it.
+"""Terminal output from a thread of its own, so that a blocked terminal doesn't block the program.
 
-A terminal takes nothing while somebody marks text in it (Windows) or has pressed Ctrl+S, and a pipe while
-nobody reads it. A program that serves others must not stand still as long: what does not fit is dropped,
-counted, and told when there is room again.
+A terminal blocks while text is selected (Windows) or after Ctrl+S, a pipe while its reader is busy. Excess
+text is dropped and counted, and the count is written when there is room again.
 """
 
 from __future__ import annotations
@@ -24,15 +23,16 @@ if TYPE_CHECKING:
 __all__ = ["LineFormatter", "Terminal", "log_to"]
 
 MAX_CHARACTERS = 256 * 1024
-"""So much text waits for the terminal."""
+"""Maximum size of queued text in characters."""
 CLOSE_S = 0.5
 _AGAIN_S = 0.05
 
 
 class Terminal(io.TextIOBase):
-    """A text stream in front of `stream`, which may be None (a program without a window). A context manager.
+    """Text stream with a writer thread in front of `stream`. Usable as a context manager.
 
-    `write` never waits and never raises, in any thread. The thread begins with the first text.
+    `stream` may be None (a program without a console). `write` never blocks or raises, in any thread. The
+    thread starts with the first text.
     """
 
     def __init__(self, stream: TextIO | None, max_characters: int = MAX_CHARACTERS) -> None:
@@ -51,19 +51,19 @@ class Terminal(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """The stream's."""
+        """Encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
     def writable(self) -> bool:
-        """See `io.TextIOBase`."""
+        """Return True."""
         return True
 
     def isatty(self) -> bool:
-        """Whether a person reads it."""
+        """Return True if the stream is an interactive terminal."""
         return self._stream is not None and self._stream.isatty()
 
     def write(self, text: str) -> int:
-        """Hand `text` over; dropped when too much waits, or when the stream takes nothing any more."""
+        """Queue text; drop it if the queue is full or the stream has failed."""
         with self._changed:
             if self._is_over or self._is_closing or not text:
                 return len(text)
@@ -78,15 +78,15 @@ class Terminal(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Nothing: whoever flushes must not wait either."""
+        """Do nothing: flushing must not block."""
 
     def drain(self, timeout_s: float = CLOSE_S) -> bool:
-        """Wait until all is written, for what must be read before the program ends; whether it is."""
+        """Wait until everything is written; return False after the time limit."""
         with self._changed:
             return self._changed.wait_for(lambda: not self._waiting and not self._is_writing, timeout_s)
 
     def close(self, timeout_s: float = CLOSE_S) -> None:
-        """Give what waits `timeout_s` to be written, then leave it. May be called twice."""
+        """Wait at most `timeout_s` seconds for queued text, then stop. Idempotent."""
         with self._changed:
             self._is_closing = True
             self._changed.notify_all()
@@ -101,7 +101,7 @@ class Terminal(io.TextIOBase):
         self.close()
 
     def forked(self) -> None:
-        """In a child: the thread is not there; what waits is its parent's to write. `nep.system.forks`."""
+        """Reset in a forked child process: queued text is the parent's. See `nep.system.forks`."""
         self._changed = threading.Condition()
         self._thread = None
         self._waiting.clear()
@@ -112,17 +112,17 @@ class Terminal(io.TextIOBase):
         thread = threading.Thread(target=self._run, name="nep-terminal", daemon=True)
         try:
             thread.start()
-        except RuntimeError:  # the interpreter is ending (from 3.12 on), or no thread can be had now
+        except RuntimeError:  # the interpreter is shutting down (Python 3.12+), or no thread can be started
             return
         self._thread = thread
 
-    # ---- in the thread
+    # ---- thread
 
     def _run(self) -> None:
         while (text := self._next()) is not None:
             try:
                 self._put(text)
-            except (OSError, ValueError):  # nobody reads it any more, or it was closed: nowhere to say so
+            except (OSError, ValueError):  # the reader is gone, or the stream is closed
                 with self._changed:
                     self._is_over = True
                     self._is_writing = False
@@ -131,7 +131,7 @@ class Terminal(io.TextIOBase):
                 return
 
     def _next(self) -> str | None:
-        """What is to be written now; None at the end. Waits."""
+        # Blocks until there is text; None at the end.
         with self._changed:
             self._is_writing = False
             self._changed.notify_all()
@@ -153,14 +153,11 @@ class Terminal(io.TextIOBase):
         return text
 
     def _put(self, text: str) -> None:
-        """Write all of it; takes as long as the stream does.
-
-        Past the stream's own buffer: the interpreter wants its lock when it ends, and would abort while this
-        thread holds it.
-        """
+        # Bypasses the stream's buffer: at exit the interpreter needs its lock, and would abort while this
+        # thread holds it.
         stream = self._stream
         buffer = getattr(stream, "buffer", None)
-        raw = getattr(buffer, "raw", buffer)  # there is none between with `python -u`
+        raw = getattr(buffer, "raw", buffer)  # `python -u` has no buffer
         if raw is None:
             if stream is not None:
                 stream.write(text)
@@ -172,25 +169,22 @@ class Terminal(io.TextIOBase):
         never = threading.Event()
         while data:
             written = raw.write(data)
-            if written is None:  # somebody made it non-blocking, and it is full
+            if written is None:  # a non-blocking stream that is full
                 never.wait(_AGAIN_S)
             else:
                 data = data[written:]
 
 
 class LineFormatter(logging.Formatter):
-    """Formats a record so that nothing in it moves the cursor or clears the screen."""
+    """Formatter that escapes control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """See `logging.Formatter`."""
+        """Return the formatted record with control characters escaped."""
         return escaped(super().format(record), lines=True)
 
 
 def log_to(terminal: Terminal, level: int) -> logging.Handler:
-    """Let this program log to `terminal` from `level` on, unless it has said already where it logs to.
-
-    The handler, for who takes it away again.
-    """
+    """Log to `terminal` from `level` on, unless logging is already configured. Return the handler."""
     handler = logging.StreamHandler(terminal)
     handler.setFormatter(LineFormatter("%(name)s: %(message)s"))
     logging.basicConfig(level=level, handlers=[handler])

@@ -18,14 +18,14 @@ _HAS_EVENTS = sys.platform == "linux" and hasattr(os, "eventfd")
 
 
 class Waker:
-    """A descriptor that becomes readable when another thread calls `wake`. Any thread may wake; one waits.
+    """File descriptor that becomes readable when another thread calls `wake`. Thread-safe; one thread waits.
 
-    Linux has descriptors for this; elsewhere it is two connected sockets, because only sockets can be polled
-    on every system. Raises `TooManyFilesError`.
+    An eventfd on Linux; elsewhere a socket pair, because only sockets can be polled on every system. Raises
+    `TooManyFilesError`.
     """
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()  # a descriptor that was closed may be somebody else's file already
+        self._lock = threading.RLock()  # the number of a closed descriptor may already belong to another file
         self._event = -1
         self._ends: tuple[socket.socket, ...] = ()
         try:
@@ -40,19 +40,19 @@ class Waker:
         for end in self._ends:
             end.setblocking(False)
         self.fd = self._ends[0].fileno() if self._ends else self._event
-        """What to poll for reading."""
+        """File descriptor to poll for reading."""
         watch(self)
 
     def wake(self) -> None:
-        """Make `fd` readable. Never blocks; many wakes before a `clear` are one."""
-        with self._lock, contextlib.suppress(OSError):  # full: it is readable already
+        """Make `fd` readable. Never blocks; several wakes before a `clear` count as one."""
+        with self._lock, contextlib.suppress(OSError):  # full: already readable
             if self._event >= 0:
                 os.eventfd_write(self._event, 1)
             elif self._ends:
                 self._ends[1].send(b"\0")
 
     def clear(self) -> None:
-        """Make `fd` unreadable again. To be called by the thread that waits, before it looks for work."""
+        """Make `fd` unreadable. Called by the waiting thread before it checks for work."""
         with self._lock, contextlib.suppress(OSError):
             if self._event >= 0:
                 os.eventfd_read(self._event)
@@ -61,12 +61,12 @@ class Waker:
                     pass
 
     def close(self) -> None:
-        """Give the descriptors back. May be called twice."""
+        """Close the descriptors. Idempotent."""
         with self._lock:
             self._close()
 
     def forked(self) -> None:
-        """In a child: its descriptors are the parent's, too; closing them here does nothing there."""
+        """Close the inherited descriptors in a forked child process, which doesn't affect the parent."""
         self._lock = threading.RLock()
         self._close()
 
