@@ -1,7 +1,7 @@
-"""Bookmarks of a recording: places in its time with a name, to find them again.
+"""Bookmarks of a recording: named moments.
 
-Those that were made while it was recorded are its notes, and stand in the file. Those that a person makes
-later are in a small file beside it: the recording itself is never changed.
+Bookmarks made while recording are notes in the file itself. Later ones are in a JSON file beside it: the
+recording is never changed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MOST_LETTERS = 200
 
 @dataclass(frozen=True)
 class Bookmark:
-    """A place: ns since 1970, and its name, which may be "". `is_note`: it stands in the recording itself."""
+    """Bookmark: time in ns since 1970, and name (may be ""). `is_note`: it is part of the recording."""
 
     at_ns: int
     name: str
@@ -37,13 +37,13 @@ class Bookmark:
 
 
 class Bookmarks:
-    """Those of one recording, by their times. Used by one thread; what is changed is on the disk at once."""
+    """Bookmarks of one recording in order of time. Not thread-safe. Changes are saved at once."""
 
     def __init__(self, recording: Recording) -> None:
-        """Read them. A damaged file has none, and is kept under another name as soon as one is made."""
+        """Read the bookmarks. A damaged file counts as empty and is renamed at the next change."""
         self._recording = recording
         self.path = recording.path.with_name(f"{recording.path.name}.bookmarks.json")
-        """Where those are that are made here."""
+        """File of the bookmarks that are not notes."""
         self._is_damaged = False
         notes: list[Bookmark] = []
         for at_ns, value in recording.said("notes"):
@@ -59,23 +59,23 @@ class Bookmarks:
 
     @property
     def all(self) -> Sequence[Bookmark]:
-        """All of them, the earliest first."""
+        """All bookmarks, earliest first."""
         return self._all
 
     def before(self, at_ns: int) -> Bookmark | None:
-        """The last one before a time."""
+        """Return the last bookmark before a time, or None."""
         place = bisect_left(self._all, at_ns, key=_at_ns)
         return self._all[place - 1] if place else None
 
     def after(self, at_ns: int) -> Bookmark | None:
-        """The first one after a time."""
+        """Return the first bookmark after a time, or None."""
         place = bisect_right(self._all, at_ns, key=_at_ns)
         return self._all[place] if place < len(self._all) else None
 
     # ---- changing them
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
-        """Make one, within the recording's time. Raises `RecordingError` when it cannot be kept."""
+        """Add a bookmark within the recording's time. Raises `RecordingError` if it can't be saved."""
         if len(self._made) >= MOST_BOOKMARKS:
             reason = _("it has {most} bookmarks, and there is no room for more").format(most=MOST_BOOKMARKS)
             raise RecordingError(str(self._recording.path), reason)
@@ -85,7 +85,7 @@ class Bookmarks:
         return made
 
     def rename(self, bookmark: Bookmark, name: str) -> Bookmark:
-        """Give it another name. Raises `ValueError` for a note, and for one that is gone; as `add` does."""
+        """Rename a bookmark. Raises `ValueError` for a note or an unknown bookmark, else as `add` does."""
         new = replace(bookmark, name=name[:_MOST_LETTERS])
         made = list(self._made)
         made[self._place(bookmark)] = new
@@ -93,7 +93,7 @@ class Bookmarks:
         return new
 
     def remove(self, bookmark: Bookmark) -> None:
-        """Take it away. Raises as `rename` does."""
+        """Remove a bookmark. Raises as `rename` does."""
         made = list(self._made)
         del made[self._place(bookmark)]
         self._keep(made)
@@ -122,7 +122,7 @@ class Bookmarks:
         unfinished = self.path.with_name(f"{self.path.name}.part")
         try:
             text = orjson.dumps(plain, option=orjson.OPT_INDENT_2)
-        except TypeError as error:  # half a letter, which no file can hold
+        except TypeError as error:  # a lone surrogate
             raise RecordingError(str(self.path), _("the name has letters that are none")) from error
         try:
             if self._is_damaged:
@@ -142,7 +142,7 @@ class Bookmarks:
 
 
 def _bookmark(plain: object) -> Bookmark:
-    """Raises `ValueError` for what is none."""
+    # Raises `ValueError`.
     at_ns = plain.get("at_ns") if isinstance(plain, dict) else None
     name = plain.get("name") if isinstance(plain, dict) else None
     if type(at_ns) is not int or not 0 <= at_ns < 2**64 or not isinstance(name, str):

@@ -1,13 +1,13 @@
-"""A recorder in a process of its own: `python -m nep.recordings.child`.
+"""Recorder process: `python -m nep.recordings.child`.
 
-Orders come as lines of JSON on the standard input, and what happens is told as lines on the standard output:
+Commands are lines of JSON on standard input, events are lines on standard output:
 
     {"op": "record", "path": "a.mcap", "topics": ["/camera", "/arm/*"], "left_out": [], "note": "",
-     "seconds": 1800, "size_bytes": 8000000000}              ends by itself so; without them when it is told
-    {"op": "note", "text": "it fell"}                        a bookmark in the recording
+     "seconds": 1800, "size_bytes": 8000000000}              limits are optional
+    {"op": "note", "text": "it fell"}                        bookmark in the recording
     {"op": "stop"}
-    {"op": "say", "role": "runs", "value": {...}}            what happens, into the recording and the ring;
-                                                             with "to": "ring" or "recording" into that alone
+    {"op": "say", "role": "runs", "value": {...}}            event for the recording and the ring;
+                                                             with "to": "ring" or "recording" for one of them
     {"op": "ring", "folder": "ring", "seconds": 60, "size_bytes": 2000000000, "topics": [], "left_out": []}
     {"op": "keep", "path": "b.mcap", "seconds": 60, "note": "it fell"}
     {"op": "end_ring"}
@@ -21,8 +21,8 @@ Orders come as lines of JSON on the standard input, and what happens is told as 
                                              once a second
     {"event": "problem", "op": ..., "sentence": ..., "path": ...}
 
-What ends by itself, such as on a full disk, is told in the same way: its status has the "problem". When its
-input ends, so does it: what was recorded is finished first.
+A recording that stops by itself, such as on a full disk, reports the same events; its status has the
+"problem". At the end of its input the process finishes the recording and exits.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ FIGURES_S = 1.0
 _LONGEST_LINE = 1_000_000
 _MOST_SECONDS = 1e9
 SAID = ("runs", "alarms")
-"""What it may be told to write down; all else it says by itself."""
+"""Roles accepted by "say"; the recorder itself writes the others."""
 _MOST_KEEPING = 4
-"""Copies of the ring that are made at the same time: each reads and writes as fast as the disk can."""
+"""Maximum number of concurrent copies of the ring: each reads and writes at the speed of the disk."""
 Tell = Callable[[Mapping[str, object]], object]
 
 
 @dataclass(frozen=True)
 class _OneRecording:
-    """What is being recorded; it ends at the time `until` (of the clock) and with `most_bytes`, if any."""
+    """Current recording; it stops at the time `until` (of the clock) or at `most_bytes`, if set."""
 
     writer: RecordingWriter
     recorder: Recorder
@@ -73,7 +73,7 @@ class _OneRecording:
     most_bytes: int | None
 
     def limit(self, now: float) -> str:
-        """Which limit is reached: "time", "size", or ""."""
+        # "time", "size" or "".
         if self.until is not None and now >= self.until:
             return "time"
         is_full = self.most_bytes is not None and self.writer.status.size_bytes >= self.most_bytes
@@ -81,7 +81,7 @@ class _OneRecording:
 
 
 class RecorderService:
-    """Carries out orders; `tell` is given what happens, from any thread, one at a time."""
+    """Executor of commands. `tell` is called with events, from any thread, one at a time."""
 
     def __init__(
         self,
@@ -91,12 +91,12 @@ class RecorderService:
         figures_s: float = FIGURES_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """The node stays the caller's."""
+        """The node remains open."""
         self._clock = clock
         self._node, self._tell_one = node, tell
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
-        """Held while something begins or ends."""
+        """Held while a recording or the ring starts or stops."""
         self._recording: _OneRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
         self._keeping: list[threading.Thread] = []
@@ -116,7 +116,7 @@ class RecorderService:
         self._thread.start()
 
     def order(self, line: bytes) -> None:
-        """Carry out one line. What goes wrong is told, never raised."""
+        """Execute one line. Errors are reported as events, not raised."""
         try:
             order = orjson.loads(line)
         except orjson.JSONDecodeError:
@@ -140,7 +140,7 @@ class RecorderService:
             self._problem(op, words, path)
 
     def close(self) -> None:
-        """End all of it, and finish what was recorded. What goes wrong is told, never raised."""
+        """Stop everything and finish the recording. Errors are reported as events, not raised."""
         self._is_ending = True
         self._look_now.set()
         self._thread.join()
@@ -151,7 +151,7 @@ class RecorderService:
             self._guarded("end_ring", "", lambda: self._end_ring({}))
 
     def tell(self, event: str, **content: object) -> None:
-        """Tell what happens."""
+        """Report an event."""
         with self._tell_lock:
             self._tell_one({"event": event, **content})
 
@@ -159,10 +159,10 @@ class RecorderService:
         self.tell("problem", op=op, sentence=sentence, path=path)
 
     def _has_failed(self, _reason: str) -> None:
-        """Told by a thread that writes, which cannot wait for its own end."""
+        # Called by a writer thread, which can't join itself.
         self._look_now.set()
 
-    # ---- orders
+    # ---- commands
 
     def _record(self, order: Mapping[str, Any]) -> None:
         path = _text(order, "path")
@@ -183,11 +183,11 @@ class RecorderService:
             recorder = Recorder(self._node, writer, selection)
         except BaseException:
             writer.close()
-            with suppress(OSError):  # it has nothing
+            with suppress(OSError):  # the file is empty
                 Path(path).unlink()
             raise
         self._recording = _OneRecording(writer, recorder, path, until, most_bytes)
-        self._look_now.set()  # it may end sooner than the next figures come
+        self._look_now.set()  # the limit may be reached before the next figures
         self.tell("recording", path=path)
 
     def _stop(self, _order: Mapping[str, Any], limit: str = "") -> None:
@@ -202,7 +202,7 @@ class RecorderService:
             self._recording.writer.say("notes", {"text": _text(order, "text")})
 
     def _say(self, order: Mapping[str, Any]) -> None:
-        """Something that happens now; where nothing is recorded nobody wants to know it."""
+        # Discarded while nothing is recorded.
         role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
         if role not in SAID or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
             raise ValueError(role)
@@ -231,7 +231,7 @@ class RecorderService:
         self.tell("ring")
 
     def _keep(self, order: Mapping[str, Any]) -> None:
-        """In a thread of its own: orders go on meanwhile."""
+        # Copies in a thread, so that commands are still served.
         path = _text(order, "path")
         if self._ring is None:
             self._problem("keep", _("the flight recorder is off"), path)
@@ -282,14 +282,14 @@ class RecorderService:
                 )
 
     def _wait_s(self) -> float:
-        """Until the next figures, or the end of a recording when that is sooner."""
+        # Until the next figures, or the end of the recording if that is earlier.
         recording = self._recording
         if recording is None or recording.until is None:
             return self._figures_s
         return max(0.0, min(self._figures_s, recording.until - self._clock()))
 
     def _end_what_is_over(self) -> None:
-        """What has failed, and what has reached its limit."""
+        # Stops what has failed or reached its limit.
         with self._lock:
             recording = self._recording
             if recording is not None:
@@ -301,7 +301,7 @@ class RecorderService:
 
 
 def _free_bytes(path: str) -> int | None:
-    """What is free on the disk of a file; None when that does not tell."""
+    # None if unknown.
     with suppress(OSError):
         return shutil.disk_usage(Path(path).parent).free
     return None
@@ -312,7 +312,7 @@ def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
 
 
 def _positive(seconds: object) -> float:
-    """Raises `ValueError` for what is no length of time."""
+    # Raises `ValueError`.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MOST_SECONDS:
         raise ValueError(_("{given} is no time").format(given=seconds))
     return float(seconds)
@@ -337,7 +337,7 @@ def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str
 
 
 def _lines(stream: IO[bytes]) -> Iterator[bytes]:
-    """Lines; one that is longer than an order can be comes as an empty one, which is none."""
+    # A line longer than any command is replaced by an empty one, which is not a command.
     is_inside = False
     while line := stream.readline(_LONGEST_LINE):
         is_end = line.endswith(b"\n")
@@ -347,7 +347,7 @@ def _lines(stream: IO[bytes]) -> Iterator[bytes]:
 
 
 def _end_well_when_told() -> None:
-    """Let SIGTERM and SIGHUP end the process as Ctrl+C does, which finishes what is being recorded."""
+    # SIGTERM and SIGHUP end the process as Ctrl+C does, so that the recording is finished.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
@@ -355,7 +355,7 @@ def _end_well_when_told() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Carry out what comes on the standard input until it ends."""
+    """Execute commands from standard input until it ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.child")
     parser.add_argument("--master", default=None)
     parser.add_argument("--transport", default="zeromq")
@@ -366,7 +366,7 @@ def main(arguments: list[str] | None = None) -> None:
         try:
             out.write(orjson.dumps(event) + b"\n")
             out.flush()
-        except OSError:  # nobody listens any more: the input ends, too
+        except OSError:  # the parent process has ended, and the input ends, too
             return
 
     node = Node(f"nep-recorder-{os.getpid()}", given.transport, master=given.master, wait_s=None)

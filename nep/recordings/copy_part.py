@@ -1,7 +1,7 @@
-"""A part of a recording as a smaller one: channels, bytes, numbers and times as they are in the original.
+"""Copy a part of a recording with the original channels, bytes, sequence numbers and times.
 
-Recordings of other programs keep their encodings and schemas, and get no counts that nobody made. In those of
-nep, what was lost or came late within the part is counted anew.
+Recordings of other programs keep their encodings and schemas and get no counts. In nep's own recordings, lost
+and late messages are counted again within the part.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ def copy_part(
     topics: Collection[str],
     copied: Callable[[], object],
 ) -> int:
-    """Write a part of a recording to a new file, which is complete then; return its number of messages.
+    """Write a part of a recording to a new, complete file; return its number of messages.
 
     Args:
         recording: The original.
-        path: The file; one that exists is overwritten.
-        span: From when, and before when (ns since 1970); None for no limit.
-        topics: All topics of the part; those without messages are listed in it, too.
+        path: The new file; an existing one is overwritten.
+        span: Start (inclusive) and end (exclusive) in ns since 1970; None for no limit.
+        topics: Topics of the part; topics without messages are included.
         copied: Called for each message.
 
     Raises:
         RecordingError: There are too many channels.
-        OSError: The disk doesn't take it.
+        OSError: The file can't be written.
     """
     writer = FileWriter(path, is_new=False, profile=recording.facts.profile)
     try:
@@ -90,7 +90,6 @@ class _Copy:
         return number
 
     def add(self, raw: RawMessage) -> None:
-        """Copy a message, or what the recorder said."""
         if raw.channel in self._roles:
             self._say(raw)
             return
@@ -111,7 +110,7 @@ class _Copy:
             self._chunk_ns = None
 
     def _say(self, raw: RawMessage) -> None:
-        """What is said again and again, such as a behaviour that still runs, is copied where it changes."""
+        # Repeated values, such as a running behaviour, are copied only when they change.
         role = self._roles[raw.channel]
         try:
             value = orjson.loads(raw.data)
@@ -133,7 +132,6 @@ class _Copy:
             self._writer.add(number, (at_ns, at_ns), 0, b"", record)
 
     def finish(self) -> None:
-        """Write the counts, the metadata and the summary. Raises `OSError`."""
         recording, writer = self._recording, self._writer
         self._write_figures(self._last_ns, is_final=True)
         writer.flush()
@@ -154,7 +152,7 @@ class _Copy:
 
 
 class _Figures:
-    """Counts what was lost and late within the part."""
+    """Counter of lost and late messages within the part."""
 
     def __init__(self, recording: Recording) -> None:
         self._decoders = {number: ChannelDecoder(each) for number, each in recording.facts.channels.items()}
@@ -169,7 +167,7 @@ class _Figures:
         counter.add(message.publisher, message.seq, message.size_bytes, is_decodable=is_decodable)
 
     def record(self, at_ns: int, *, is_final: bool) -> bytes | None:
-        """The counts that have changed, once a second; all of them at the end."""
+        # Changed counts once a second; all of them at the end.
         if self._next_ns is None:
             self._next_ns = at_ns + _FIGURES_NS
         if not is_final and at_ns < self._next_ns:

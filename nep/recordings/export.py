@@ -1,7 +1,7 @@
-"""Export: a recording's numbers as CSV or Parquet, its pictures as files or as a film, a part of it as MCAP.
+"""Export of recordings: values as CSV or Parquet, images as files or video, parts as MCAP.
 
-One file, or one folder of pictures, for each topic; one file of all of them as MCAP. Nothing is written
-over, and a file that is not whole is not left behind. Messages that cannot be read are left out and counted.
+One file (or folder of images) per topic; one MCAP file of all topics. Existing files are not overwritten, and
+incomplete files are removed. Messages that can't be decoded are skipped and counted.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MOST_COLUMNS = 5_000
 MAX_FILES = 1_000
-"""One for each topic."""
+"""Maximum number of files, one per topic."""
 _MOST_ITEMS = 100
-"""Of a list that get a column each; a longer one is one column of JSON."""
+"""Maximum length of a list with a column per item; longer lists are one column of JSON."""
 _DEEPEST = 20
 _CELLS_AT_ONCE = 200_000
 _FIRST_COLUMNS = ("time_ns", "time_s", "stamp_ns", "stamp_s", "seq", "publisher")
@@ -43,7 +43,7 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True)
 class Part:
-    """What of a recording: times in ns since 1970 (None: to its end), topics (None: all that fit)."""
+    """Part of a recording: times in ns since 1970 (None: no limit), topics (None: all that are suitable)."""
 
     start_ns: int | None = None
     end_ns: int | None = None
@@ -55,9 +55,13 @@ ALL_OF_IT = Part()
 
 @dataclass(frozen=True)
 class Exported:
-    """A file or folder that was made. `count`: messages in it; `unreadable`: those left out.
+    """Exported file or folder.
 
-    `topic` is "" for a file of all of them.
+    Attributes:
+        topic: Topic, or "" for a file of all topics.
+        path: File or folder.
+        count: Number of messages in it.
+        unreadable: Number of messages skipped because they can't be decoded.
     """
 
     topic: str
@@ -75,10 +79,24 @@ def export(
     fps: float = _FPS,
     progress: Progress | None = None,
 ) -> list[Exported]:
-    """Export as one of `FORMATS` into a folder, which is made; a film is an .avi where no MP4 can be written.
+    """Export a recording to files in a folder, which is created if needed.
 
-    `progress` is told how many messages of how many are done. Raises `RecordingError`, also when no topic
-    fits, `RecordingsUnavailableError` when a package is missing.
+    A video is an .avi file where MP4 can't be written.
+
+    Args:
+        recording: The recording.
+        kind: One of `FORMATS`.
+        folder: Target folder.
+        part: Part of the recording.
+        fps: Frame rate of videos.
+        progress: Called with the number of messages done and in total.
+
+    Returns:
+        The exported files.
+
+    Raises:
+        RecordingError: No topic is suitable, or a file can't be written.
+        RecordingsUnavailableError: A package is not installed.
     """
     if kind not in FORMATS:
         raise ValueError(_("no format '{kind}'").format(kind=kind))
@@ -113,7 +131,7 @@ def export(
 
 
 def takes(kind: str, codec: str) -> bool:
-    """Whether messages of this codec are exported as this one of `FORMATS`."""
+    """Return True if messages of this codec can be exported to the format."""
     if kind in {"pictures", "mp4"}:
         return codec == "image"
     return kind == "mcap" or codec in {"json", "msgpack", "string"}
@@ -122,7 +140,7 @@ def takes(kind: str, codec: str) -> bool:
 def _wanted(
     recording: Recording, kind: str, part: Part, progress: Progress | None
 ) -> tuple[list[str], _Counted]:
-    """The topics that have something for this format, and how far they are. Raises `RecordingError`."""
+    # Suitable topics that have messages. Raises `RecordingError`.
     topics = [
         name
         for name, each in recording.topics.items()
@@ -151,7 +169,7 @@ def _wanted(
 
 
 def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, int]:
-    """About how many messages of each topic there are in a part: of the indexes alone, never 0 for some."""
+    # Estimated from indexes, without reading messages; at least 1 for a topic with messages.
     if part.start_ns is None and part.end_ns is None:
         return {name: recording.topics[name].message_count for name in topics}
     start_ns = recording.start_ns if part.start_ns is None else part.start_ns
@@ -175,7 +193,7 @@ def _remove(path: Path) -> None:
 
 
 def _file_name(topic: str, taken: set[str], suffix: str) -> str:
-    """A name for every system, another one for each topic."""
+    # Valid on every operating system, and unique.
     plain = re.sub(r"[^\w.-]+", "_", topic).strip("._") or "topic"
     name, number = plain[:100], 2
     while name.lower() in taken:
@@ -185,7 +203,7 @@ def _file_name(topic: str, taken: set[str], suffix: str) -> str:
 
 
 class _Counted:
-    """How far all of it is."""
+    """Progress of the whole export."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress
@@ -198,7 +216,7 @@ class _Counted:
 
 
 class _Source:
-    """The messages of one topic."""
+    """Messages of one topic."""
 
     def __init__(self, recording: Recording, topic: str, part: Part, counted: _Counted) -> None:
         self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
@@ -211,10 +229,7 @@ class _Source:
             yield each
 
     def rows(self, *, is_counted: bool = True) -> Iterator[dict[str, object]]:
-        """Flat values of each message that can be read, with its times first.
-
-        What a payload calls as one of these gets another name: "payload.seq".
-        """
+        # Flat values with the times first; a field of the payload with the same name becomes "payload.seq".
         self.unreadable = 0
         for each in self.messages(is_counted=is_counted):
             try:
@@ -242,12 +257,12 @@ def _times(each: RecordedMessage) -> dict[str, object]:
 
 
 def _letters(text: str) -> str:
-    """A text that a file can hold: JSON may have half letters."""
+    # JSON may contain lone surrogates, which can't be encoded.
     return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def flattened(payload: object) -> dict[str, object]:
-    """Single values by their paths, such as "pose.x" and "joints[3]"; of a value alone by "value"."""
+    """Return scalar values by path, such as "pose.x" and "joints[3]", or "value" for a scalar payload."""
     made: dict[str, object] = {}
     _flatten(payload, "", made, _DEEPEST)
     return made
@@ -270,7 +285,7 @@ def _flatten(value: object, path: str, made: dict[str, object], depth: int) -> N
 
 
 def _columns(source: _Source) -> dict[str, set[type]]:
-    """The columns with the types of their values. Raises `RecordingError` for more than a table can have."""
+    # Columns with their value types. Raises `RecordingError` for too many.
     columns: dict[str, set[type]] = {name: set() for name in _FIRST_COLUMNS}
     for row in source.rows(is_counted=False):
         for name, value in row.items():
@@ -285,14 +300,11 @@ def _columns(source: _Source) -> dict[str, set[type]]:
     return columns
 
 
-# ---- a recording
+# ---- MCAP
 
 
 def _mcap(recording: Recording, folder: Path, part: Part, counted: _Counted) -> Exported:
-    """One file of all topics, with the bytes, numbers and times that they have, and what the recorder said.
-
-    Raises `RecordingError`.
-    """
+    # Copies bytes, sequence numbers, times, and the recorder's own entries. Raises `RecordingError`.
     path = folder / f"{recording.path.stem}.mcap"
     unfinished = path.with_name(f"{path.name}.part")
     try:
@@ -384,7 +396,7 @@ def _kind_of(name: str, types: set[type]) -> str:
 
 
 def _as(kind: str, value: object) -> object:
-    """A value as a column's kind; one that does not fit, such as a number beyond 64 bits, is left out."""
+    # Values that don't fit, such as ints beyond 64 bits, are left out.
     if value is None:
         return None
     if kind == "text":
@@ -398,11 +410,11 @@ def _as(kind: str, value: object) -> object:
     return value
 
 
-# ---- pictures
+# ---- images
 
 
 def _pictures(source: _Source, path: Path, _fps: float) -> int:
-    """The files as they were received; raw ones as PNG, or as they are where PNG has no such numbers."""
+    # JPEG and PNG files unchanged; raw images as PNG, or raw where PNG lacks the number type.
     path.mkdir()
     count = 0
     for each in source.messages():
@@ -443,7 +455,7 @@ def _opencv() -> Any:  # noqa: ANN401 - a module
 
 
 def _film(source: _Source, path: Path, fps: float, container: Container) -> int:
-    """A film in the recording's own time: each of its pictures is the newest up to then."""
+    # Constant frame rate in recording time: each frame is the newest image.
     opencv = _opencv()
     film = Film(opencv, path, fps, container)
     count = 0

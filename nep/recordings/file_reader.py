@@ -1,7 +1,7 @@
-"""FileReader: messages of a recording as they lie in it, from any time on, with bounded memory.
+"""Raw messages of a recording from any time, with bounded memory.
 
-It knows channels and bytes, not topics and messages (`nep.recordings.reader`), so it can run in another
-process (`nep.recordings.apart.remote`).
+It works with channels and bytes, not topics and messages (`nep.recordings.reader`), so that it can run in
+another process (`nep.recordings.apart.remote`).
 """
 
 from __future__ import annotations
@@ -32,22 +32,31 @@ __all__ = ["CACHE_BYTES", "FileFacts", "FileReader", "RawFile"]
 
 CACHE_BYTES = 64_000_000
 _MAX_EXACT_CHUNKS = 200
-"""Chunks whose message indexes are read to count exactly: what a screen shows of some minutes."""
+"""Maximum number of chunks whose message indexes are read for exact counts: some minutes on a screen."""
 _MAX_COUNTED_CHUNKS = 10_000
-"""With more chunks the counts of the file's own statistics are believed."""
+"""Maximum number of chunks that are counted; beyond it the file's own statistics are used."""
 _MAX_HELD_BYTES = 64_000_000
-"""Of chunks that overlap in time, held to give their messages in order; beyond, order is given up."""
+"""Maximum size of overlapping chunks held to sort their messages. Beyond it messages are unsorted."""
 _LARGE_CHUNK_BYTES = 8_000_000
-"""Messages of larger chunks are copied, so that the last message of a reader doesn't keep its chunk."""
+"""Messages of larger chunks are copied, so that a message doesn't keep its whole chunk in memory."""
 
 
 @dataclass(frozen=True)
 class FileFacts:
-    """What is known of a recording's file when it is open.
+    """Properties of an open recording file.
 
-    ``channels``: by their numbers; ``counts``: messages of each, 0 for channels without any. Times are ns
-    since 1970, 0 and 0 without messages. ``is_complete``: the file was closed properly. ``compressions``:
-    chunks by compression ("" for none, "-" for messages outside of chunks).
+    Attributes:
+        channels: Channels by number.
+        counts: Number of messages by channel; 0 for channels without messages.
+        start_ns: Time of the first message in ns since 1970; 0 without messages.
+        end_ns: Time of the last message; 0 without messages.
+        size_bytes: Size of the intact part of the file.
+        is_complete: True if the file was closed properly.
+        metadata: Metadata records.
+        attachments: Attached files.
+        compressions: Number of chunks by compression ("" for none, "-" for messages outside of chunks).
+        profile: MCAP profile.
+        library: Program that wrote the file.
     """
 
     channels: Mapping[int, ChannelDefinition]
@@ -64,15 +73,15 @@ class FileFacts:
 
 
 class RawFile(Protocol):
-    """A recording's file that is open for reading, here or in another process. Thread-safe."""
+    """Recording file that is open for reading, in this or another process. Thread-safe."""
 
     @property
     def facts(self) -> FileFacts:
-        """What is known of it."""
+        """Properties of the file."""
 
     @property
     def damage(self) -> Sequence[Damage]:
-        """Pieces that can't be read, as far as they were met."""
+        """Unreadable pieces of the file found so far."""
 
     def raw(
         self,
@@ -81,38 +90,38 @@ class RawFile(Protocol):
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """Messages of these channels by log time, from ``start_ns`` on and before ``end_ns``.
+        """Iterate over messages of channels by log time, from ``start_ns`` and before ``end_ns``.
 
-        ``pieces``: only from these chunks, as `pieces_of` numbers them.
+        ``pieces`` restricts it to these chunks (`pieces_of`).
         """
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """The last message up to a time, of each group of channels."""
+        """Return the last message up to a time for each group of channels."""
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """The log time of the last message up to a time, of each channel that has one; from indexes alone."""
+        """Return the log time of the last message up to a time by channel, from indexes only."""
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """Number of messages of each channel in each of ``buckets`` equal parts of [start, end)."""
+        """Return the number of messages by channel in each of ``buckets`` equal parts of [start, end)."""
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        """The chunks in which these channels have messages, in their order."""
+        """Return the chunks with messages of these channels, in order."""
 
     def close(self) -> None:
-        """Close the file; later calls raise `ClosedError`. May be called twice."""
+        """Close the file; later calls raise `ClosedError`. Idempotent."""
 
 
 class _Loaded:
-    """A chunk in memory."""
+    """Chunk in memory."""
 
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = data
         self._offsets: dict[int, array[int]] | None = None
 
     def messages(self, info: ChunkInfo, channels: Collection[int]) -> Iterator[RawMessage]:
-        """The messages of these channels. Finding those of a few among many takes time once only."""
+        # Indexed at the first search for few channels among many.
         if self._offsets is None and all(each in channels for each in info.channels):
             for record in messages_in(self.data):
                 if isinstance(record, RawMessage) and record.channel in channels:
@@ -137,7 +146,7 @@ class _Loaded:
 
 
 class FileReader:
-    """A recording's file that is read in this process. See `RawFile`."""
+    """Recording file read in this process (a `RawFile`)."""
 
     def __init__(
         self,
@@ -147,17 +156,17 @@ class FileReader:
         progress: Callable[[int, int], object] | None = None,
         budget: ReadBudget | None = None,
     ) -> None:
-        """Open it: from its summary at once, else by a walk over its records.
+        """Open the file, from its summary, or by walking over its records without one.
 
         Args:
             path: The file.
-            cache_bytes: How much of decompressed chunks is kept.
-            progress: Given how many bytes of how many are done during a walk; what it raises comes out.
-            budget: Bounds all that is read until the file is closed; by default only opening is bounded.
+            cache_bytes: Maximum size of cached decompressed chunks.
+            progress: Called with bytes done and in total during a walk; its exceptions propagate.
+            budget: Limit of the work until the file is closed. Default: only opening is limited.
 
         Raises:
-            RecordingError: The file can't be opened or is no recording.
-            RecordingTooLargeError: It is more work than is allowed.
+            RecordingError: The file can't be opened or is not a recording.
+            RecordingTooLargeError: The file exceeds a limit.
         """
         check_packages()
         self.path = Path(path)
@@ -223,12 +232,12 @@ class FileReader:
 
     @property
     def facts(self) -> FileFacts:
-        """See `RawFile`."""
+        """Properties of the file."""
         return self._facts
 
     @property
     def damage(self) -> Sequence[Damage]:
-        """See `RawFile`."""
+        """Unreadable pieces of the file found so far."""
         with self._lock:
             return tuple(
                 sorted(
@@ -237,7 +246,7 @@ class FileReader:
             )
 
     def chunks(self) -> Sequence[ChunkInfo]:
-        """The file's chunks by their times."""
+        """Return the chunks of the file in order of time."""
         return tuple(self._chunks)
 
     # ---- reading
@@ -249,14 +258,14 @@ class FileReader:
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """See `RawFile`."""
+        """Iterate over messages of channels by log time. See `RawFile.raw`."""
         wanted = self._wanted(start_ns, end_ns, channels, pieces)
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         waiting: list[tuple[int, int, RawMessage]] = []
         order = held = 0
         for at, number in enumerate(wanted):
             came = [each for each in self._messages(number, channels) if first <= each.log_ns < last]
-            came.sort(key=_log_ns)  # mostly sorted, which takes no time
+            came.sort(key=_log_ns)  # usually sorted, which costs no time
             following = wanted[at + 1] if at + 1 < len(wanted) else None
             limit = 2**64 if following is None else self._starts[following]
             held += self._size(number)
@@ -283,7 +292,7 @@ class FileReader:
         channels: Collection[int],
         pieces: Collection[int] | None,
     ) -> list[int]:
-        """Numbers of the chunks that may have such messages."""
+        # Chunks that may contain such messages.
         first = 0 if start_ns is None else bisect_left(self._latest_ends, max(0, start_ns))
         last = (
             len(self._chunks) if end_ns is None else bisect_left(self._starts, max(0, min(end_ns, 2**64 - 1)))
@@ -302,7 +311,7 @@ class FileReader:
         return numbers[bisect_left(numbers, first) : bisect_left(numbers, last)]
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """See `RawFile`."""
+        """Return the last message up to a time for each group of channels. See `RawFile.newest`."""
         found: list[RawMessage | None] = []
         for group in groups:
             places = [
@@ -314,12 +323,12 @@ class FileReader:
         return found
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """See `RawFile`."""
+        """Return the log time of the last message up to a time by channel. See `RawFile.newest_times`."""
         places = {channel: self._last_before(channel, at_ns) for channel in channels}
         return {channel: place[0] for channel, place in places.items() if place is not None}
 
     def _last_before(self, channel: int, at_ns: int) -> tuple[int, int, int] | None:
-        """(time, chunk, offset in it) of a channel's last message up to a time."""
+        # (time, chunk, offset)
         numbers = self._in_chunks.get(channel, array("L"))
         place = (
             bisect_right(numbers, bisect_right(self._starts, max(-1, min(at_ns, 2**64 - 1))) - 1)
@@ -357,15 +366,15 @@ class FileReader:
             return None
         return self._owned(record, chunk)
 
-    # ---- how many there are
+    # ---- counts
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """See `RawFile`.
+        """Return the number of messages by channel in each part of [start, end). See `RawFile.densities`.
 
-        No payload is read: for a short time exactly, of the indexes; for a long one each chunk's messages are
-        spread over its time, which is half a second at most in recordings of our own.
+        Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
+        a chunk are spread evenly over its time, at most half a second in nep's own recordings.
         """
         made: dict[int, list[int]] = {}
         first = bisect_left(self._latest_ends, max(0, start_ns))
@@ -387,11 +396,11 @@ class FileReader:
         return dict(made)
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        """See `RawFile`."""
+        """Return the chunks with messages of these channels. See `RawFile.pieces_of`."""
         return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
 
     def _counts(self, number: int) -> Mapping[int, int]:
-        """The messages of each channel in a chunk; it is read where its indexes are not there."""
+        # Reads the chunk if it has no indexes.
         chunk = self._chunks[number]
         counts = chunk.counts
         if len(counts) < chunk.channel_count:
@@ -405,7 +414,7 @@ class FileReader:
     def check(
         self, progress: Callable[[int, int], object] | None = None, most_bytes: int | None = None
     ) -> bool:
-        """Read every chunk once, so that `damage` is complete; False when ``most_bytes`` didn't suffice."""
+        """Read every chunk once, to complete `damage`; return False if ``most_bytes`` was exceeded."""
         done, whole = 0, sum(each.length for each in self._chunks)
         expanded = 0
         for number, chunk in enumerate(self._chunks):
@@ -430,7 +439,7 @@ class FileReader:
         return raw._replace(data=memoryview(bytes(raw.data)))
 
     def _chunk(self, number: int) -> _Loaded | None:
-        """A chunk's records; None when it is damaged."""
+        # None if it is damaged.
         with self._lock:
             self._check_open()
             known = self._cache.get(number)
@@ -447,7 +456,7 @@ class FileReader:
                 made = _Loaded(read_chunk(self._file, info))
             except (ValueError, OSError) as error:
                 self._bad[number] = self._damage_of(info)
-                if isinstance(error, ValueError):  # a disk may answer again
+                if isinstance(error, ValueError):  # an I/O error may be temporary
                     self._broken.add(number)
                 return None
             self._bad.pop(number, None)
@@ -475,7 +484,7 @@ class FileReader:
             raise ClosedError(f"recording '{self.path.name}'")
 
     def close(self) -> None:
-        """See `RawFile`."""
+        """Close the file. Idempotent."""
         with self._lock:
             self._file.close()
             self._cache.clear()
@@ -489,7 +498,7 @@ class FileReader:
 
 
 def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
-    """Add the messages of a chunk to the equal parts of `whole`, as if they came evenly."""
+    # Distributes messages evenly over the chunk's time.
     (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
     first = (chunk_start - start) * buckets // (end - start)
     last = (chunk_end - start) * buckets // (end - start)
@@ -499,7 +508,6 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
         return
 
     def until(at: int) -> int:
-        """How many come before the end of a part."""
         if at < first:
             return 0
         if at >= last:

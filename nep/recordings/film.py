@@ -1,7 +1,7 @@
-"""A film of a recording's pictures, in the container that OpenCV can write on this computer.
+"""Videos of a recording's images, in a container that OpenCV can write on this computer.
 
-MP4 needs FFmpeg, which the packages of Studio leave out; OpenCV alone writes Motion JPEG into an .avi file,
-which the players of Windows and Linux show, and VLC everywhere.
+MP4 needs FFmpeg, which Studio's packages leave out; OpenCV itself writes Motion JPEG in .avi files, which the
+players of Windows and Linux, and VLC, can play.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from nep.system.replace_file import replace_file
 __all__ = ["Container", "Film", "container_there", "frame_of"]
 
 LONGEST_S = 86_400.0
-"""A recording with one picture of another day would become a film of millions of them."""
+"""Maximum duration: an image of another day would lead to millions of frames."""
 _TRIED_PX = (64, 48)
 
 
 @dataclass(frozen=True)
 class Container:
-    """A kind of film: the end of its files' names, its codec, which part of OpenCV writes and reads it."""
+    """Video container: file suffix, codec, and OpenCV back end that writes and reads it."""
 
     suffix: str
     fourcc: str
     api: str
 
     def writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
-        """OpenCV's writer of such a file; it may not be open."""
+        """Return an OpenCV writer for such a file; it may not be open."""
         code = opencv.VideoWriter_fourcc(*self.fourcc)
         return opencv.VideoWriter(str(path), getattr(opencv, self.api), code, fps, size)
 
 
 CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "CAP_OPENCV_MJPEG"))
-"""The one that is wanted first."""
+"""Containers in order of preference."""
 
 
 def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
-    """The first that can be written into this folder; whatever is in it stays.
+    """Return the first container that can be written to a folder, whose files are not touched.
 
-    Raises `RecordingError` when none can, `OSError` when nothing can be written there.
+    Raises `RecordingError` if there is none, and `OSError` if the folder is not writable.
     """
     with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
         for container in CONTAINERS:
@@ -58,7 +58,7 @@ def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a
 
 
 def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
-    """The picture with three channels of 8 bits; None when it cannot be read."""
+    """Return an image with three channels of 8 bits, or None if it can't be decoded."""
     try:
         frame: Any = message.payload
     except DecodeError:
@@ -73,7 +73,7 @@ def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
 
 
 class Film:
-    """Pictures at a steady rate, all of the size of the first one."""
+    """Video with a constant frame rate, in the size of its first image."""
 
     def __init__(
         self,
@@ -88,11 +88,11 @@ class Film:
         self._size = (0, 0)
         self._start_ns = self._frames = 0
         self._last: Any = None
-        # OpenCV knows the container by the name's end.
+        # OpenCV determines the container from the suffix
         self._written = path.with_name(f"{path.name}{container.suffix}")
 
     def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
-        """The next picture."""
+        """Add an image. Raises `RecordingError` if the video can't be written or is too long."""
         if self._film is None:
             height, width = frame.shape[:2]
             self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
@@ -113,9 +113,9 @@ class Film:
         self._last = frame
 
     def finish(self) -> None:
-        """Write the last picture, and end. Raises `RecordingError` when they are not all in the file.
+        """Write the last frame and close. Raises `RecordingError` if frames are missing in the file.
 
-        OpenCV does not say so when a disk is full.
+        OpenCV does not report a full disk, so the frames are counted.
         """
         if self._film is None:
             return
@@ -130,12 +130,12 @@ class Film:
         replace_file(self._written, self._path)
 
     def close(self) -> None:
-        """End it as it is; may be called twice."""
+        """Close the file as it is. Idempotent."""
         if self._film is not None:
             self._film.release()
 
     def remove(self) -> None:
-        """Leave no half film behind."""
+        """Close and remove an incomplete file."""
         self.close()
         with suppress(OSError):
             self._written.unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""Playing a recording: its messages again, in the time in which they came.
+"""Replay of recordings in their original timing.
 
-`Playback` is the timing, with a clock that is passed in and nothing that waits. `Player` is a thread around
-it that gives what is due to a sink. Nothing is published by either: who wants that gives a sink that does.
-What such a sink has to know, above all which topics move robots, is here, too.
+`Playback` is the timing, with an injected clock and without waiting. `Player` is a thread that passes due
+messages to a sink. Neither publishes: a sink may do so. Helpers for such sinks, above all to find the topics
+that move robots, are here, too.
 """
 
 from __future__ import annotations
@@ -46,21 +46,28 @@ __all__ = [
 
 SPEED_MIN, SPEED_MAX = 0.1, 10.0
 _MOST_LAG_S = 0.25
-"""Who is slower than that is not sent a burst: then the playback is slower, and `true_speed` tells."""
+"""Maximum backlog of a slow sink: instead of a burst the playback slows down, reported in `true_speed`."""
 _MOST_AT_ONCE = 2_000
 _MOST_WAIT_S = 0.05
 _MEASURED_S = 1.0
 _MOST_KINDS = 10_000
 _COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
-"""Types of messages that move a robot, or a base of ROS (docs/robots.md)."""
+"""Message types that move a robot or a ROS base (docs/robots.md)."""
 _MAX_DESCRIPTIONS = 10_000
 
 
 @dataclass(frozen=True)
 class PlayerStatus:
-    """Where it is. `true_speed`: of the last second, None while it is paused or not known yet.
+    """State of a playback.
 
-    `loop`: the part that is played again and again, None for all; `is_looping`: whether it is.
+    Attributes:
+        position_ns: Position in ns since 1970.
+        is_playing: True while playing.
+        is_at_end: True at the end of the part or recording.
+        speed: Requested speed.
+        true_speed: Speed over the last second, or None while paused or unknown.
+        loop: Start and end of the looped part, or None for all.
+        is_looping: True if the part repeats.
     """
 
     position_ns: int
@@ -74,11 +81,13 @@ class PlayerStatus:
 
 @dataclass(frozen=True)
 class Due:
-    """What is to be given out now.
+    """Messages due now.
 
-    `messages`: in their order. `is_jump`: they are the newest of each topic at another place, not what came
-    next. `wait_s`: until there is more to do, None when it is paused. `log_ns`: when each of them was
-    recorded, but for a jump.
+    Attributes:
+        messages: Messages in order.
+        is_jump: True if they are the newest of each topic after a seek, not the next ones.
+        wait_s: Seconds until the next call, or None while paused.
+        log_ns: Time of recording of each message; empty for a jump.
     """
 
     messages: Sequence[Message]
@@ -88,7 +97,7 @@ class Due:
 
 
 class Playback:
-    """A recording's position in time. Not for several threads at once."""
+    """Position and timing of a replay. Not thread-safe."""
 
     def __init__(
         self,
@@ -98,7 +107,7 @@ class Playback:
         topics: Collection[str] | None = None,
         remap: Mapping[str, str] | None = None,
     ) -> None:
-        """Paused, before the first message. `topics`: those played, None for all. `remap`: new names."""
+        """Start paused before the first message. `topics`: None for all; `remap`: new names of topics."""
         self._recording, self._clock = recording, clock
         self._topics = topics
         self._remap = dict(remap or {})
@@ -112,15 +121,15 @@ class Playback:
         self._jump: list[Message] | None = None
         self._shown_ns = recording.start_ns
         self._from_ns = recording.start_ns
-        """Nothing of this time, or later, was given out."""
+        """Time from which no message was returned yet."""
         self._coming: Iterator[RecordedMessage] = iter(())
         self._next: RecordedMessage | None = None
         self._read_from(recording.start_ns)
 
-    # ---- what a person does
+    # ---- controls
 
     def play(self) -> None:
-        """Go on, from the beginning when it is at its end."""
+        """Play, from the beginning if the position is at the end."""
         if not self._is_playing:
             if self._is_at_end():
                 self.begin()
@@ -128,18 +137,18 @@ class Playback:
             self._anchor_here()
 
     def pause(self) -> None:
-        """Stay where it is."""
+        """Pause."""
         if self._is_playing:
             self._is_playing = False
             self._anchor_here()
 
     def seek(self, at_ns: int) -> None:
-        """Go to a time; the newest message of each topic up to there is due at once."""
+        """Move to a time; the newest message of each topic up to it becomes due at once."""
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
         self._show_and_read_from(at_ns, at_ns)
 
     def _show_and_read_from(self, shown_ns: int, at_ns: int) -> None:
-        """Go to a time; due at once is what was there at `shown_ns`, and what came later comes as it came."""
+        # The state at `shown_ns` becomes due at once, later messages at their time.
         self._position_ns, self._shown_ns = at_ns, shown_ns
         newest = self._recording.newest(shown_ns, self._topics)
         self._jump = [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
@@ -147,7 +156,7 @@ class Playback:
         self._anchor_here()
 
     def step(self, topic: str, *, forward: bool = True) -> bool:
-        """Go to the next or previous message of a topic, and pause; False when there is none."""
+        """Move to the next or previous message of a topic and pause; return False if there is none."""
         find = self._recording.after if forward else self._recording.before
         found = find(self._position_ns, topic)
         self.pause()
@@ -157,10 +166,9 @@ class Playback:
         return True
 
     def choose(self, topics: Collection[str]) -> Sequence[Message]:
-        """Play these topics from here on, and no others.
+        """Play only these topics from now on.
 
-        Gives the newest message up to here of each that was not played before; where a jump is due, that
-        brings it.
+        Return the newest message of each added topic; empty if a jump is due, which includes them.
         """
         new = set(topics) if self._topics is None else set(topics).difference(self._topics)
         self._topics = frozenset(topics)
@@ -173,7 +181,7 @@ class Playback:
 
     @property
     def speed(self) -> float:
-        """How fast it is to be, 0.1 to 10."""
+        """Speed factor, 0.1 to 10."""
         return self._speed
 
     @speed.setter
@@ -188,7 +196,7 @@ class Playback:
         self._anchor_here()
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Play a part again and again, or all of it. Raises `ValueError` when the part has no length."""
+        """Repeat a part of the recording, or all of it. Raises `ValueError` for an empty part."""
         if start_ns is None or end_ns is None:
             self._loop = None
         else:
@@ -202,23 +210,23 @@ class Playback:
         self._is_looping = True
 
     def end_loop(self) -> None:
-        """Play on beyond the part's end."""
+        """Continue beyond the end of the part."""
         self._is_looping, self._loop = False, None
 
     def once(self) -> None:
-        """Play to the part's end, and no further."""
+        """Stop at the end of the part instead of repeating it."""
         self._is_looping = False
 
     def begin(self) -> None:
-        """Go before the first message of the part, without showing what was before."""
+        """Move before the first message of the part, without a jump."""
         self._position_ns, self._jump = self._first_ns(), None
         self._read_from(self._position_ns)
         self._anchor_here()
 
-    # ---- the timing
+    # ---- timing
 
     def status(self) -> PlayerStatus:
-        """Where it is now."""
+        """Return the current state."""
         return PlayerStatus(
             self._position_ns,
             self._is_playing,
@@ -230,7 +238,7 @@ class Playback:
         )
 
     def advance(self) -> Due:
-        """What is due by the clock. Call it again after `wait_s` seconds at most."""
+        """Return the messages due by the clock. Call it again within `wait_s` seconds."""
         if self._jump is not None:
             messages, self._jump = self._jump, None
             return Due(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
@@ -250,9 +258,9 @@ class Playback:
         return Due(messages, False, self._wait_s(), [each.log_ns for each in due])
 
     def shown_first(self, topics: Collection[str]) -> Sequence[Message]:
-        """What lies at the very beginning of the part, when a jump has shown it and it will not come again.
+        """Return the messages at the start of the part, if a jump has shown them and they won't be due again.
 
-        Who acts on what is played, and on no jump, lacks it when it plays from the beginning.
+        For sinks that ignore jumps and would miss them when playing from the beginning.
         """
         first_ns = self._first_ns()
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
@@ -277,7 +285,7 @@ class Playback:
             self._next = next(self._coming, None)
         if self._next is None or self._next.log_ns > until_ns:
             given_ns = until_ns
-        else:  # those of one time are not told apart: where it is cut between them, some come twice
+        else:  # several messages of one time: a cut between them repeats some
             given_ns = due[-1].log_ns - (self._next.log_ns == due[-1].log_ns)
         self._from_ns = max(self._from_ns, given_ns + 1)
         return due
@@ -331,7 +339,7 @@ class Playback:
         return (to_ns - from_ns) / 1e9 / (now - started) if now > started else None
 
     def _renamed(self, message: Message) -> Message:
-        """A message under the topic's new name."""
+        # Applies `remap`.
         new = self._remap.get(message.topic)
         if new is None:
             return message
@@ -352,9 +360,9 @@ def _log_ns(each: RecordedMessage) -> int:
 
 
 def moving_topics(recording: Recording) -> MovingTopics:
-    """Return the topics that move robots, as far as a recording tells; they may not be in it themselves.
+    """Return the topics that move robots, as far as the recording shows; they may not be in it.
 
-    It tells by descriptions, by types, and by names: the robot that heard a topic need not be in it.
+    Derived from descriptions, message types and names: the commanded robot may not be in the recording.
     """
     described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
     robots = dict[RobotControls, None]()
@@ -368,23 +376,27 @@ def moving_topics(recording: Recording) -> MovingTopics:
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:
-    """Those of these topics whose last message was kept for who comes later."""
+    """Return the latched topics among these."""
     newest = recording.newest(recording.end_ns, list(topics))
     return frozenset(each.message.topic for each in newest.values() if each.message.is_latched)
 
 
 def published_type(message: Message) -> str:
-    """The type under which its bytes are published again, so that they are read as they were."""
+    """Return the message type for republishing a message so that its bytes are decoded as before."""
     return message.msg_type if codec_for(message.msg_type).name == message.codec else message.codec
 
 
 class Player:
-    """Plays a recording into a sink, in a thread of its own. Use it from any thread; a context manager.
+    """Thread that plays a recording into a sink. Thread-safe; usable as a context manager.
 
-    `sink` is given messages in their order, a few at a time; `on_jump` the newest of each topic after a seek
-    (without it they go to the sink, too). Both are called in the player's thread and may take their time:
-    then it is slower, and loses nothing. `on_end` is told when the end was reached, and when something that
-    they or the recording raised has ended it, which `problem` is then.
+    Slow callbacks slow the playback down; no message is lost.
+
+    Args:
+        playback: The playback; afterwards change it with `order` only.
+        sink: Called in the player's thread with a few messages in order.
+        on_jump: Called with the newest message of each topic after a seek. Default: `sink`.
+        on_end: Called at the end, and after an exception of a callback or of the recording, stored in
+            `problem`.
     """
 
     def __init__(
@@ -405,7 +417,7 @@ class Player:
         self._thread.start()
 
     def order(self, change: Callable[[Playback], object]) -> PlayerStatus:
-        """Let something be done to the playback: `player.order(Playback.play)`; what it raises comes out."""
+        """Change the playback: `player.order(Playback.play)`. Exceptions propagate."""
         with self._lock:
             change(self._playback)
             self._lock.notify_all()
@@ -413,14 +425,14 @@ class Player:
 
     @property
     def status(self) -> PlayerStatus:
-        """Where it is now."""
+        """Current state."""
         with self._lock:
             return self._playback.status()
 
     def _run(self) -> None:
         try:
             self._play_until_closed()
-        except Exception as error:  # noqa: BLE001 - it belongs to who asked for the messages
+        except Exception as error:  # noqa: BLE001 - stored in `problem`
             with self._lock:
                 self.problem = error
                 self._playback.pause()
@@ -444,7 +456,7 @@ class Player:
                 self._on_end()
 
     def close(self, timeout_s: float = 10.0) -> None:
-        """End. May be called twice; the recording stays open."""
+        """Stop. The recording stays open. Idempotent."""
         with self._lock:
             self._is_closed = True
             self._lock.notify_all()

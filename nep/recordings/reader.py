@@ -1,4 +1,4 @@
-"""Recording: reads a recording from any time on, without reading what is before; memory stays bounded."""
+"""Recording: random access to a recording by time, with bounded memory."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["RecordedMessage", "RecordedTopic", "Recording"]
 
 
 class RecordedMessage(NamedTuple):
-    """A message, and when it came (ns since 1970)."""
+    """Message and its time of receipt (ns since 1970)."""
 
     log_ns: int
     message: Message
@@ -32,10 +32,16 @@ class RecordedMessage(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic of a recording. `codec` and `msg_type` are those of its first channel.
+    """Topic of a recording. `codec` and `msg_type` are those of its first channel.
 
-    `publishers`: their numbers, None where one has none. `encoding`, `schema_encoding`: as the file names
-    them, "" for none.
+    Attributes:
+        name: Name of the topic.
+        msg_type: Message type.
+        codec: Codec.
+        message_count: Number of messages.
+        publishers: Ids of the publishers, None where unknown.
+        encoding: Message encoding as named in the file.
+        schema_encoding: Schema encoding as named in the file, or "".
     """
 
     name: str
@@ -48,11 +54,18 @@ class RecordedTopic:
 
 
 class Recording:
-    """A recording that is read. Thread-safe; usable as a context manager.
+    """Recording that is open for reading. Thread-safe; usable as a context manager.
 
-    `start_ns`, `end_ns`: when the first and the last message came; both 0 when there is none. `is_complete`:
-    False for a file that was not closed, because its program was killed or its end was cut off: all that is
-    whole is read, and `nep.recordings.repair` closes it. `topics`: by name, also those without messages.
+        with Recording("tour.mcap") as recording:
+            for log_ns, message in recording.read(topics=["/camera"]):
+                show(message.payload)
+
+    Attributes:
+        start_ns: Time of the first message in ns since 1970, or 0 without messages.
+        end_ns: Time of the last message, or 0 without messages.
+        is_complete: False if the file was not closed (killed program, truncated file). The intact part is
+            read; `nep.recordings.repair` completes it.
+        topics: Topics by name, also those without messages.
     """
 
     def __init__(
@@ -63,17 +76,18 @@ class Recording:
         progress: Callable[[int, int], object] | None = None,
         file: RawFile | None = None,
     ) -> None:
-        """Open it, in this process unless a `file` is given that is open elsewhere.
+        """Open a recording, in this process unless a `file` is given.
 
         Args:
             path: The file.
-            cache_bytes: How much of decompressed chunks is kept.
-            progress: Given how many bytes of how many are done, where the whole file must be walked over;
-                what it raises ends that, and comes out.
-            file: Reads the file instead, for example in another process; it is closed with the recording.
+            cache_bytes: Maximum size of cached decompressed chunks.
+            progress: Called with bytes done and in total if the whole file must be walked; its exceptions
+                propagate.
+            file: Open file to use instead, for example in another process; closed with the recording.
 
         Raises:
-            RecordingError: The file can't be opened or is no recording.
+            RecordingError: The file can't be opened or is not a recording.
+            RecordingsUnavailableError: Packages for recordings are not installed.
         """
         self.path = Path(path)
         self.file: RawFile = (
@@ -124,36 +138,36 @@ class Recording:
             )
         return dict(sorted(made.items()))
 
-    # ---- what it is
+    # ---- properties
 
     @property
     def duration_s(self) -> float:
-        """From the first message to the last one."""
+        """Time from the first to the last message in seconds."""
         return (self.end_ns - self.start_ns) / 1e9
 
     @property
     def message_count(self) -> int:
-        """Messages of all topics."""
+        """Number of messages of all topics."""
         return sum(each.message_count for each in self.topics.values())
 
     @property
     def size_bytes(self) -> int:
-        """Size of the file, as far as it is whole."""
+        """Size of the intact part of the file."""
         return self.facts.size_bytes
 
     @property
     def damage(self) -> Sequence[Damage]:
-        """Pieces of the file that can't be read, as far as they were met."""
+        """Unreadable pieces of the file found so far."""
         return self.file.damage
 
     @property
     def damaged_chunks(self) -> int:
-        """How many pieces of the file were wanted and could not be read so far."""
+        """Number of unreadable pieces found so far."""
         return len(self.file.damage)
 
     @property
     def words(self) -> Mapping[str, str]:
-        """What the recorder noted: "note", "end", "started_ns", "ended_ns"; what is not known is missing."""
+        """Metadata of the recorder: "note", "end", "started_ns", "ended_ns", as far as known."""
         made: dict[str, str] = {}
         for name, values in self.facts.metadata:
             if name == "nep.recording":
@@ -161,9 +175,9 @@ class Recording:
         return made
 
     def figures(self) -> dict[str, TopicFigures]:
-        """What became of each topic's messages, as the recorder counted; empty for others' recordings.
+        """Return the recorder's counts by topic; empty for recordings of other programs.
 
-        At once when it was ended, else by reading what it said once a second.
+        They are in the metadata of a complete recording; otherwise its entries, once a second, are read.
         """
         made: dict[str, TopicFigures] = {}
         for name, values in self.facts.metadata:
@@ -179,15 +193,15 @@ class Recording:
         return made
 
     def figure_pieces(self) -> Sequence[int]:
-        """The pieces of the file in which the recorder told figures, by time; nothing is read for that."""
+        """Return the pieces of the file with counts, in order of time, without reading them."""
         return self.file.pieces_of(self._channels_with("figures"))
 
     def figures_over_time(
         self, pieces: Collection[int] | None = None
     ) -> Iterator[tuple[int, dict[str, TopicFigures]]]:
-        """(time, figures of the topics that have new ones): where they grow, there something was lost.
+        """Iterate over (time, changed counts by topic), to locate losses in time.
 
-        Of all of the file, or of some of `figure_pieces`.
+        From the whole file, or from some of `figure_pieces`.
         """
         for log_ns, value in self.said("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
@@ -196,9 +210,9 @@ class Recording:
                 yield log_ns, {topic: each for topic, each in made.items() if each is not None}
 
     def said(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
-        """(time, value) of what the recorder said: "alerts", "figures", "notes", "runs", "alarms".
+        """Iterate over (time, value) of a role of the recorder's own entries: "alerts", "notes", "runs" etc.
 
-        Of all of the file, or of these pieces.
+        From the whole file, or from these pieces.
         """
         for raw in self.file.raw(None, None, self._channels_with(role), pieces):
             try:
@@ -217,9 +231,14 @@ class Recording:
         end_ns: int | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[RecordedMessage]:
-        """Messages by the time when they came, from `start_ns` on and before `end_ns`; of all topics or some.
+        """Iterate over messages by time of receipt, from `start_ns` and before `end_ns`.
 
-        A piece of the file that is damaged is skipped, and listed in `damage`.
+        Damaged pieces of the file are skipped and listed in `damage`.
+
+        Args:
+            start_ns: Start in ns since 1970, or None.
+            end_ns: End in ns since 1970, or None.
+            topics: Names of topics, or None for all.
         """
         for raw in self.read_raw(start_ns, end_ns, topics):
             yield RecordedMessage(raw.log_ns, self._decoders[raw.channel].message(raw))
@@ -230,7 +249,7 @@ class Recording:
         end_ns: int | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[RawMessage]:
-        """The same as they lie in the file, with the numbers of their channels (`facts.channels`)."""
+        """Iterate over raw messages with their channel numbers (`facts.channels`), as `read` does."""
         return self.file.raw(start_ns, end_ns, self._channels(topics))
 
     def _channels(self, topics: Collection[str] | None) -> set[int]:
@@ -239,7 +258,7 @@ class Recording:
         return {number for topic in topics for number in self._channels_of.get(topic, ())}
 
     def newest(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, RecordedMessage]:
-        """The newest message of each topic that came at `at_ns` or before; topics without one are missing."""
+        """Return the newest message up to `at_ns` by topic; topics without one are missing."""
         wanted = [topic for topic in self._named(topics) if self.topics[topic].message_count]
         found = self.file.newest(at_ns, [self._channels_of[topic] for topic in wanted])
         return {
@@ -256,7 +275,7 @@ class Recording:
         )
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
-        """When the newest message of each topic came that came at `at_ns` or before; of the indexes alone."""
+        """Return the time of the newest message up to `at_ns` by topic, from indexes only."""
         made: dict[str, int] = {}
         for channel, log_ns in self.file.newest_times(at_ns, self._channels(topics)).items():
             topic = self.facts.channels[channel].topic
@@ -264,20 +283,20 @@ class Recording:
         return made
 
     def before(self, at_ns: int, topic: str) -> RecordedMessage | None:
-        """The last message of a topic that came before `at_ns`."""
+        """Return the last message of a topic before `at_ns`, or None."""
         return self.newest(at_ns - 1, (topic,)).get(topic) if at_ns > 0 else None
 
     def after(self, at_ns: int, topic: str) -> RecordedMessage | None:
-        """The first message of a topic that came after `at_ns`."""
+        """Return the first message of a topic after `at_ns`, or None."""
         return next(self.read(at_ns + 1, None, (topic,)), None)
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, topics: Collection[str] | None = None
     ) -> dict[str, list[int]]:
-        """How many messages of each topic came in each of so many equal parts of [start, end).
+        """Return the number of messages by topic in each of `buckets` equal parts of [start, end).
 
-        No payload is read: for a short time exactly, of the indexes; for a long one each chunk's messages are
-        spread over its time, which is half a second at most in recordings of our own.
+        Payloads are not read. Short times are counted exactly from the indexes; for long ones the messages of
+        a chunk are spread evenly over its time, at most half a second in nep's own recordings.
         """
         made: dict[str, list[int]] = {}
         if buckets < 1 or end_ns <= start_ns:
@@ -289,7 +308,7 @@ class Recording:
         return made
 
     def close(self) -> None:
-        """Close the file. May be called twice; who reads then gets `ClosedError`."""
+        """Close the file; concurrent reads raise `ClosedError`. Idempotent."""
         self.file.close()
 
     def __enter__(self) -> Self:
@@ -300,7 +319,7 @@ class Recording:
 
 
 class _Decoders(dict[int, ChannelDecoder]):
-    """Decoders of channels, made when they are first used."""
+    """Decoders by channel, created at their first use."""
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition]) -> None:
         super().__init__()

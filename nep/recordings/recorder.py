@@ -1,4 +1,4 @@
-"""Recorder: subscribes what is chosen, also topics that appear later, and gives it to a writer."""
+"""Recorder: subscribes to chosen topics, also new ones, and passes their messages to a writer."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ __all__ = ["Recorder", "TopicSelection"]
 
 _LOOK_S = 1.0
 _PATIENCE_S = 0.5
-"""A master that is away must not keep anybody waiting who does not need it."""
+"""Time limit of requests to the master, so that an absent one does not delay the recorder."""
 _MOST_KNOWN = 20_000
 _ALL = "**"
 
 
 class _Takes(Protocol):
-    """A `RecordingWriter` or a `FlightRecorder`."""
+    """Writer: a `RecordingWriter` or a `FlightRecorder`."""
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Messages that came now."""
+        """Record messages received now."""
 
     def say(self, role: Role, value: object) -> None:
-        """Something of the recorder's own."""
+        """Write an entry of the recorder's own."""
 
 
 @dataclass(frozen=True)
 class TopicSelection:
-    """Which topics: names and patterns (`*`, `?`, `**`) of those wanted, none for all; and of those not.
+    """Selection of topics: names and patterns (`*`, `?`, `**`) to include (none for all) and to exclude.
 
-    What is left out wins. Raises `BadTopicError` for what can be no topic.
+    Excluded topics win. Raises `BadTopicError` for invalid names.
     """
 
     topics: tuple[str, ...] = ()
@@ -57,7 +57,7 @@ class TopicSelection:
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """What to subscribe, so that all of it is heard; none of them is another's part."""
+        """Minimal set of topics and patterns that covers the selection."""
         made: list[str] = []
         for each in map(widened, self.topics or (_ALL,)):
             if not any(glob_matches(other, each) for other in made):
@@ -65,22 +65,22 @@ class TopicSelection:
         return tuple(made)
 
     def has(self, topic: str) -> bool:
-        """Whether a topic is chosen."""
+        """Return True if a topic is selected."""
         if any(glob_matches(each, topic) for each in self.left_out):
             return False
         return not self.topics or any(glob_matches(each, topic) for each in self.topics)
 
     def leaves_out(self, topic: str) -> bool:
-        """Whether it is not wanted by name."""
+        """Return True if a topic is excluded explicitly."""
         return any(glob_matches(each, topic) for each in self.left_out)
 
 
 class Recorder:
-    """Gives the messages of chosen topics to a writer until it is closed; a context manager.
+    """Recorder of chosen topics into a writer. Usable as a context manager.
 
-    What is published after it was made is recorded, from topics that appear later too, the first message
-    included, where the back end knows wildcards (else within a second). Once a second it looks for alerts,
-    which are written when they change, and for descriptions of robots.
+    Everything published after its creation is recorded, including the first message of new topics where the
+    back end has patterns (otherwise within a second). Once a second it records changed alerts, and subscribes
+    to descriptions of robots.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Recorder:
         *,
         look_s: float = _LOOK_S,
     ) -> None:
-        """Subscribe. The node stays the caller's. Raises as `Node.new_sub` does."""
+        """Subscribe. The node remains open. Raises the exceptions of `Node.new_sub`."""
         self._node, self._writer, self._selection = node, writer, selection
         self._subscriptions = selection.subscriptions
         self._known: dict[str, int] = {}
@@ -113,7 +113,7 @@ class Recorder:
         if is_glob(topic):
             try:
                 self._subscribers.append(self._node.new_sub(topic, sink=partial(self._take, number)))
-            except BadTopicError:  # a back end without wildcards: the graph tells the names
+            except BadTopicError:  # a back end without patterns: use the names in the graph
                 self._has_patterns = False
         else:
             self._subscribers.append(
@@ -123,7 +123,7 @@ class Recorder:
             )
 
     def _type_of(self, topic: str) -> str:
-        """The topic's type now: who subscribes with another one causes an alert."""
+        # Subscribing with another type would cause an alert.
         with suppress(NepError):
             known = self._node.graph(_PATIENCE_S).topics.get(topic)
             if known is not None and known.msg_type:
@@ -131,13 +131,13 @@ class Recorder:
         return "json"
 
     def _take(self, number: int, messages: Sequence[Message]) -> None:
-        """Of two subscriptions that hear the same topic the first one counts."""
+        # With overlapping subscriptions the first one counts.
         mine = [each for each in messages if self._owner(each.topic) == number]
         if mine:
             self._writer.post(mine)
 
     def _owner(self, topic: str) -> int:
-        """The number of the subscription whose messages of a topic are recorded; -1: it is not chosen."""
+        # -1 if the topic is not selected.
         known = self._known.get(topic)
         if known is None:
             if len(self._known) >= _MOST_KNOWN:
@@ -163,7 +163,7 @@ class Recorder:
             self._writer.say("alerts", {"alerts": alerts})
         self._told_alerts = alerts
         for name, topic in graph.topics.items():
-            # descriptions are recorded whatever is chosen, unless they are left out by name
+            # descriptions are recorded in any case, unless excluded explicitly
             is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.leaves_out(name)
             is_chosen = self._selection.has(name)
             is_heard = is_chosen and (self._has_patterns or name in self._subscriptions)
@@ -175,7 +175,7 @@ class Recorder:
             )
 
     def close(self) -> None:
-        """Hear no more. May be called twice; the writer and the node stay."""
+        """Stop recording. The writer and the node stay open. Idempotent."""
         self._end.set()
         self._thread.join(10.0)
         self._unsubscribe()

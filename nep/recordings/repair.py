@@ -1,8 +1,8 @@
-"""Repair: what is whole in a cut or damaged recording, in a new file beside it.
+"""Repair of truncated and damaged recordings, into a new file.
 
-Read record by record until the cut. A damaged chunk, which its CRC shows, is left out, and the next whole one
-is looked for; of the last chunk, when it is cut, all whole messages are kept. The new file is read back
-before success is said, and the old one is not touched.
+Records are read up to the end or a damaged place. A damaged chunk (by its CRC) is skipped, and the next
+intact one is searched; all whole messages of a truncated last chunk are kept. The new file is verified, and
+the old one is not changed.
 """
 
 from __future__ import annotations
@@ -48,20 +48,24 @@ __all__ = ["RepairReport", "repair", "repaired_path"]
 
 _WINDOW = 4_000_000
 _LIKE_A_CHUNK = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
-"""A chunk's opcode, and a length below 2^39."""
+"""Opcode of a chunk, and a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
 _READ_HERE = frozenset({Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA})
-"""Those that are read here; one that is very long has a damaged length."""
+"""Records parsed here; a very long one has a damaged length."""
 
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What was done. Nothing was lost when `discarded_bytes` is 0.
+    """Result of a repair.
 
-    `recovered`: messages in the new file. `discarded`: messages that are known to be gone; None when nobody
-    knows how many there were. `discarded_bytes`: of the old file, that could not be read. `lost_s`: how long
-    before the recording's end the last message is that was recovered, as far as is known. `duration_s`: of
-    what was recovered.
+    Attributes:
+        path: The new file.
+        recovered: Number of messages in it.
+        discarded: Number of lost messages, or None if unknown.
+        discarded_bytes: Unreadable bytes of the old file; 0 if nothing was lost.
+        lost_s: Time between the last recovered message and the end of the recording, as far as known.
+        duration_s: Duration of the new file.
+        damaged_places: Number of damaged places.
     """
 
     path: Path
@@ -74,7 +78,7 @@ class RepairReport:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing was lost: it had only not been ended."""
+        """True if nothing was lost: the file was only not closed."""
         return not self.discarded_bytes and not self.discarded
 
 
@@ -84,17 +88,17 @@ class _Counts:
     discarded: int = 0
     discarded_bytes: int = 0
     is_unknown: bool = False
-    """Whether nobody knows how many messages were in what is gone."""
+    """True if the number of lost messages is unknown."""
     damaged_places: int = 0
     last_ns: int = 0
-    """Until when there were messages."""
+    """End of the recording as far as known."""
     figures: dict[str, object] = field(default_factory=dict)
     words: dict[str, str] = field(default_factory=dict)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
 
 
 def repaired_path(path: Path) -> Path:
-    """A name beside a damaged recording that no file has yet."""
+    """Return an unused file name beside a damaged recording."""
     made = path.with_name(f"{path.stem}.repaired.mcap")
     number = 2
     while made.exists():
@@ -106,10 +110,15 @@ def repaired_path(path: Path) -> Path:
 def repair(
     path: Path, target: Path | None = None, progress: Callable[[int, int], object] | None = None
 ) -> RepairReport:
-    """Write what is whole of a recording into `target` (`repaired_path`), and read that back.
+    """Write the intact part of a recording to a new file and verify it.
 
-    `progress` is told how many bytes of how many are done. Raises `RecordingError` when there is no message
-    that can be read, when there is such a file already, or the disk does not take it.
+    Args:
+        path: The damaged recording.
+        target: The new file. Default: `repaired_path`.
+        progress: Called with bytes done and in total.
+
+    Raises:
+        RecordingError: There is no readable message, the target exists, or it can't be written.
     """
     check_packages()
     target = repaired_path(path) if target is None else target
@@ -152,7 +161,7 @@ def _no_progress(_done: int, _total: int) -> None:
 
 
 def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
-    """The times of the first and last message. Raises `RecordingError` when it is not what was written."""
+    # Verifies the new file; returns the times of its first and last message. Raises `RecordingError`.
     counts: dict[int, int] = {}
     with path.open("rb") as file:
         index = read_index(file, path)
@@ -172,7 +181,7 @@ def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
 
 
 class _Mending:
-    """One repair."""
+    """Repair of one file."""
 
     def __init__(
         self, file: BinaryIO, path: Path, target: Path, progress: Callable[[int, int], object]
@@ -192,7 +201,7 @@ class _Mending:
         self.writer = FileWriter(target, self._table, is_new=False)
 
     def _known_definitions(self, path: Path) -> Definitions:
-        """Those of the summary, if there is one: then no damage before can take a channel away."""
+        # From the summary, if it is intact, so that damage can't lose a channel.
         try:
             index = read_index(self._file, path)
         except RecordingError:
@@ -200,7 +209,7 @@ class _Mending:
         return index.definitions
 
     def run(self) -> _Counts:
-        """Do it. Raises `OSError`."""
+        # Raises `OSError`.
         offset = len(MAGIC)
         while offset + HEAD_BYTES <= self._size:
             self._progress(offset, self._size)
@@ -220,14 +229,14 @@ class _Mending:
         return self._counts
 
     def _place(self, offset: int) -> Place | None:
-        """The record at an offset, if it can be one; it may be cut."""
+        # The record may be truncated.
         self._file.seek(offset)
         opcode, length = RECORD_HEAD.unpack(self._file.read(HEAD_BYTES))
         known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
         return Place(offset, opcode, length) if known and length < 2**39 else None
 
     def _take(self, place: Place) -> bool:
-        """Keep what a record has; False when it is no whole record."""
+        # False if it is not a whole record.
         end = place.offset + HEAD_BYTES + place.length
         if end > self._size:
             return False
@@ -249,7 +258,7 @@ class _Mending:
         return self._is_record_at(end)
 
     def _is_record_at(self, offset: int) -> bool:
-        """Whether a record, or nothing, may follow: else a length was damaged."""
+        # A damaged length would lead to arbitrary bytes.
         if offset + HEAD_BYTES > self._size:
             return True
         return self._place(offset) is not None
@@ -293,7 +302,7 @@ class _Mending:
                 return False
             self._damaged_chunk = head
             self._counts.damaged_places += 1
-            self._counts.is_unknown = True  # until its indexes tell
+            self._counts.is_unknown = True  # until its message indexes are read
             self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
             self._discard_bytes(HEAD_BYTES + place.length)
             return True
@@ -302,7 +311,7 @@ class _Mending:
         return True
 
     def _keep_chunk(self, record: memoryview, head: ChunkHead, chunk: bytes | memoryview) -> None:
-        """Copy it as it is, if it has nothing but messages of known channels."""
+        # Copied unchanged if it contains only messages of known channels.
         indexes: dict[int, list[int]] = {}
         is_plain = True
         for each in messages_in(chunk):
@@ -333,7 +342,7 @@ class _Mending:
         )
 
     def _take_record(self, record: RawMessage | tuple[int, memoryview]) -> None:
-        """A record of its own, or of a chunk that is not copied as it is."""
+        # From outside of chunks, or from a chunk that can't be copied unchanged.
         if not isinstance(record, RawMessage):
             self._define(*record)
             return
@@ -357,14 +366,14 @@ class _Mending:
         return bool(self._role(channel))
 
     def _read_own(self, record: RawMessage) -> None:
-        """The recorder's own counts, as far as they are there, stand at the end of the new file, too."""
+        # The recorder's counts are written to the metadata of the new file, too.
         if self._role(record.channel) != "figures":
             return
         with suppress(orjson.JSONDecodeError, AttributeError):
             self._counts.figures.update(orjson.loads(record.data).get("topics", {}))
 
     def _take_index(self, place: Place) -> None:
-        """Of a chunk that was kept it is known; of a damaged one it tells how many messages are gone."""
+        # The index of a damaged chunk has the number of its lost messages.
         if self._damaged_chunk is None:
             return
         with suppress(ValueError):
@@ -380,7 +389,7 @@ class _Mending:
         self._counts.discarded_bytes += count
 
     def _beyond_damage(self, offset: int) -> int:
-        """Where to go on; what is whole of a chunk that the file's end has cut is kept."""
+        # Returns the offset to continue at. Keeps whole messages of a chunk truncated by the end of the file.
         found = next(self._whole_chunks(offset + 1), None)
         self._counts.damaged_places += 1
         self._counts.is_unknown = True
@@ -395,7 +404,7 @@ class _Mending:
         return next(self._whole_chunks(offset), None) is not None
 
     def _whole_chunks(self, offset: int) -> Iterator[int]:
-        """Where a chunk begins whose CRC is right, from an offset on."""
+        # Offsets of chunks with a valid CRC.
         while offset + CHUNK_HEAD_BYTES <= self._size:
             self._file.seek(offset)
             window = self._file.read(_WINDOW)
@@ -406,7 +415,7 @@ class _Mending:
                     continue
                 try:
                     is_whole = self._is_whole(offset + at, length)
-                except RecordingTooLargeError:  # too many places look like chunks and are none
+                except RecordingTooLargeError:  # too many places look like chunks
                     return
                 if is_whole:
                     yield offset + at
@@ -427,7 +436,7 @@ class _Mending:
         return True
 
     def _take_cut_chunk(self, offset: int) -> int:
-        """Keep the whole messages of a chunk of which the end is missing; how many bytes of it were there."""
+        # Returns the number of its bytes in the file.
         self._file.seek(offset)
         begin = self._file.read(CHUNK_HEAD_BYTES)
         if len(begin) < HEAD_BYTES or begin[0] != Opcode.CHUNK:
@@ -448,7 +457,7 @@ class _Mending:
             self._take_record(each)
         return len(record) if self._counts.recovered > before else 0
 
-    # ---- the end
+    # ---- finishing
 
     def _end(self) -> None:
         counts, writer = self._counts, self.writer

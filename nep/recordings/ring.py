@@ -1,8 +1,7 @@
-"""FlightRecorder: the last minute, always. A ring of files on the disk, bounded in bytes and seconds.
+"""FlightRecorder: ring of files on disk with the last minute of messages, bounded in bytes and seconds.
 
-What comes is written into segments; the oldest is removed when there are too many bytes, or when all of it
-is older than asked. `keep` makes a recording of the last seconds by copying chunks as they are; meanwhile the
-ring goes on.
+Messages are written to segments; the oldest segment is removed when the ring exceeds its size, or when it is
+older than the time. `keep` copies the chunks of the last seconds to a recording while the ring continues.
 """
 
 from __future__ import annotations
@@ -43,14 +42,14 @@ if TYPE_CHECKING:
 __all__ = ["FlightRecorder", "KeptRecording", "RingStatus"]
 
 _SEGMENTS = 8
-"""So many make the whole time, or all the bytes."""
+"""Number of segments of a full ring."""
 _PREFIX = "ring-"
 _MOST_SECONDS = 1e9
 
 
 @dataclass(frozen=True)
 class RingStatus:
-    """What is there to be kept: seconds, bytes on the disk. `unkept`: messages; `problem`: why it ended."""
+    """State of the ring, with the `problem` that stopped it, or ""."""
 
     seconds: float
     size_bytes: int
@@ -60,7 +59,7 @@ class RingStatus:
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """What `keep` has made."""
+    """Recording made by `keep`."""
 
     path: Path
     message_count: int
@@ -69,7 +68,7 @@ class KeptRecording:
 
 @dataclass
 class _Segment:
-    """A file of the ring. `users`: recordings that are being made of it just now."""
+    """File of the ring. `users`: number of recordings being copied from it."""
 
     writer: FileWriter
     users: int = 0
@@ -77,15 +76,13 @@ class _Segment:
 
     @property
     def path(self) -> Path:
-        """Where it is."""
         return self.writer.path
 
 
 class _Segments:
-    """The destination of a ring's writer; `copied` and `status` may be asked by other threads."""
+    """Destination of a ring's writer. `take`, `give_back` and `status` are thread-safe."""
 
     def __init__(self, folder: Path, seconds: float, size_bytes: int, least_free_bytes: int) -> None:
-        """Raises `OSError`."""
         self.table = ChannelTable()
         self._folder = folder
         self._span_ns, self._size_bytes = int(seconds * 1e9), size_bytes
@@ -103,11 +100,10 @@ class _Segments:
 
     @property
     def file(self) -> FileWriter:
-        """See `Destination`."""
         return self._all[-1].writer
 
     def flushed(self) -> None:
-        """A new segment when this one has its share, and the oldest are removed."""
+        # Starts a new segment when this one has its share, and removes the oldest.
         writer = self._all[-1].writer
         if writer.start_ns is None:
             return
@@ -136,23 +132,21 @@ class _Segments:
             _remove(oldest.path)
 
     def look(self) -> None:
-        """See `Destination`: it makes room before it ends."""
+        # Frees space before it raises.
         while shutil.disk_usage(self._folder).free < self._least_free_bytes:
             with self._lock:
                 if len(self._all) == 1:
                     raise RecordingError(str(self._folder), _("the disk is full"))
-                if self._all[0].users:  # it frees nothing yet, and whoever copies it is soon done
+                if self._all[0].users:  # removing it would free nothing until the copy is done
                     return
                 self._remove_oldest()
 
     is_full = False
-    """Never: segments are removed as a whole, and hold no counts of their own."""
+    """Always False: segments are removed as a whole and have no counts of their own."""
 
-    def next_file(self) -> None:
-        """See `Destination`."""
+    def next_file(self) -> None: ...
 
     def finish(self) -> None:
-        """Nothing of it is needed any more."""
         with self._lock:
             for each in self._all:
                 with suppress(OSError):
@@ -165,7 +159,6 @@ class _Segments:
     fail = finish
 
     def status(self) -> tuple[float, int]:
-        """(seconds, bytes) that are there."""
         with self._lock:
             starts = [each.writer.start_ns for each in self._all if each.writer.start_ns is not None]
             size = sum(each.writer.size_bytes for each in self._all)
@@ -175,7 +168,7 @@ class _Segments:
         return max(each.writer.end_ns for each in self._all)
 
     def take(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
-        """The chunks of the last seconds; `give_back` their segments."""
+        # `give_back` must follow.
         with self._lock:
             since = self._newest() - int(seconds * 1e9)
             taken = []
@@ -187,7 +180,6 @@ class _Segments:
             return taken
 
     def give_back(self, taken: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
-        """They are copied."""
         with self._lock:
             for segment, _chunks in taken:
                 segment.users -= 1
@@ -201,7 +193,7 @@ def _remove(path: Path) -> None:
 
 
 def _remove_left_behind(folder: Path) -> None:
-    """Segments of processes that are gone."""
+    # Of processes that have ended.
     for each in folder.glob(f"{_PREFIX}*-*.mcap"):
         pid = each.name.removeprefix(_PREFIX).split("-")[0]
         if pid.isascii() and pid.isdigit() and int(pid) < 2**31 and not psutil.pid_exists(int(pid)):
@@ -209,7 +201,12 @@ def _remove_left_behind(folder: Path) -> None:
 
 
 class FlightRecorder:
-    """Keeps the last seconds of what is posted. Use it from any thread; a context manager."""
+    """Flight recorder: keeps the last seconds of posted messages. Thread-safe; usable as a context manager.
+
+    with FlightRecorder("ring", seconds=60.0) as ring, Recorder(node, ring):
+        ...
+        ring.keep("incident.mcap", seconds=30.0)
+    """
 
     def __init__(
         self,
@@ -221,7 +218,20 @@ class FlightRecorder:
         limits: WriterLimits = USUAL_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
-        """Begin. `folder` is for its files alone; it is made. Raises `RecordingError`, and `ValueError`."""
+        """Start the ring.
+
+        Args:
+            folder: Folder for its files only; created if needed.
+            seconds: Time to keep.
+            size_bytes: Maximum size on disk.
+            clock: Time of receipt in ns since 1970, never decreasing.
+            limits: Limits of the writer.
+            on_problem: Called once with the reason if it stops.
+
+        Raises:
+            RecordingError: The folder can't be written.
+            ValueError: `seconds` or `size_bytes` is not positive.
+        """
         if not 0.0 < seconds < _MOST_SECONDS or size_bytes < 1:
             raise ValueError(_("a ring has more than 0 seconds and bytes"))
         path = Path(folder)
@@ -235,25 +245,34 @@ class FlightRecorder:
         )
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Messages that came now. Never waits, never raises; a sink of `Node.new_sub`."""
+        """Record messages received now. Never blocks, never raises; usable as `sink` of `Node.new_sub`."""
         self._writer.post(messages)
 
     def say(self, role: Role, value: object) -> None:
-        """See `RecordingWriter.say`."""
+        """Write an entry of the recorder's own. See `RecordingWriter.say`."""
         self._writer.say(role, value)
 
     @property
     def status(self) -> RingStatus:
-        """What is there now."""
+        """Current state."""
         seconds, size_bytes = self._segments.status()
         status = self._writer.status
         return RingStatus(seconds, size_bytes, status.unkept, status.problem)
 
     def keep(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> KeptRecording:
-        """Make a recording of the last seconds that are there, and half a second before at most.
+        """Save the last seconds, up to the newest message, to a recording.
 
-        They end with the newest message. Takes as long as copying so many bytes, and what comes meanwhile is
-        kept on. Raises `RecordingError`, also when nothing has come yet, and `ValueError` for no time.
+        It may start up to half a second earlier. Takes as long as copying the bytes; the ring continues
+        meanwhile.
+
+        Args:
+            path: The new file.
+            seconds: Duration.
+            note: Text for the metadata.
+
+        Raises:
+            RecordingError: No message was received yet, or the file can't be written.
+            ValueError: `seconds` is not positive.
         """
         if not 0.0 < seconds < _MOST_SECONDS:
             raise ValueError(_("a ring has more than 0 seconds and bytes"))
@@ -304,7 +323,7 @@ class FlightRecorder:
         return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)
 
     def close(self) -> None:
-        """End, and remove its files. May be called twice."""
+        """Stop, and remove the files. Idempotent."""
         self._writer.close()
 
     def __enter__(self) -> Self:
@@ -315,7 +334,7 @@ class FlightRecorder:
 
 
 def _copy(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _FiguresSince) -> bool:
-    """Copy a chunk; False when something has damaged it on the disk. Raises `OSError`."""
+    # False if it was damaged on disk. Raises `OSError`.
     file.seek(chunk.offset)
     record = memoryview(file.read(chunk.length))
     if len(record) != chunk.length or record[0] != Opcode.CHUNK:
@@ -334,7 +353,7 @@ def _copy(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _Figure
 
 
 def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """(channel, message index) of those that stand one behind the other."""
+    # (channel, message index) of consecutive records.
     at = 0
     while at + HEAD_BYTES + 2 <= len(data):
         length = HEAD_BYTES + int.from_bytes(data[at + 1 : at + HEAD_BYTES], "little")
@@ -344,7 +363,7 @@ def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _FiguresSince:
-    """What was lost within some chunks: the ring's own counts begin when it began."""
+    """Counts within some chunks: the ring's own counts start with the ring."""
 
     def __init__(self, table: ChannelTable) -> None:
         self._table = table
@@ -355,11 +374,9 @@ class _FiguresSince:
         return dict(self._table.definitions[channel].metadata).get("nep.role", "")
 
     def wants(self, chunk: ChunkInfo) -> bool:
-        """Whether there are counts in it."""
         return any(self._role(each) == "figures" for each in chunk.channels)
 
     def read(self, records: bytes | memoryview) -> None:
-        """The records of the next chunk that has some."""
         for record in messages_in(records):
             if not isinstance(record, RawMessage) or self._role(record.channel) != "figures":
                 continue
@@ -370,7 +387,6 @@ class _FiguresSince:
                     self._last[topic] = figures
 
     def figures(self, counts: dict[int, int]) -> dict[str, TopicFigures]:
-        """Of each topic that has messages, by the messages of each channel that were copied."""
         kept: dict[str, int] = {}
         for channel, count in counts.items():
             if not self._role(channel):

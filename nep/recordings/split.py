@@ -1,4 +1,4 @@
-"""A recording in several files, none much larger than asked, each complete in itself."""
+"""Recording split into several files of limited size, each complete in itself."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ MIN_PART_BYTES = 100_000
 
 
 def part_path(path: Path, number: int) -> Path:
-    """The name of a file of a recording that is split: "tour.mcap" gives "tour-001.mcap"."""
+    """Return the name of a part: "tour.mcap" gives "tour-001.mcap"."""
     return path.with_name(f"{path.stem}-{number:03d}{path.suffix}")
 
 
 class SplitFiles:
-    """A `nep.recordings.writer.Destination`: the next file begins when one has so many bytes.
+    """Destination that starts a new file at a size (a `nep.recordings.writer.Destination`).
 
-    A file is full when the chunk is written with which it reaches its size, so it may be larger by a chunk:
-    1 MB, or one message.
+    A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one message.
     """
 
     def __init__(self, path: Path, part_bytes: int, limits: WriterLimits = USUAL_LIMITS) -> None:
-        """Make the first file. Raises `RecordingError`."""
+        """Create the first file. Raises `RecordingError`."""
         self._path, self._part_bytes, self._limits = path, part_bytes, limits
         self._table = ChannelTable()
         self.paths: list[Path] = []
-        """The files so far."""
+        """Files so far."""
         self._part = self._new()
 
     def _new(self) -> OneFile:
@@ -47,31 +46,31 @@ class SplitFiles:
 
     @property
     def file(self) -> FileWriter:
-        """See `Destination`."""
+        """Current file."""
         return self._part.file
 
     @property
     def is_full(self) -> bool:
-        """See `Destination`."""
+        """True if the file has reached the size."""
         return self.file.size_bytes >= self._part_bytes
 
     def flushed(self) -> None:
-        """There is nothing to do."""
+        """Do nothing."""
 
     def next_file(self) -> None:
-        """See `Destination`."""
+        """Open the next file and finish this one."""
         full = self._part
         self._part = self._new()
         full.finish()
 
     def look(self) -> None:
-        """See `Destination`."""
+        """Check file and disk. Raises `RecordingError`."""
         self._part.look()
 
     def finish(self) -> None:
-        """See `Destination`."""
+        """Finish the last file. Raises `OSError`."""
         self._part.finish()
 
     def fail(self) -> None:
-        """See `Destination`."""
+        """Close the last file as it is."""
         self._part.fail()

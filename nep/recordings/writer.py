@@ -1,8 +1,8 @@
-"""RecordingWriter: messages in, from any thread; a file out, written by one thread.
+"""RecordingWriter: records messages from any thread in a thread of its own.
 
-`post` never waits. The queue is bounded by bytes and by number; a message for which there is no room is
-counted, shown and told inside the recording. Chunks are written when they have 1 MB or are half a second old:
-so a process that is killed loses less than a second, and a reader finds whole records up to there.
+`post` never blocks. The queue is bounded in bytes and number; dropped messages are counted, shown and
+recorded. Chunks are written at 1 MB or after half a second: a process that is killed loses less than a
+second, and readers find whole records up to there.
 """
 
 from __future__ import annotations
@@ -40,35 +40,41 @@ if TYPE_CHECKING:
 __all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 
 MOST_ONES_CHANNELS = 10_000
-"""With more, publishers that come later share a channel for each topic."""
+"""Number of channels beyond which new publishers share a channel per topic."""
 _CLOSE_S = 30.0
 _KNOWN = 10_000
 _MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
 _OTHERS = ""
-"""Where topics are counted of which there are too many."""
+"""Key of the counter for all topics beyond the limit."""
 _log = logging.getLogger("nep.recordings")
 
 
 class LogClock:
-    """When messages came, in nanoseconds since 1970: the computer's clock when it was made, and steady since.
+    """Clock of receipt times in nanoseconds since 1970: system time at its creation, then monotonic.
 
-    So a recording's time never jumps, also when somebody sets the clock.
+    So the time of a recording never jumps, even if the system clock is set.
     """
 
     def __init__(self) -> None:
         self._add_ns = time.time_ns() - time.monotonic_ns()
 
     def __call__(self) -> int:
-        """Now."""
+        """Return the current time."""
         return time.monotonic_ns() + self._add_ns
 
 
 @dataclass(frozen=True)
 class RecordingStatus:
-    """What a writer has done so far.
+    """State of a writer.
 
-    `message_count`: messages in the file. `size_bytes`: of the file. `duration_s`: since the first message.
-    `queued_bytes`: waits to be written. `unkept`: came and are not in it. `problem`: why it ended, or "".
+    Attributes:
+        message_count: Number of messages in the file.
+        size_bytes: Size of the file.
+        duration_s: Time since the first message.
+        queued_bytes: Size of messages waiting to be written.
+        unkept: Number of received messages that are not recorded.
+        topics: Counts by topic.
+        problem: Reason why it stopped by itself, or "".
     """
 
     message_count: int
@@ -82,7 +88,7 @@ class RecordingStatus:
 
 @dataclass
 class _Known:
-    """What is known of the messages of one publisher, by their `MessageKind`."""
+    """Cached properties of a publisher's messages, by their `MessageKind`."""
 
     kind: MessageKind
     publisher: int | None
@@ -91,7 +97,7 @@ class _Known:
 
 
 class _Said:
-    """Something that the recorder says itself."""
+    """Entry of the recorder's own."""
 
     __slots__ = ("role", "text")
 
@@ -102,20 +108,20 @@ class _Said:
 
 @dataclass
 class _Part:
-    """What is known of one file of a recording that is split."""
+    """State of one file of a split recording."""
 
     number: int = 1
     messages_before: int = 0
     bytes_before: int = 0
     repeated: int = 0
-    """Latched messages that stand in an earlier file, too."""
+    """Number of latched messages repeated from an earlier file."""
     before: Mapping[str, TopicFigures] = field(default_factory=dict)
-    """The counts when it began."""
+    """Counts at its start."""
     latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
     latched_bytes: int = 0
 
     def keep(self, message: Message) -> None:
-        """A latched message, which the next file needs, too; as many as fit."""
+        # A latched message is repeated in the next file; bounded.
         key = (message.topic, message.publisher)
         old = self.latched.get(key)
         grown = message.size_bytes - (old.size_bytes if old is not None else 0)
@@ -126,12 +132,10 @@ class _Part:
             self.latched_bytes += grown
 
     def of(self, figures: Mapping[str, TopicFigures]) -> dict[str, TopicFigures]:
-        """What was counted in this file."""
         nothing = TopicFigures()
         return {topic: each.since(self.before.get(topic, nothing)) for topic, each in figures.items()}
 
     def following(self, figures: Mapping[str, TopicFigures], messages: int, size_bytes: int) -> _Part:
-        """The next file's, where so much is in this one and those before."""
         return _Part(
             self.number + 1,
             messages,
@@ -144,7 +148,11 @@ class _Part:
 
 
 class RecordingWriter:
-    """Writes a recording. Use it from any thread; a context manager."""
+    """Writer of a recording. Thread-safe; usable as a context manager.
+
+    with RecordingWriter("tour.mcap", note="first floor") as writer, Recorder(node, writer):
+        time.sleep(60.0)
+    """
 
     def __init__(
         self,
@@ -155,10 +163,18 @@ class RecordingWriter:
         limits: WriterLimits = USUAL_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
-        """Make the file, which there must not be yet, and start the thread. Raises `RecordingError`.
+        """Create a file and start the thread.
 
-        `note`: words about it. `clock`: nanoseconds since 1970, never backwards. `on_problem` is told once,
-        in the thread that writes, why it has ended.
+        Args:
+            path: The new file, which must not exist, or a destination.
+            note: Text for the metadata.
+            clock: Time of receipt in ns since 1970, never decreasing.
+            limits: Limits of queue, disk and times.
+            on_problem: Called once in the writer's thread with the reason if it stops by itself.
+
+        Raises:
+            RecordingError: The file can't be created.
+            RecordingsUnavailableError: Packages for recordings are not installed.
         """
         self._note = note
         self._clock = LogClock() if clock is None else clock
@@ -193,7 +209,7 @@ class RecordingWriter:
         self._part = _Part()
         self._own_numbers: set[int] = set()
         self._rest: list[Sequence[Message]] = []
-        """What was taken from the queue and not added to the file when the disk took no more."""
+        """Messages taken from the queue but not added to the file when writing failed."""
         self._message_count = self._size_bytes = 0
         self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
         self._thread.start()
@@ -201,7 +217,10 @@ class RecordingWriter:
     # ---- any thread
 
     def post(self, messages: Sequence[Message]) -> None:
-        """Record messages that came now, in this order. Never waits, never raises: a sink of `new_sub`."""
+        """Record messages received now, in this order.
+
+        Never blocks, never raises; usable as `sink` of `new_sub`.
+        """
         now = self._clock()
         size = sum([each.size_bytes for each in messages])
         with self._lock:
@@ -218,7 +237,7 @@ class RecordingWriter:
             self._lock.notify_all()
 
     def _post_what_fits(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
-        """There is no room for all of them: under the lock."""
+        # Called with the lock held, when there is not room for all.
         fits = []
         for message in messages:
             size = message.size_bytes
@@ -242,7 +261,7 @@ class RecordingWriter:
             self._lock.notify_all()
 
     def say(self, role: Role, value: object) -> None:
-        """Write something of the recorder's own, as JSON: "alerts", "notes". Never waits."""
+        """Write an entry of the recorder's own as JSON, such as "alerts" or "notes". Never blocks."""
         text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
         with self._lock:
             if (
@@ -255,7 +274,7 @@ class RecordingWriter:
                 self._lock.notify_all()
 
     def flush(self, timeout_s: float = 10.0) -> bool:
-        """Let all that was posted before be in the file; whether that was done in time."""
+        """Wait until everything posted is in the file. Return False after the time limit or an error."""
         with self._lock:
             self._flush_wanted += 1
             wanted = self._flush_wanted
@@ -267,7 +286,7 @@ class RecordingWriter:
 
     @property
     def status(self) -> RecordingStatus:
-        """What was done so far; the topics' figures are a second old at most."""
+        """Current state; counts by topic are at most a second old."""
         with self._lock:
             first = self._first_ns
             waiting = sum(count for count, _size in self._left_out.values())
@@ -283,13 +302,14 @@ class RecordingWriter:
 
     @property
     def problem(self) -> str:
-        """Why it has ended by itself; "" while all is well."""
+        """Reason why the writer stopped by itself, or ""."""
         return self._problem
 
     def close(self, timeout_s: float = _CLOSE_S) -> RecordingStatus:
-        """Write what waits, and the end. May be called twice. Raises `ClosedError` when that takes too long.
+        """Write queued messages and finish the file. Idempotent. Errors are in the returned status.
 
-        What went wrong is in the status.
+        Raises:
+            ClosedError: The disk did not respond within `timeout_s` seconds.
         """
         with self._lock:
             self._is_closing = True
@@ -305,7 +325,7 @@ class RecordingWriter:
     def __exit__(self, *_exc: object) -> None:
         self.close()
 
-    # ---- the thread that writes
+    # ---- writer thread
 
     def _run(self) -> None:
         try:
@@ -315,7 +335,7 @@ class RecordingWriter:
             self._fail(disk_sentence(self._destination.file.path, error))
         except RecordingError as error:
             self._end_early(error)
-        except Exception as error:  # noqa: BLE001 - whatever it is: nobody may think that it goes on
+        except Exception as error:  # noqa: BLE001 - any error must be reported as the end of the recording
             _log.exception("a recording has ended by an error of nep's own")
             self._fail(
                 RecordingError(
@@ -378,14 +398,14 @@ class RecordingWriter:
                 self._queued_messages -= count
 
     def _log_ns(self, message: Message, now: int) -> int:
-        """When it came. Messages come in batches: their stamps say when, as far as their clock is known."""
+        # Messages arrive in batches; if the publisher's clock is known, their time stamps are more precise.
         difference = message.kind.clock.difference
         log_ns = now
         if difference is not None and message.stamp_ns is not None:
             log_ns = min(now, message.stamp_ns + difference.add_ns)
         log_ns = self._last_ns = max(self._last_ns, log_ns)
         if self._first_ns is None:
-            # A latched message is as old as its publisher: the first one comes when it came.
+            # a latched message may be as old as its publisher; the recording starts at its receipt
             self._first_ns = self._last_ns = log_ns = max(log_ns, self._started_ns)
         return log_ns
 
@@ -417,7 +437,7 @@ class RecordingWriter:
         if len(self._known) >= _KNOWN:
             self._known.clear()
         known = _Known(message.kind, message.publisher, self._counter(message.topic))
-        self._known[id(message.kind)] = known  # which lives as long as this, so nobody else has its id
+        self._known[id(message.kind)] = known  # `known` keeps the kind alive, so its id stays unique
         return known
 
     def _counter(self, topic: str) -> TopicCounter:
@@ -426,7 +446,7 @@ class RecordingWriter:
         return self._counters.setdefault(topic, TopicCounter())
 
     def _channel(self, message: Message, encoding: Encoding, log_ns: int) -> tuple[int | None, Encoding]:
-        """The number of its channel; with too many publishers it shares one, and tells all of itself."""
+        # With too many publishers it is shared, and the record has all properties.
         table = self._destination.file.table
         definition = definition_of(message, encoding)
         if len(table.definitions) < MOST_ONES_CHANNELS or table.has(definition):
@@ -452,14 +472,14 @@ class RecordingWriter:
             self._begin_next()
 
     def _begin_next(self) -> None:
-        """Finish a file that is full, with what was counted in it, and go on in the next one."""
+        # The counts of the full file are written before it is finished.
         self._write_figures(all_of_them=True)
         file = self._destination.file
         self._add_words(file, "")
         self._destination.next_file()
         self._count_file(file)
         self._part = self._part.following(self._figures, self._message_count, self._size_bytes)
-        for message in self._part.latched.values():  # who plays this file alone needs them, too
+        for message in self._part.latched.values():  # each file must be playable alone
             encoding = encoding_of(message, self._last_ns)
             number, encoding = self._channel(message, encoding, self._last_ns)
             if number is not None:
@@ -483,7 +503,7 @@ class RecordingWriter:
         plain = {topic: each.to_plain() for topic, each in self._part.of(figures).items()}
         self._write_own("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
 
-    # ---- the end
+    # ---- finishing
 
     def _finish(self, reason: str = "") -> None:
         self._write_figures(all_of_them=True)
@@ -522,7 +542,7 @@ class RecordingWriter:
             self._size_bytes = part.bytes_before + file.size_bytes
 
     def _end_early(self, error: RecordingError) -> None:
-        """It may not go on, but what is there can be finished."""
+        # Stops, but the file can be finished.
         self._stop(error.reason)
         try:
             self._finish(error.reason)
@@ -530,12 +550,12 @@ class RecordingWriter:
             self._let_go()
 
     def _fail(self, error: RecordingError) -> None:
-        """Nothing more can be written: the file ends with its last whole record."""
+        # Nothing more can be written: the file ends with its last whole record.
         file = self._destination.file
         with self._lock:
             for messages in self._rest:
                 self._leave_out(messages)
-            for number, count in file.pending_counts.items():  # came, but only into memory
+            for number, count in file.pending_counts.items():  # received, but only in memory
                 definition = file.table.definitions[number]
                 left = self._left_out.setdefault((definition.topic, None), [0, 0])
                 left[0] += 0 if number in self._own_numbers else count
@@ -544,7 +564,7 @@ class RecordingWriter:
         self._stop(error.reason)
 
     def _let_go(self) -> None:
-        with suppress(OSError):  # what a disk says to the end, too, nobody needs
+        with suppress(OSError):  # a further error doesn't matter
             self._destination.fail()
 
     def _stop(self, reason: str) -> None:

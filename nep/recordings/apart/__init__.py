@@ -1,1 +1,1 @@
-"""Recordings that are read in a process of their own, and the frames between the two processes."""
+"""Reading recordings in a process of its own, and the frames exchanged with it."""

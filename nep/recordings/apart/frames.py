@@ -1,4 +1,4 @@
-"""Frames between a program and the process that reads recordings for it: msgpack maps with their length."""
+"""Frames exchanged with the reader process: msgpack maps with a length prefix."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MAX_FRAME_BYTES = 2**31 - 1
 
 
 def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
-    """Write a frame, and flush. Raises `OSError`, and `ValueError` for a stream that is closed."""
+    """Write a frame and flush. Raises `OSError`, and `ValueError` for a closed stream."""
     packed = pack(content)
     stream.write(_LENGTH.pack(len(packed)))
     stream.write(packed)
@@ -36,7 +36,7 @@ def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
 
 
 def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
-    """Read a frame; None at the end of the stream, or where it is no frame. Raises `OSError`."""
+    """Read a frame; return None at the end of the stream or for invalid data. Raises `OSError`."""
     head = stream.read(_LENGTH.size)
     if len(head) < _LENGTH.size:
         return None
@@ -61,17 +61,17 @@ def packed_messages(messages: Iterable[RawMessage]) -> bytes:
 
 
 def plain_damage(damage: Iterable[Damage]) -> list[dict[str, object]]:
-    """Damage as a frame has it."""
+    """Return damage as plain values for a frame."""
     return [asdict(each) for each in damage]
 
 
 def damage_of(plain: object) -> tuple[Damage, ...]:
-    """The damage in a frame. Raises `TypeError` for what is none."""
+    """Return the damage in a frame. Raises `TypeError` for invalid data."""
     return tuple(Damage(**each) for each in plain) if isinstance(plain, list) else ()
 
 
 def plain_facts(facts: FileFacts) -> dict[str, object]:
-    """What is known of a file, as a frame has it."""
+    """Return facts of a file as plain values for a frame."""
     return {
         **{name: getattr(facts, name) for name in _SCALARS},
         "channels": {
@@ -96,7 +96,7 @@ _SCALARS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "libra
 
 
 def facts_of(plain: object) -> FileFacts:
-    """The facts in a frame. Raises `TypeError`, `KeyError` for what are none."""
+    """Return the facts in a frame. Raises `TypeError` or `KeyError` for invalid data."""
     if not isinstance(plain, dict):
         raise TypeError("facts")
     definitions = {

@@ -1,8 +1,8 @@
-"""Reads recordings for another program: `python -m nep.recordings.apart.reader_process`.
+"""Process that reads recordings for another program: `python -m nep.recordings.apart.reader_process`.
 
-A recording may come from anywhere, so a program with a window reads it in this process, whose memory is
-limited, and which may be ended at any moment. Requests come as frames (`nep.recordings.apart.frames`) on the
-standard input, one at a time; each is answered by one frame, after any number of progress frames.
+Recordings may be untrusted, so Studio reads them in this process, whose memory is limited and which can be
+killed at any time. Requests are frames (`nep.recordings.apart.frames`) on standard input, one at a time; each
+is answered by any number of progress frames and one reply frame.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Answer = Mapping[str, object]
 
 
 class RecordingService:
-    """Carries out requests; `tell` is given progress."""
+    """Executor of requests. `tell` is called with progress frames."""
 
     def __init__(self, tell: Callable[[Answer], object]) -> None:
         self._tell = tell
@@ -52,7 +52,7 @@ class RecordingService:
         }
 
     def answer(self, request: Mapping[str, Any]) -> Answer:
-        """Carry out a request. What goes wrong is in the answer; nothing is raised."""
+        """Execute a request and return the reply. Errors are returned, not raised."""
         path = str(request.get("path", ""))
         try:
             answer = dict(self._operations[request["op"]](request))
@@ -72,7 +72,7 @@ class RecordingService:
         return answer
 
     def _add_damage(self, answer: dict[str, object], number: object) -> None:
-        """Tell the damage of a file when there is more of it than was told."""
+        # Adds the damage of a file if it has grown since the last reply.
         file = self._files.get(number) if isinstance(number, int) else None
         if file is None or not isinstance(number, int):
             return
@@ -105,7 +105,7 @@ class RecordingService:
         return self._next({"cursor": number, "most": request["most"]})
 
     def _next(self, request: Mapping[str, Any]) -> Answer:
-        """Messages that follow; a cursor of 0 when there are no more."""
+        # The cursor is 0 after the last message.
         number = request["cursor"]
         if number not in self._cursors:
             raise ValueError(_("it is read in too many places at once"))
@@ -148,7 +148,7 @@ class RecordingService:
 
 
 def _limit_memory(limit_mb: int) -> None:
-    """Where the system has such a limit; elsewhere the reader's own limits are all."""
+    # Only where the system supports it; elsewhere only the reader's own limits apply.
     try:
         import resource  # noqa: PLC0415 - not on Windows
     except ImportError:
@@ -158,19 +158,19 @@ def _limit_memory(limit_mb: int) -> None:
 
 
 def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
-    """Answer requests until there are no more."""
+    """Execute requests until the input ends."""
     service = RecordingService(lambda content: write_frame(answers, content))
     while (request := read_frame(requests)) is not None:
         write_frame(answers, service.answer(request))
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Answer what comes on the standard input until it ends."""
+    """Execute requests from standard input until it ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.apart.reader_process")
     parser.add_argument("--memory-mb", type=int, default=1024)
     _limit_memory(parser.parse_args(arguments).memory_mb)
     begin()
-    with suppress(OSError, KeyboardInterrupt):  # nobody listens any more
+    with suppress(OSError, KeyboardInterrupt):  # the parent process has ended
         serve(sys.stdin.buffer, sys.stdout.buffer)
 
 

@@ -1,7 +1,7 @@
-"""Recordings that are read in another process (`nep.recordings.apart.reader_process`).
+"""Client of the process that reads recordings (`nep.recordings.apart.reader_process`).
 
-A process that takes too long, needs too much memory or dies costs its files, and nobody else: reading them
-raises `RecordingError` with a sentence. The next file that is opened starts a new process.
+When the process takes too long, needs too much memory or crashes, reading its files raises `RecordingError`.
+The next file that is opened starts a new process.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ _FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
 
 
 class ReaderProcess:
-    """A process that reads recordings. Thread-safe; usable as a context manager.
+    """Process that reads recordings. Thread-safe; usable as a context manager.
 
-    Requests are carried out one after the other; a reader that iterates asks for a megabyte at a time, so
-    others need not wait long.
+    Requests are executed one at a time. Iterating requests at most a megabyte at once, so that other requests
+    don't wait long.
     """
 
     def __init__(self, command: Sequence[str], *, timeout_s: float = _TIMEOUT_S) -> None:
-        """Nothing is started before a recording is opened.
+        """Create it without starting a process.
 
         Args:
-            command: Starts `nep.recordings.apart.reader_process`.
-            timeout_s: A request that is not answered for so long ends the process. Opening a file may take
-                longer, as long as it makes progress.
+            command: Command line of `nep.recordings.apart.reader_process`.
+            timeout_s: Time limit of a request in seconds, after which the process is killed. Opening a file
+                may take longer as long as it makes progress.
         """
         self._command, self._timeout_s = command, timeout_s
         self._lock = threading.Lock()
@@ -65,13 +65,13 @@ class ReaderProcess:
 
         Args:
             path: The file.
-            cache_bytes: How much of decompressed chunks the process keeps.
-            progress: See `Recording`; what it raises ends the process, and comes out.
-            budget: Bytes and seconds of work that may be spent on the file, opening included.
+            cache_bytes: Maximum size of decompressed chunks that the process caches.
+            progress: As for `Recording`; an exception kills the process and propagates.
+            budget: Maximum work for the file in bytes and seconds, including opening.
 
         Raises:
-            RecordingError: It can't be opened, or the process can't be started.
-            RecordingTooLargeError: It is more work than is allowed.
+            RecordingError: The file can't be opened, or the process can't be started.
+            RecordingTooLargeError: The file exceeds the budget.
             ClosedError: `close` was called.
         """
         with self._lock:
@@ -85,7 +85,7 @@ class ReaderProcess:
         return Recording(path, file=_RemoteFile(pipe, path, answer, self._timeout_s))
 
     def close(self) -> None:
-        """End the process at once; whoever reads gets `ClosedError`. May be called twice."""
+        """Kill the process; concurrent reads raise `ClosedError`. Idempotent."""
         with self._lock:
             self._is_closed = True
             pipe, self._pipe = self._pipe, None
@@ -100,7 +100,7 @@ class ReaderProcess:
 
 
 class _Pipe:
-    """One process and its pipes. A thread reads the answers, so that waiting for them can end."""
+    """Process with its pipes. A thread reads the replies, so that waiting for them can time out."""
 
     def __init__(self, command: Sequence[str], path: Path) -> None:
         try:
@@ -110,7 +110,7 @@ class _Pipe:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 creationflags=NO_CONSOLE,
-                start_new_session=True,  # Ctrl+C in a terminal is the program's that reads
+                start_new_session=True,  # Ctrl+C in the terminal is for the parent
             )
         except OSError as error:
             reason = _("the process that reads it can't be started: {error}")
@@ -131,7 +131,7 @@ class _Pipe:
         while frame is not None:
             frame = None
             if out is not None:
-                with suppress(OSError, ValueError):  # it has ended
+                with suppress(OSError, ValueError):  # the process has ended
                     frame = read_frame(out)
             self._answers.put(frame)
 
@@ -142,11 +142,11 @@ class _Pipe:
         timeout_s: float,
         progress: Callable[[int, int], object] | None = None,
     ) -> dict[str, Any]:
-        """The answer to a request. Raises `RecordingError`, `ClosedError`."""
+        # Raises `RecordingError`, `ClosedError`.
         with self._lock:
             self._check(path)
             stdin: IO[bytes] | None = self._process.stdin
-            with suppress(OSError, ValueError):  # then there is no answer, either
+            with suppress(OSError, ValueError):  # the reply is then missing, too
                 if stdin is not None:
                     write_frame(stdin, request)
             while True:
@@ -180,7 +180,7 @@ class _Pipe:
             raise ClosedError(f"recording '{path.name}'")
 
     def end(self) -> None:
-        """End it, also while somebody waits for an answer."""
+        # Also interrupts a thread that waits for a reply.
         self._was_ended = True
         self._kill()
 
@@ -189,7 +189,7 @@ class _Pipe:
             self._process.kill()
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_CLOSE_S)
-        while self._thread.is_alive():  # it may wait for room
+        while self._thread.is_alive():  # the reader thread may wait for room in the queue
             with suppress(queue.Empty):
                 self._answers.get_nowait()
             self._thread.join(0.01)
@@ -202,7 +202,7 @@ class _Pipe:
 
 
 class _RemoteFile:
-    """A file that is open in the process. See `nep.recordings.file_reader.RawFile`."""
+    """Open file in the reader process (a `RawFile`)."""
 
     def __init__(self, pipe: _Pipe, path: Path, opened: Mapping[str, Any], timeout_s: float) -> None:
         self._pipe, self._path, self._timeout_s = pipe, path, timeout_s
@@ -213,7 +213,6 @@ class _RemoteFile:
 
     @property
     def damage(self) -> Sequence[Damage]:
-        """See `RawFile`."""
         return self._damage
 
     def _ask(self, op: str, **request: object) -> dict[str, Any]:
@@ -232,7 +231,6 @@ class _RemoteFile:
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """See `RawFile`."""
         if not channels:
             return
         most = _FIRST_BATCH
@@ -252,7 +250,6 @@ class _RemoteFile:
             answer = self._ask("next", cursor=answer["cursor"], most=most)
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """See `RawFile`."""
         if not groups:
             return []
         answer = self._ask("newest", at_ns=_bounded(at_ns), groups=[list(each) for each in groups])
@@ -260,7 +257,6 @@ class _RemoteFile:
         return [next(messages, None) if is_there else None for is_there in answer["are_there"]]
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """See `RawFile`."""
         times: dict[int, int] = self._ask("newest_times", at_ns=_bounded(at_ns), channels=list(channels))[
             "times"
         ]
@@ -269,19 +265,16 @@ class _RemoteFile:
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """See `RawFile`."""
         span = {"start_ns": _bounded(start_ns), "end_ns": _bounded(end_ns)}
         answer = self._ask("densities", **span, buckets=buckets, channels=list(channels))
         counts: dict[int, Sequence[int]] = answer["counts"]
         return counts
 
     def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        """See `RawFile`."""
         pieces: list[int] = self._ask("pieces_of", channels=list(channels))["pieces"]
         return pieces
 
     def close(self) -> None:
-        """See `RawFile`."""
         if not self._is_closed:
             with suppress(RecordingError, ClosedError):
                 self._ask("close")
@@ -289,5 +282,5 @@ class _RemoteFile:
 
 
 def _bounded(at_ns: int | None) -> int | None:
-    """A time that msgpack has a form for."""
+    # Clamped to the range of msgpack.
     return None if at_ns is None else max(-(2**63), min(at_ns, 2**64 - 1))

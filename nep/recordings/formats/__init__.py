@@ -1,4 +1,4 @@
-"""Files of recordings as bytes: records, chunks, channels, indexes, limits and damage.
+"""File format of recordings: records, chunks, channels, indexes, limits and damage.
 
-Reading, playing, repairing and exporting messages is outside.
+Reading, playing, repairing and exporting messages are in the parent package.
 """

@@ -1,11 +1,11 @@
-"""Channels of a recording: how a message lies in it, so that it comes out as it was received.
+"""Channels of a recording: encoding of messages so that they can be restored exactly.
 
-A channel has the messages of one publisher on one topic that are alike: its metadata tell once what they have
-in common (codec, type, publisher, whether it is latched), a message's record has its time of arrival (log
-time), its stamp (publish time) and the lower half of its number (sequence). JSON and msgpack lie there as
-they were received; pictures, text and bytes in a message of Protocol Buffers that has them in one piece
-(`nep.recordings.formats.protobuf`). What does not fit, such as a number above 2^32 or bytes that are no JSON,
-is wrapped in one, too; the rest is in its field 1000. docs/recordings.md has the whole table.
+A channel holds similar messages of one publisher on one topic: its metadata has their common properties
+(codec, type, publisher, latched), a record has log time (time of receipt), publish time (time stamp) and the
+lower half of the sequence number. JSON and msgpack are stored as received; images, text and bytes in a
+Protocol Buffers message that contains them unchanged (`nep.recordings.formats.protobuf`). Other data, such as
+sequence numbers above 2^32 or invalid JSON, are wrapped in one, too, with the rest in its field 1000. See the
+table in docs/recordings.md.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ __all__ = [
 ]
 
 PREFIX = "nep."
-"""How the keys of nep's own metadata begin."""
+"""Prefix of nep's metadata keys."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1
 Role = str
 OWN_TOPICS: Mapping[Role, str] = {
@@ -56,13 +56,12 @@ OWN_TOPICS: Mapping[Role, str] = {
     "runs": "/nep/recording/runs",
     "alarms": "/nep/recording/alarms",
 }
-"""What the recorder says itself, by its role: counts of each topic, alerts, bookmarks and notes; and what it
-is told by whoever runs behaviours and watches over alarms."""
+"""Topics of the recorder's own entries by role: counts, alerts, notes, and events of runs and alarms."""
 
 
 @dataclass(frozen=True)
 class ChannelDefinition:
-    """A channel and its schema, as they stand in the file."""
+    """Channel and schema as stored in the file."""
 
     topic: str
     message_encoding: str
@@ -73,7 +72,7 @@ class ChannelDefinition:
 
 
 class Encoding(NamedTuple):
-    """How a message is written: its form, what stands before its bytes, and the two numbers of its record."""
+    """Encoding of a message: form, bytes before its data, and the two numbers of its record."""
 
     form: str
     before: bytes
@@ -81,7 +80,7 @@ class Encoding(NamedTuple):
     publish_ns: int
     is_decodable: bool
     is_apart: bool = False
-    """Whether its publisher and the like are told with it, for a recording that has too many channels."""
+    """True if the record includes its publisher and type, because the recording has too many channels."""
 
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
@@ -89,16 +88,16 @@ _DATA_FIELD = {"picture": 2, "raw": 6, "text": 1, "wrapped": 1}
 _RAW_SHOWN = frozenset({
     "bgr8", "bgra8", "rgb8", "rgba8", "mono8", "mono16", "8UC1", "8UC3", "16UC1", "32FC1",
 })  # fmt: skip
-"""Layouts of raw pixels that `foxglove.RawImage` has, too."""
+"""Pixel layouts supported by `foxglove.RawImage`."""
 
 
-# ---- a message becomes a record
+# ---- encoding
 
 
 def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Encoding:
-    """How to write a message that arrived at `log_ns`. Never raises, whatever the message has.
+    """Return the encoding of a message received at `log_ns`. Never raises.
 
-    `is_apart`: tell all of it in the record, because there is no channel for its publisher.
+    `is_apart`: include all properties in the record, because its publisher has no channel.
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
@@ -135,14 +134,14 @@ def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Enc
 def _packed(extra: Mapping[str, Any]) -> bytes:
     try:
         return pack(extra)
-    except ValueError:  # an extension or a number that cannot have come over a wire
+    except ValueError:  # an extension or number that can't have been received from a wire
         plain = {key: value for key, value in extra.items() if key != "extension"}
         numbers = {key: max(-(2**63), min(each, _U64)) for key, each in plain.items() if type(each) is int}
         return pack(plain | numbers)
 
 
 def _form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
-    """(how it lies in the file, whether it can be decoded, fields that come before its data)."""
+    # (form, whether it can be decoded, fields before its data)
     codec = message.kind.codec
     if codec == "json":
         try:
@@ -198,7 +197,7 @@ def _pixel_bytes(numbers: str, channels: int) -> int:
 
 
 def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
-    """The channel that a message so encoded belongs to."""
+    """Return the channel of a message with this encoding."""
     kind, form = message.kind, encoding.form
     metadata = [("nep.form", form)]
     if not encoding.is_apart:
@@ -213,7 +212,7 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
     schema = ("", "", b"")
     if form == "json":
         schema = (kind.msg_type, "jsonschema", schema_of(kind.msg_type))
-    elif form == "msgpack":  # of anything; `mcap doctor` calls it an error when a channel has no schema
+    elif form == "msgpack":  # any value; `mcap doctor` reports an error for a channel without schema
         schema = (kind.msg_type, "jsonschema", b"{}")
     elif form in _DATA_FIELD:
         name = _SCHEMAS.get(form, "nep.Bytes")
@@ -223,7 +222,7 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
 
 
 def own_channel(role: Role) -> ChannelDefinition:
-    """A channel of what the recorder says itself, as JSON."""
+    """Return a JSON channel for the recorder's own entries."""
     topic = OWN_TOPICS[role]
     return ChannelDefinition(
         topic, "json", f"nep/{role}", "jsonschema", b'{"type":"object"}', (("nep.role", role),)
@@ -256,17 +255,17 @@ class LiveChannels:
         return definition_of(message, encoding), b"".join((encoding.before, message.raw))
 
 
-# ---- and back
+# ---- decoding
 
 
 class ChannelDecoder:
-    """Makes messages of the records of one channel; of other programs' recordings, too, as far as they go."""
+    """Decoder of the records of one channel, also of other programs' recordings as far as possible."""
 
     def __init__(self, definition: ChannelDefinition) -> None:
         self.definition = definition
         metadata = dict(definition.metadata)
         self.role: Role | None = metadata.get("nep.role")
-        """What the recorder says with it; None for a topic's messages."""
+        """Role of the recorder's own entries, or None for messages of a topic."""
         self._form = metadata.get("nep.form", "")
         self._has_seq = bool(metadata.get("nep.has_seq", "1" if not self._form else ""))
         self._has_stamp = bool(metadata.get("nep.has_stamp", "1" if not self._form else ""))
@@ -287,7 +286,7 @@ class ChannelDecoder:
         self._kinds: dict[tuple[str, str, bool], MessageKind] = {}
 
     def _likely_codec(self) -> str:
-        """Of a channel that another program has made."""
+        # For channels of other programs.
         if self._is_wrapped:
             return "image" if self.definition.schema_name.endswith("Image") else "bytes"
         encoded = self.definition.message_encoding
@@ -295,29 +294,29 @@ class ChannelDecoder:
 
     @property
     def topic(self) -> str:
-        """The topic's name."""
+        """Name of the topic."""
         return self.definition.topic
 
     @property
     def publisher(self) -> int | None:
-        """The publisher of its messages, when all have the same."""
+        """Publisher of the messages, if all have the same."""
         return self._publisher
 
     def message(self, raw: RawMessage) -> Message:
-        """The message as it was received. A record that is no such message gives one of its bytes."""
+        """Return the message as it was received, or a message of bytes for an invalid record."""
         kind, data = self._kind, raw.data
         seq = raw.sequence if self._has_seq else None
         stamp = raw.publish_ns if self._has_stamp else None
         publisher, extension = self._publisher, NOTHING
         if self._is_wrapped:
             data, extra = self._unwrapped(data)
-            if extra:  # of a damaged or made up file they may be anything
+            if extra:  # untrusted: may contain any values
                 told = extra.get("extension", NOTHING)
                 extension = told if isinstance(told, Mapping) else NOTHING
                 seq, stamp = _whole(extra.get("seq", seq)), _whole(extra.get("stamp_ns", stamp))
                 if "publisher" in extra:
                     publisher, kind = _whole(extra["publisher"]), self._kind_of(extra)
-        # A publisher's number may be missing, which `arrived` takes as it is.
+        # `arrived` accepts a missing publisher
         return arrived(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
 
     def _kind_of(self, extra: Mapping[str, Any]) -> MessageKind:
@@ -342,7 +341,7 @@ class ChannelDecoder:
                     told[number] = value
         except ValueError:
             return data, {}
-        if not self._form and self._data_field != 1:  # another program's picture
+        if not self._form and self._data_field != 1:  # an image of another program
             extra = {"extension": self._foreign_extension(told)}
         return payload, extra
 

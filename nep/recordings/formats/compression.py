@@ -1,7 +1,7 @@
-"""Chunk data, compressed and decompressed within limits. Pure functions.
+"""Compression of chunks, with limits for decompression. Pure functions.
 
-python-zstandard ignores ``max_output_size`` when a frame states its own size, so that size is compared with
-the chunk's before anything is allocated; frames that state none are read through a stream with a limit.
+python-zstandard ignores ``max_output_size`` when a frame states its size, so that size is compared with the
+chunk's before anything is allocated; other frames are read from a stream with a limit.
 """
 
 from __future__ import annotations
@@ -19,15 +19,18 @@ if TYPE_CHECKING:
     import zstandard
 
     from nep.recordings.formats.records import ChunkHead
-else:  # programs that record nothing need not have them
+else:  # optional for programs that don't record
     lz4_frame = lazy_module("lz4.frame")
     zstandard = lazy_module("zstandard")
 
 __all__ = ["check_packages", "compressed", "decompressed", "decompressed_part"]
 
 _ZSTD_LEVEL = 1
-"""Joints as JSON shrink to 40 % at 170 MB/s (lz4: 80 % at 360 MB/s), JPEGs are skipped at 1200 MB/s; higher
-levels take three times as long for nothing (2 cores, 1 MB chunks)."""
+"""Level with the best throughput.
+
+Compresses joint states in JSON to 40 % at 170 MB/s (lz4: 80 % at 360 MB/s) and skips JPEG at 1200 MB/s.
+Higher levels take three times as long without a gain (2 cores, 1 MB chunks).
+"""
 _MAX_WINDOW_BYTES = 2**27
 _STEP_BYTES = 2**20
 _PART_STEP_BYTES = 16_384
@@ -44,7 +47,7 @@ def check_packages() -> None:
 
 
 def compressed(data: bytes, compression: str) -> bytes:
-    """Return a chunk's data as it is stored in a file."""
+    """Compress the data of a chunk."""
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
     if compression == "lz4":
@@ -54,9 +57,10 @@ def compressed(data: bytes, compression: str) -> bytes:
 
 
 def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Return a chunk's records, checked by size and CRC. Raises `ValueError` for a damaged or huge chunk.
+    """Decompress the records of a chunk, and verify size and CRC.
 
-    Memory stays below the chunk's stated size plus one step, and that size below `max_chunk_bytes`.
+    Raises `ValueError` if it is damaged or too large. Memory is limited to the declared size plus one step,
+    and the declared size to `max_chunk_bytes`.
     """
     size = head.uncompressed_bytes
     if size > max_chunk_bytes(head.data_bytes):
@@ -79,7 +83,7 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
 
 
 def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Return as many of a chunk's records as its first bytes hold, unchecked."""
+    """Decompress as many records as the first bytes of a chunk contain, without verification."""
     if not head.compression:
         return data
     size = min(head.uncompressed_bytes, max_chunk_bytes(head.data_bytes))
@@ -88,7 +92,7 @@ def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
         for piece in _pieces(data, head.compression, size, _PART_STEP_BYTES):
             buffer += piece
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
-        pass  # the pieces before the cut are whole
+        pass  # pieces before the cut are intact
     return memoryview(buffer)
 
 
@@ -102,7 +106,7 @@ def _joined(pieces: Iterator[bytes]) -> memoryview:
 def _pieces(
     data: memoryview, compression: str, most_bytes: int, step_bytes: int = _STEP_BYTES
 ) -> Iterator[bytes]:
-    """Yield decompressed data, ``most_bytes`` of it at most, in short steps that Ctrl+C can interrupt."""
+    # Short steps, so that Ctrl+C can interrupt.
     if compression == "zstd":
         decompressor = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES)
         with decompressor.stream_reader(data, read_size=step_bytes) as stream:

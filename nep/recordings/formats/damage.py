@@ -1,4 +1,4 @@
-"""What is missing in a damaged recording, in a sentence without a full stop."""
+"""Summary of the damage of a recording, as a sentence without a full stop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MAX_NAMED = 3
 
 
 def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
-    """Say how many pieces were skipped, from when to when, and how many messages are missing; "" for none.
+    """Return a summary of the skipped pieces, their times and the missing messages; "" without damage.
 
     Times are seconds after ``start_ns``, the start of the recording.
     """

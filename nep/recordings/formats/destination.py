@@ -1,4 +1,4 @@
-"""Where a recording is written to: one file, and what its disk must have."""
+"""Destination of a recording: one file, and checks of its disk."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ __all__ = ["USUAL_LIMITS", "Destination", "OneFile", "WriterLimits", "disk_sente
 
 @dataclass(frozen=True)
 class WriterLimits:
-    """How much a writer holds, and how long.
+    """Limits of a writer.
 
-    `queue_bytes`, `queue_messages`: what may wait to be written. `least_free_bytes`: with less of it free on
-    the disk a recording ends, because other programs need some, too. `flush_s`: what came is in the file so
-    long after at most. `figures_s`: how often it writes what became of the topics' messages.
+    Attributes:
+        queue_bytes: Maximum size of queued messages.
+        queue_messages: Maximum number of queued messages.
+        least_free_bytes: Free disk space below which a recording stops; other programs need some, too.
+        flush_s: Maximum time until a message is in the file.
+        figures_s: Interval of writing the counts by topic.
     """
 
     queue_bytes: int = 256_000_000
@@ -35,34 +38,37 @@ USUAL_LIMITS = WriterLimits()
 
 
 class Destination(Protocol):
-    """Where a writer's thread writes to. All of it is called by that thread alone."""
+    """Destination of a writer's thread, which alone calls it."""
 
     @property
     def file(self) -> FileWriter:
-        """The file for what comes next."""
+        """Current file."""
 
     def flushed(self) -> None:
-        """A chunk was written. Raises `OSError`, `RecordingError`."""
+        """Handle a written chunk. Raises `OSError` or `RecordingError`."""
 
     @property
     def is_full(self) -> bool:
-        """Whether the recording is to go on in another file."""
+        """True if the recording should continue in another file."""
 
     def next_file(self) -> None:
-        """Finish the file, in which counts and metadata are, and begin the next. Raises as `finish` does."""
+        """Finish the file, which has its counts and metadata, and open the next one.
+
+        Raises as `finish` does.
+        """
 
     def look(self) -> None:
-        """Once a second: is there still room? Raises `RecordingError` with the sentence when not."""
+        """Check the disk, once a second. Raises `RecordingError` if it is full."""
 
     def finish(self) -> None:
-        """Nothing more comes. Raises `OSError`."""
+        """Finish the recording. Raises `OSError`."""
 
     def fail(self) -> None:
-        """Close it as it is, after an error."""
+        """Close the file as it is, after an error."""
 
 
 class OneFile:
-    """A recording's file."""
+    """Destination with a single file."""
 
     def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
         self.file = file
@@ -72,13 +78,13 @@ class OneFile:
     is_full = False
 
     def flushed(self) -> None:
-        """There is nothing to do."""
+        """Do nothing."""
 
     def next_file(self) -> None:
-        """There is none."""
+        """Do nothing: there is only one file."""
 
     def look(self) -> None:
-        """See `Destination`."""
+        """Check that the file was not moved or deleted and the disk is not full. Raises `RecordingError`."""
         if _identity(self.file.path) != self._identity:
             raise RecordingError(
                 str(self.file.path), _("somebody has moved or deleted it while it was written")
@@ -87,11 +93,11 @@ class OneFile:
             raise RecordingError(str(self.file.path), _("the disk is full; what came before is kept"))
 
     def finish(self) -> None:
-        """See `Destination`."""
+        """Write the summary and close the file. Raises `OSError`."""
         self.file.finish()
 
     def fail(self) -> None:
-        """See `Destination`."""
+        """Close the file as it is."""
         self.file.close()
 
 
@@ -104,7 +110,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def disk_sentence(path: Path, error: OSError) -> RecordingError:
-    """What a disk's error means for a recording."""
+    """Return the error of a recording for an I/O error."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
         reason = _("the disk is full; what came before is kept")
     else:

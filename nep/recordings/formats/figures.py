@@ -1,6 +1,7 @@
-"""What became of each topic's messages: how many came, were lost, came late, or could not be read.
+"""Counts of received, lost, late, undecodable and dropped messages by topic.
 
-A publisher numbers its messages; so what did not come shows as a gap. Pure; used by the thread that writes.
+Lost messages are gaps in the sequence numbers of a publisher. Free of input and output; used by the writer's
+thread.
 """
 
 from __future__ import annotations
@@ -13,21 +14,24 @@ import orjson
 __all__ = ["MOST_LOST", "MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
 
 MOST_TOPICS = 10_000
-"""Counted each; all others are counted together."""
+"""Maximum number of topics counted separately; the others are counted together."""
 MOST_PUBLISHERS = 1_000
-"""Of one topic, whose numbers are followed; of later ones nobody knows what was lost."""
+"""Maximum number of publishers per topic whose sequence numbers are tracked; losses of others are unknown."""
 MOST_LOST = 2**63 - 1
-"""More is not told: who sends numbers at random would make figures that no JSON holds."""
+"""Limit of the count: random sequence numbers would lead to values that JSON can't represent."""
 
 
 @dataclass(frozen=True)
 class TopicFigures:
-    """Of one topic.
+    """Counts of one topic.
 
-    `received`: messages that came. `lost`: those that did not, by their publishers' numbers; None where they
-    have none. `late`: came after one that was published after them. `undecodable`: are in the recording, but
-    cannot be read. `unkept`: came and are not in the recording, because it could not be written so fast.
-    `size_bytes`: of the payloads of all that came.
+    Attributes:
+        received: Number of received messages.
+        lost: Number of lost messages by sequence numbers, or None without sequence numbers.
+        late: Number of messages received out of order.
+        undecodable: Number of recorded messages that can't be decoded.
+        unkept: Number of received messages that are not recorded, because writing was too slow.
+        size_bytes: Total size of the received payloads.
     """
 
     received: int = 0
@@ -38,7 +42,7 @@ class TopicFigures:
     size_bytes: int = 0
 
     def since(self, earlier: TopicFigures) -> TopicFigures:
-        """What was counted since earlier figures of the same counts."""
+        """Return the difference to earlier counts."""
         return TopicFigures(
             max(0, self.received - earlier.received),
             None if self.lost is None else max(0, self.lost - (earlier.lost or 0)),
@@ -49,7 +53,7 @@ class TopicFigures:
         )
 
     def to_plain(self) -> dict[str, int | None]:
-        """As a map, for JSON."""
+        """Return the counts as a map for JSON."""
         return {
             "received": self.received,
             "lost": self.lost,
@@ -61,7 +65,7 @@ class TopicFigures:
 
 
 def read_figures(value: object) -> TopicFigures | None:
-    """Figures of a map, or of its JSON text; None for what is none."""
+    """Parse counts from a map or its JSON text; return None for invalid data."""
     if isinstance(value, str):
         try:
             value = orjson.loads(value)
@@ -78,7 +82,7 @@ def read_figures(value: object) -> TopicFigures | None:
 
 @dataclass
 class _Numbers:
-    """The numbers of one publisher's messages."""
+    """Sequence numbers of one publisher."""
 
     first: int
     last: int
@@ -91,7 +95,7 @@ class _Numbers:
 
 @dataclass
 class TopicCounter:
-    """Counts the messages of one topic."""
+    """Counter of one topic."""
 
     received: int = 0
     late: int = 0
@@ -99,11 +103,11 @@ class TopicCounter:
     unkept: int = 0
     size_bytes: int = 0
     is_changed: bool = True
-    """Whether there is something new since `figures` were last written."""
+    """True if the counts have changed since they were last written."""
     _publishers: dict[int | None, _Numbers] = field(default_factory=dict)
 
     def add(self, publisher: int | None, seq: int | None, size_bytes: int, *, is_decodable: bool) -> None:
-        """A message came, and is in the recording."""
+        """Count a recorded message."""
         self.received += 1
         self.size_bytes += size_bytes
         self.is_changed = True
@@ -124,7 +128,7 @@ class TopicCounter:
             numbers.first = min(numbers.first, seq)
 
     def leave_out(self, publisher: int | None, count: int, size_bytes: int) -> None:
-        """So many messages of a publisher came and are not in the recording."""
+        """Count received messages of a publisher that are not recorded."""
         self.received += count
         self.unkept += count
         self.size_bytes += size_bytes
@@ -134,7 +138,7 @@ class TopicCounter:
             numbers.came += count
 
     def figures(self) -> TopicFigures:
-        """The counts as of now."""
+        """Return the current counts."""
         lost = None
         if self._publishers:
             lost = min(sum(each.lost for each in self._publishers.values()), MOST_LOST)
@@ -142,5 +146,5 @@ class TopicCounter:
 
 
 def changed(counters: Mapping[str, TopicCounter]) -> Iterable[tuple[str, TopicCounter]]:
-    """Those of which there is something new."""
+    """Return the counters that have changed."""
     return [(topic, each) for topic, each in counters.items() if each.is_changed]

@@ -1,9 +1,9 @@
-"""What is where in a recording: from its summary, or from a walk over its records where it has none.
+"""Index of a recording, from its summary, or from a walk over its records without one.
 
-A file that was closed properly but has no summary, no chunk index or no chunks is read as it is. Messages
-outside of chunks (ROS 2's preset "fastwrite") are grouped into runs of about 1 MB, which are read like
-uncompressed chunks. The package `mcap` is not used for this, because its reader takes offsets, lengths and
-counts of the file as they are (docs/adr/0032-reading-foreign-recordings.md).
+Files without summary, chunk index or chunks are read as they are. Messages outside of chunks (ROS 2's preset
+"fastwrite") are grouped into runs of about 1 MB, which are read like uncompressed chunks. The package `mcap`
+is not used, because its reader trusts the offsets, lengths and counts of the file
+(docs/adr/0032-reading-foreign-recordings.md).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ __all__ = [
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 MOST_SMALL_BYTES = 64_000_000
-"""A record that is no chunk and is larger is damaged, or an attachment that nobody needs here."""
+"""Maximum size of records other than chunks; larger ones are damaged, or attachments that are not needed."""
 _MAX_SCHEMA_BYTES = 8_000_000
 _MAX_CHANNEL_BYTES = 256_000
 _MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
@@ -66,21 +66,26 @@ _MAX_DEFINITION_BYTES = 64_000_000
 _MAX_OTHER_RECORDS = 200_000
 _MANY = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
 _MAX_METADATA_BYTES = 4_000_000
-"""Of all metadata together; recordings of 10 000 topics have half of it."""
+"""Maximum size of all metadata; a recording of 10,000 topics has half of it."""
 _MAX_ATTACHMENTS = 1_000
 _MAX_HEADER_BYTES = 64_000
 _MAX_COUNTED_CHUNKS = 10_000
 _RUN_BYTES = 1_000_000
 _MAX_INSIDE_BYTES = 65_536
-"""A longer record between messages ends their run, so that reading the run does not read it, too."""
+"""Records longer than this end a run of messages, so that they are not read with it."""
 _READ_BYTES = 1_048_576
 
 
 @dataclass(frozen=True)
 class Damage:
-    """A piece of a file that can't be read. Times in ns since 1970; 0 and 0 where they are not known.
+    """Unreadable piece of a file.
 
-    ``message_count``: how many messages are missing, None where the file doesn't say.
+    Attributes:
+        offset: Offset in the file.
+        length: Length in bytes.
+        start_ns: Start of its time in ns since 1970, or 0 if unknown.
+        end_ns: End of its time, or 0 if unknown.
+        message_count: Number of missing messages, or None if unknown.
     """
 
     offset: int
@@ -92,7 +97,7 @@ class Damage:
 
 @dataclass(frozen=True)
 class AttachedFile:
-    """A file inside the recording: its name, media type and size."""
+    """Attached file: name, media type and size."""
 
     name: str
     media_type: str
@@ -100,13 +105,13 @@ class AttachedFile:
 
 
 class RecordCounter:
-    """Counts the records of a file that are neither chunks nor messages: no recording has very many."""
+    """Counter of records other than chunks and messages, with a limit."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._count = path, 0
 
     def add(self, opcode: int) -> None:
-        """Count a record. Raises `RecordingTooLargeError` for the first one beyond the limit."""
+        """Count a record. Raises `RecordingTooLargeError` beyond the limit."""
         if opcode in _MANY:
             return
         self._count += 1
@@ -116,26 +121,27 @@ class RecordCounter:
 
 
 class Definitions:
-    """Channels by their numbers, as records of schemas and channels tell of them."""
+    """Channels by number, collected from schema and channel records."""
 
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
         self._schemas: dict[int, Schema] = {}
         self._waiting: dict[int, dict[int, Channel]] = {}
-        """By the schema that they need, and their own number."""
+        """Channels by missing schema and channel number."""
         self._read: dict[tuple[int, int], int] = {}
-        """Hashes of what was read for an opcode and a number: files repeat the same record many times."""
+        """Hashes of records by opcode and number, to skip the repetitions in a file."""
         self._size_bytes = 0
 
     @property
     def lacks_schemas(self) -> bool:
-        """Whether there are channels whose schemas have not been told yet."""
+        """True if the schema of a channel is still missing."""
         return bool(self._waiting)
 
     def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
-        """Add a record of a schema or channel; others, and damaged or huge ones, are skipped.
+        """Add a schema or channel record; ignore other, damaged and huge records.
 
-        Returns the channels that are defined by it.
+        Returns:
+            The channels defined by it.
         """
         most = _MAX_SIZES.get(opcode, 0)
         if not 2 <= len(content) <= most:
@@ -171,7 +177,7 @@ class Definitions:
 
 @dataclass
 class FileIndex:
-    """`chunks` by the time when they begin. `is_complete`: the file was closed, so it has its footer."""
+    """Index of a file. `chunks` are sorted by start; `is_complete`: the file has its footer."""
 
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
@@ -179,10 +185,10 @@ class FileIndex:
     attachments: list[AttachedFile] = field(default_factory=list)
     damage: list[Damage] = field(default_factory=list)
     counts: dict[int, int] | None = None
-    """Messages of each channel; None where the file does not tell."""
+    """Number of messages by channel, or None if the file lacks it."""
     is_complete: bool = True
     end: int = 0
-    """How far the file is whole, in bytes."""
+    """Size of the intact part of the file in bytes."""
     profile: str = ""
     library: str = ""
     metadata_bytes: int = 0
@@ -196,9 +202,16 @@ def read_index(
 ) -> FileIndex:
     """Return the index of a recording.
 
-    `progress` is given how many bytes of how many are done, where they all have to be looked through. Raises
-    `RecordingError` for a file that is no recording, `RecordingTooLargeError` for one that is too much work,
-    `OSError`.
+    Args:
+        file: The open file.
+        path: Its path, for messages.
+        progress: Called with bytes done and in total during a walk.
+        budget: Limit of the work.
+
+    Raises:
+        RecordingError: The file is not a recording.
+        RecordingTooLargeError: The file exceeds a limit.
+        OSError: The file can't be read.
     """
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
@@ -217,7 +230,7 @@ def read_index(
 
 
 def _footer(file: BinaryIO, size: int) -> bytes | None:
-    """The footer with the magic after it; None for a file that was not closed."""
+    # With the magic after it; None if the file was not closed.
     if size < len(MAGIC) + _FOOTER_BYTES:
         return None
     file.seek(size - _FOOTER_BYTES)
@@ -255,11 +268,11 @@ def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
         index.metadata.append((made.name, made.metadata))
 
 
-# ---- by the summary
+# ---- from the summary
 
 
 class _Summary:
-    """Reads a summary, and believes what can be true."""
+    """Reader of a summary, which validates it."""
 
     def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
         self._file, self._size, self._budget = file, size, budget
@@ -271,7 +284,7 @@ class _Summary:
         self._lacks_places: Mapping[int, bool] = {}
 
     def read(self, footer: bytes) -> FileIndex | None:
-        """The index; None where there is no summary, or it is damaged, or it does not tell of all chunks."""
+        # None if the summary is missing, damaged or incomplete.
         start = int.from_bytes(footer[9:17], "little")
         end = self._size - _FOOTER_BYTES
         if not len(MAGIC) <= start < end or not self._is_crc_right(start, end, footer):
@@ -296,7 +309,7 @@ class _Summary:
         return zlib.crc32(footer[:25], crc) == wanted
 
     def _add(self, place: Place) -> None:
-        """Raises `ValueError` for what can't be true."""
+        # Raises `ValueError` for invalid entries.
         index, opcode = self._index, place.opcode
         self._others.add(opcode)
         self._opcodes.add(opcode)
@@ -324,7 +337,7 @@ class _Summary:
                 index.attachments.append(AttachedFile(told.name, told.media_type, told.data_size))
 
     def _is_new(self, offset: int) -> bool:
-        """Whether no other entry of the summary leads to this offset."""
+        # False for a second entry with the same offset.
         if offset in self._seen:
             return False
         self._seen.add(offset)
@@ -343,7 +356,7 @@ class _Summary:
             self._index.chunks.append(info)
 
     def _is_true(self, start: int) -> bool:
-        """Whether chunks don't overlap, all channels are known, and all that the file has is listed."""
+        # Chunks must not overlap, all channels must be known, and everything in the file must be listed.
         index, known = self._index, self._index.definitions.channels
         if any(lacks and opcode not in self._opcodes for opcode, lacks in self._lacks_places.items()):
             return False
@@ -359,11 +372,11 @@ class _Summary:
         return self._message_count <= sum(sum(info.counts.values()) for info in index.chunks)
 
 
-# ---- by the records
+# ---- from the records
 
 
 class _Scan:
-    """Puts together the chunks, and the runs of messages, of a file without a summary."""
+    """Builder of the index of a file without a summary, from its chunks and runs of messages."""
 
     def __init__(
         self,
@@ -384,7 +397,7 @@ class _Scan:
         self._others = RecordCounter(path)
 
     def run(self) -> FileIndex:
-        """Walk over the file. Raises `RecordingTooLargeError`, `OSError`, what `progress` raises."""
+        # Raises `RecordingTooLargeError`, `OSError`, and what `progress` raises.
         index, told = self._index, 0
         is_closed = self._data_end < self._size
         for place in walk(self._file, self._data_end, self._budget):
@@ -398,9 +411,9 @@ class _Scan:
                 break
         self._end_chunk()
         self._end_run()
-        if is_closed and index.end < self._data_end:  # it was not cut, so the rest is damaged
+        if is_closed and index.end < self._data_end:  # the file is not truncated, so the rest is damaged
             index.damage.append(Damage(index.end, self._data_end - index.end))
-        for chunk in index.chunks:  # other programs put a schema into any chunk before that of its channel
+        for chunk in index.chunks:  # other programs write a schema into any chunk before its channel
             if index.definitions.lacks_schemas and not chunk.is_run:
                 _index_by_reading(self._file, chunk, index.definitions, self._budget)
         if is_closed and index.end == self._data_end:
@@ -469,7 +482,7 @@ class _Scan:
             self._chunk = _info(place, head)
 
     def _end_chunk(self) -> None:
-        """No more indexes of the last chunk come."""
+        # Called after the message indexes of the chunk.
         if self._chunk is None:
             return
         chunk, self._chunk = self._chunk, None
@@ -514,7 +527,7 @@ def _info(place: Place, head: ChunkHead) -> ChunkInfo:
 def _index_by_reading(
     file: BinaryIO, info: ChunkInfo, definitions: Definitions, budget: ReadBudget
 ) -> list[Damage]:
-    """Find out which channels a chunk has, where the file does not tell; an offset of 0 is no index."""
+    # For files without message indexes; an offset of 0 means no index.
     budget.spend(info.length)
     try:
         chunk = read_chunk(file, info)
@@ -536,7 +549,7 @@ def _index_by_reading(
 
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
-    """Return a chunk's records. Raises `ValueError` when it is damaged or too large, `OSError`."""
+    """Return the records of a chunk. Raises `ValueError` if it is damaged or too large, and `OSError`."""
     if info.length > MOST_CHUNK_BYTES:
         raise ValueError("size")
     file.seek(info.offset)
@@ -554,7 +567,7 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
 
 
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:
-    """(time, offset in the chunk) of a channel's messages; None where the file does not tell."""
+    """Return (time, offset in the chunk) of a channel's messages, or None without a message index."""
     offset = info.index_offsets.get(channel, 0)
     if not info.has_index_at(offset):
         return None

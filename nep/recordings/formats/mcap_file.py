@@ -1,8 +1,8 @@
-"""Writing an MCAP file: chunks with their indexes, and the summary at its end.
+"""MCAP writer: chunks with indexes, and the summary.
 
-Why not the package's own writer: a chunk must be able to be copied from another file as it is (the flight
-recorder), a write that fails must leave a file that ends with a whole record, and channels stand before the
-chunk that needs them first, outside of it, where a damaged chunk cannot take them away.
+It replaces the writer of the package `mcap`, because chunks must be copied from other files unchanged (flight
+recorder), a failed write must leave a file that ends with a whole record, and channels are written before and
+outside of the chunk that first uses them, so that a damaged chunk doesn't lose them.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ from nep.version import __version__
 
 if TYPE_CHECKING:
     import mcap.records as mcap_records
-else:  # who records nothing need not have it
+else:  # optional for programs that don't record
     mcap_records = lazy_module("mcap.records")
 
 __all__ = ["CHUNK_BYTES", "MOST_CHANNELS", "ChannelTable", "FileWriter"]
 
 CHUNK_BYTES = 1_000_000
 MOST_CHANNELS = 65_535
-"""Their numbers have 16 bits."""
+"""Maximum number of channels: their numbers have 16 bits."""
 
 
 class ChannelTable:
-    """Numbers of channels and schemas. Files that share one can take each other's chunks."""
+    """Numbers of channels and schemas. Files that share a table can copy each other's chunks."""
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
-        """`definitions`: channels that have their numbers already."""
+        """Create a table, with numbered channels in `definitions`."""
         self.definitions: dict[int, ChannelDefinition] = {}
         self._numbers: dict[ChannelDefinition, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
@@ -58,7 +58,7 @@ class ChannelTable:
             self._add(number, definition)
 
     def number(self, definition: ChannelDefinition) -> int | None:
-        """The channel's number, from 1; None when there are too many."""
+        """Return the channel's number (from 1), or None if there are too many."""
         known = self._numbers.get(definition)
         if known is None:
             if self._next > MOST_CHANNELS:
@@ -68,16 +68,16 @@ class ChannelTable:
         return known
 
     def put(self, number: int, definition: ChannelDefinition) -> None:
-        """A channel that has its number already, in chunks that are copied."""
+        """Add a channel with its number, for copied chunks."""
         if number not in self.definitions:
             self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
-        """Whether it has a number."""
+        """Return True if the channel has a number."""
         return definition in self._numbers
 
     def _add(self, number: int, definition: ChannelDefinition) -> None:
-        """Its schema has a number from now on, too: other threads may ask for `records` meanwhile."""
+        # The schema gets its number here, because other threads may call `records` concurrently.
         key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
         if key[1]:
             self._schemas.setdefault(key, len(self._schemas) + 1)
@@ -86,7 +86,7 @@ class ChannelTable:
         self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
-        """What stands in a file of a channel."""
+        """Return schema and channel record of a channel."""
         made = self.definitions[number]
         key = (made.schema_name, made.schema_encoding, made.schema_data)
         schema_number = self._schemas.get(key, 0)
@@ -105,12 +105,12 @@ class ChannelTable:
 
 
 def _open_private(path: str, flags: int) -> int:
-    """Make a file that only its owner may read: a recording has what cameras and microphones gave."""
+    # Readable by the owner only: recordings may contain camera images and sound.
     return os.open(path, flags, 0o600)
 
 
 class _Chunk:
-    """A chunk that is being filled."""
+    """Chunk being filled."""
 
     def __init__(self) -> None:
         self.parts: list[bytes | memoryview] = []
@@ -121,10 +121,9 @@ class _Chunk:
 
 
 class FileWriter:
-    """One file. Every method raises `OSError` when the disk does not take it.
+    """Writer of one file. Not thread-safe. Every method raises `OSError` when the file can't be written.
 
-    After that the file ends with the last record that was whole, and `finish` may still be tried. Used by
-    one thread.
+    The file then ends with its last whole record, and `finish` may still be tried.
     """
 
     def __init__(
@@ -137,21 +136,21 @@ class FileWriter:
         keeps_chunks: bool = False,
         profile: str = "",
     ) -> None:
-        """Raises `FileExistsError` when there is such a file, unless it is not to be new.
+        """Create the file. Raises `FileExistsError` if it exists, unless `is_new` is False.
 
-        `profile`: what MCAP calls the kind of messages, such as "ros2".
+        `profile` is the MCAP profile of the messages, such as "ros2".
         """
         check_packages()
         self.path = path
         self.table = ChannelTable() if table is None else table
         self.chunks: list[ChunkInfo] | None = [] if keeps_chunks else None
-        """Those that are written, for who wants to copy them; hours of them would take much memory."""
+        """Written chunks, if they may be copied later; they take much memory for hours of recording."""
         self.start_ns: int | None = None
         self.end_ns = 0
         self._packed_chunks = bytearray()
         self._chunk_count = 0
         self.counts: dict[int, int] = {}
-        """Messages of each channel, in chunks that are written."""
+        """Number of messages by channel in written chunks."""
         self._compression = compression
         self._file: BinaryIO = open(  # noqa: SIM115
             path, "xb" if is_new else "wb", buffering=0, opener=_open_private
@@ -165,36 +164,36 @@ class FileWriter:
             self._write(MAGIC + packed(mcap_records.Header(profile=profile, library=f"nep {__version__}")))
         except OSError:
             self._file.close()
-            with suppress(OSError):  # it has nothing
+            with suppress(OSError):  # the file is empty
                 path.unlink()
             raise
 
-    # ---- filling it
+    # ---- writing
 
     @property
     def size_bytes(self) -> int:
-        """Of the file as it is on the disk."""
+        """Size of the file on disk."""
         return self._at
 
     @property
     def pending_bytes(self) -> int:
-        """What waits in the chunk that is not written yet."""
+        """Size of the chunk being filled."""
         return self._chunk.size
 
     @property
     def pending_counts(self) -> dict[int, int]:
-        """The messages of each channel in that chunk."""
+        """Number of messages by channel in the chunk being filled."""
         return {number: len(entries) // 2 for number, entries in self._chunk.indexes.items()}
 
     @property
     def message_count(self) -> int:
-        """Messages that are in the file."""
+        """Number of messages in the file."""
         return sum(self.counts.values())
 
     def add(
         self, channel: int, times: tuple[int, int], sequence: int, before: bytes, data: bytes | memoryview
     ) -> None:
-        """Add a message of a channel of the table to the chunk; nothing is written. `times`: log, publish."""
+        """Add a message to the current chunk, without writing. `times`: log and publish time."""
         chunk = self._chunk
         log_ns = times[0]
         size = len(before) + (len(data) if isinstance(data, bytes) else data.nbytes)
@@ -215,7 +214,7 @@ class FileWriter:
         chunk.size += len(head) + size
 
     def flush(self) -> int:
-        """Write the chunk, if there is anything in it; how many messages it has."""
+        """Write the current chunk; return its number of messages."""
         chunk = self._chunk
         if not chunk.parts:
             return 0
@@ -244,7 +243,7 @@ class FileWriter:
         return sum(counts.values())
 
     def copy_chunk(self, record: bytes | memoryview, info: ChunkInfo, indexes: Mapping[int, bytes]) -> None:
-        """A chunk of another file, with the same channels. `indexes`: its message indexes by channel."""
+        """Copy a chunk of another file with the same channels. `indexes`: its message indexes by channel."""
         self.flush()
         counts = {number: message_count(index) for number, index in indexes.items()}
         self.define(counts)
@@ -275,7 +274,7 @@ class FileWriter:
             self.counts[number] = self.counts.get(number, 0) + count
 
     def define(self, channels: Mapping[int, object]) -> None:
-        """Write those of these channels, and their schemas, that are not in the file yet."""
+        """Write channels, and their schemas, that are not yet in the file."""
         new = [number for number in channels if number not in self._written_channels]
         if not new:
             return
@@ -292,7 +291,7 @@ class FileWriter:
         self._written_schemas |= schemas
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write words about the recording, after what waits in the chunk."""
+        """Write a metadata record after the current chunk."""
         self.flush()
         record = packed(mcap_records.Metadata(name=name, metadata=dict(values)))
         index = mcap_records.MetadataIndex(offset=self._at, length=len(record), name=name)
@@ -300,7 +299,7 @@ class FileWriter:
         self._metadata.append(index)
 
     def _write(self, *parts: bytes | memoryview) -> None:
-        """Write all of it, or nothing: what is half there is taken back. Raises `OSError`."""
+        # All or nothing: a partial write is truncated. Raises `OSError`.
         size = 0
         try:
             for part in parts:
@@ -315,17 +314,17 @@ class FileWriter:
         self._at += size
 
     def cut_back(self) -> None:
-        """Let the file end with its last whole record, as far as the disk does that."""
+        """Truncate the file after its last whole record, as far as possible."""
         try:
             self._file.truncate(self._at)
             self._file.seek(self._at)
         except OSError:
             return
 
-    # ---- the end
+    # ---- closing
 
     def finish(self) -> None:
-        """Write what waits and the summary; the file is closed and on the disk then. Raises `OSError`."""
+        """Write the current chunk and the summary, sync and close. Raises `OSError`."""
         try:
             self.flush()
             self._write(self._summary())
@@ -334,7 +333,7 @@ class FileWriter:
             self._file.close()
 
     def close(self) -> None:
-        """Close it as it is: whoever opens it makes the summary."""
+        """Close the file without a summary, which readers then rebuild."""
         self._file.close()
 
     def _summary(self) -> bytes:
@@ -358,7 +357,7 @@ class FileWriter:
         return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
 
     def _place_in_summary(self, number: int) -> tuple[bool, int]:
-        """Wrapped ones last: viewers read all of a topic's messages as those of its first channel there."""
+        # Wrapped channels last: viewers read all messages of a topic as those of its first channel.
         return ("nep.form", "wrapped") in self.table.definitions[number].metadata, number
 
     def _groups(self) -> list[tuple[Opcode, bytes]]:

@@ -1,16 +1,16 @@
-"""Messages of Protocol Buffers that wrap what is recorded: pictures, text and bytes.
+"""Protocol Buffers messages that wrap recorded data: images, text and bytes.
 
-A payload lies in such a message as it was received, in one piece: writing one costs no conversion, reading
-one is a slice. So programs that know nothing of nep (Foxglove, Lichtblick) show them, and replay has the very
-bytes. JSON would need base64: a third more, and 0.8 ms for each picture. Four messages are all there is:
+The payload is contained unchanged and in one piece: writing needs no conversion, reading is a slice. So
+programs without nep (Foxglove, Lichtblick) can show it, and replay has the original bytes. JSON would need
+base64: a third larger, and 0.8 ms per image. There are four messages:
 
     foxglove.CompressedImage    timestamp 1, data 2, format 3, frame_id 4
     foxglove.RawImage           timestamp 1, width 2, height 3, encoding 4, step 5, data 6, frame_id 7
     nep.Text                    data 1 (string)
     nep.Bytes                   data 1 (bytes)
 
-Each may have the field 1000, unknown to others: a msgpack map of what a channel does not tell of it
-(`nep.recordings.formats.channels`). It stands before the data.
+Each may have the field 1000, ignored by others: a msgpack map of properties that the channel lacks
+(`nep.recordings.formats.channels`), before the data.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from functools import cache
 __all__ = ["EXTRA", "SCHEMAS", "bytes_field", "descriptor_set", "fields", "fixed_field", "timestamp_field"]
 
 EXTRA = 1000
-"""The field of what only nep knows."""
+"""Number of the field with nep's own properties."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 _NS = 1_000_000_000
@@ -38,7 +38,7 @@ def _varint(number: int) -> bytes:
 
 
 def bytes_field(number: int, size_bytes: int) -> bytes:
-    """What stands before so many bytes, that follow: bytes, text or a message."""
+    """Return the prefix of a field of bytes, text or a message, whose content follows."""
     return _varint(number << 3 | _BYTES) + _varint(size_bytes)
 
 
@@ -47,12 +47,12 @@ def _whole(number: int, data: bytes) -> bytes:
 
 
 def fixed_field(number: int, value: int) -> bytes:
-    """A field of the type `fixed32`."""
+    """Return a field of type `fixed32`."""
     return _varint(number << 3 | _FIXED32) + _U32.pack(value)
 
 
 def timestamp_field(number: int, stamp_ns: int) -> bytes:
-    """A field of the type `google.protobuf.Timestamp`."""
+    """Return a field of type `google.protobuf.Timestamp`."""
     seconds, rest = divmod(stamp_ns, _NS)
     return _whole(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
 
@@ -70,7 +70,10 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
-    """The fields of a message: numbers, and slices of it. Raises `ValueError` for bytes that are none."""
+    """Iterate over the fields of a message: numbers, and slices of it.
+
+    Raises `ValueError` for invalid data.
+    """
     at, size = 0, len(message)
     while at < size:
         try:
@@ -95,12 +98,12 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
         yield tag >> 3, value
 
 
-# ---- what others need to read them: a FileDescriptorSet
+# ---- FileDescriptorSet for other programs
 
 _INT64, _FIXED32_TYPE, _INT32, _STRING, _BYTES_TYPE, _MESSAGE = 3, 7, 5, 9, 12, 11
 _STAMP = "google.protobuf.Timestamp"
 _Fields = Mapping[str, tuple[int, int]]
-"""Names: (number, type)."""
+"""Field numbers and types by name."""
 
 SCHEMAS: Mapping[str, _Fields] = {
     "foxglove.CompressedImage": {
@@ -121,7 +124,7 @@ SCHEMAS: Mapping[str, _Fields] = {
     "nep.Text": {"data": (1, _STRING)},
     "nep.Bytes": {"data": (1, _BYTES_TYPE)},
 }
-"""The messages by their names."""
+"""Fields by message name."""
 
 
 def _message_type(name: str, fields_of_it: _Fields) -> bytes:
@@ -144,7 +147,7 @@ def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
 
 @cache
 def descriptor_set(schema: str) -> bytes:
-    """What a schema record of MCAP has: the message's file, and those that it needs."""
+    """Return the data of an MCAP schema record: the message's file with its dependencies."""
     package, name = schema.split(".")
     message = _message_type(name, SCHEMAS[schema])
     needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""

@@ -1,8 +1,8 @@
-"""MCAP's records as bytes: those of which there are many, and how to find them in a file.
+"""MCAP records as bytes.
 
-The format is at https://mcap.dev/spec. Records of which there are few (schemas, channels, statistics) are
-those of the package `mcap`; messages, chunks and their indexes come by the thousand each second, and are
-packed and read here. Pure functions.
+The format is at https://mcap.dev/spec. Rare records (schemas, channels, statistics) are those of the package
+`mcap`; messages, chunks and their indexes, thousands per second, are encoded and decoded here. Pure
+functions.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import mcap.data_stream as mcap_stream
     import mcap.exceptions as mcap_exceptions
     import mcap.records as mcap_records
-else:  # who records nothing need not have them
+else:  # optional for programs that don't record
     mcap_exceptions = lazy_module("mcap.exceptions")
     mcap_records = lazy_module("mcap.records")
     mcap_stream = lazy_module("mcap.data_stream")
@@ -56,14 +56,14 @@ __all__ = [
 ]
 
 MAGIC = b"\x89MCAP0\r\n"
-RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of the content
 HEAD_BYTES = RECORD_HEAD.size
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MAX_OTHERS = 200_000
-"""A chunk has schemas and channels beside its messages, each once."""
+"""Maximum number of schemas and channels in a chunk."""
 MESSAGE_REST_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
 MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
-_CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, letters of the compression
+_CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, length of the compression's name
 _SIZE = struct.Struct("<Q")
 _ENTRIES = struct.Struct("<HI")  # channel, bytes of the entries
 _ENTRY = struct.Struct("<QQ")
@@ -72,13 +72,13 @@ _INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the inde
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
 MOST_CHUNK_BYTES = 2**31
-"""A chunk that tells of more is none: whoever writes larger ones cannot be read in memory."""
+"""Maximum size of a chunk; larger ones can't be read in memory."""
 CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
-"""So many bytes hold the head of any chunk, whose compression has a name of a few letters."""
+"""Number of bytes that contain the header of any chunk."""
 
 
 class Opcode(IntEnum):
-    """The kinds of records, as the specification numbers them."""
+    """Kinds of records, as numbered by the specification."""
 
     HEADER = 1
     FOOTER = 2
@@ -98,7 +98,7 @@ class Opcode(IntEnum):
 
 
 def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 - any record of mcap
-    """One of mcap's records, by the name of its class, from its content. Raises `ValueError`."""
+    """Parse a record by the name of its class in `mcap`. Raises `ValueError`."""
     stream_class, record_class = _classes(kind)
     try:
         return record_class.read(stream_class(io.BytesIO(content)))
@@ -117,7 +117,7 @@ def _builder_class() -> Any:  # noqa: ANN401 - of mcap
 
 
 def packed(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
-    """One of mcap's records as bytes."""
+    """Encode a record of `mcap`."""
     builder = _builder_class()()
     record.write(builder)
     made: bytes = builder.end()
@@ -128,7 +128,7 @@ def packed(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
 
 
 class RawMessage(NamedTuple):
-    """A message record in a chunk: `data` is what it carries, of the chunk's own memory."""
+    """Message record of a chunk; `data` is a slice of the chunk."""
 
     offset: int
     channel: int
@@ -139,16 +139,16 @@ class RawMessage(NamedTuple):
 
 
 def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
-    """What stands before a message's bytes in a chunk."""
+    """Return the bytes of a record before the message's data."""
     return MESSAGE_HEAD.pack(
         Opcode.MESSAGE, MESSAGE_REST_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
     )
 
 
 def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
-    """The records of a chunk from an offset on: messages, and others as (opcode, content).
+    """Iterate over the records of a chunk from an offset: messages, and others as (opcode, content).
 
-    Ends without an error where the bytes do, or where they can be no record: the last record may be cut.
+    Stops without an error at the end or at invalid bytes, because the last record may be truncated.
     """
     whole = memoryview(chunk)
     size, others = whole.nbytes, 0
@@ -176,7 +176,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
 
 
 class ChunkHead(NamedTuple):
-    """What a chunk's record says before its data. `data_at`: bytes from the record's begin to the data."""
+    """Header of a chunk record. `data_at`: offset of the data in the record."""
 
     start_ns: int
     end_ns: int
@@ -188,9 +188,9 @@ class ChunkHead(NamedTuple):
 
 
 def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
-    """The head of a chunk's record of this `length`; None for bytes that can be none.
+    """Parse the header of a chunk record of this length; return None for invalid bytes.
 
-    What it says must fit: so that a place in a damaged file that merely looks like one is not taken.
+    It is validated strictly, so that arbitrary bytes of a damaged file are not mistaken for a chunk.
     """
     if len(record) < HEAD_BYTES + _CHUNK.size:
         return None
@@ -211,7 +211,7 @@ def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
 def pack_chunk(
     data: bytes, compression: str, uncompressed_bytes: int, crc: int, times: tuple[int, int]
 ) -> bytes:
-    """What stands before a chunk's data, which follows."""
+    """Return the bytes of a chunk record before its data."""
     letters = compression.encode("ascii")
     rest = _CHUNK.pack(*times, uncompressed_bytes, crc, len(letters)) + letters + _SIZE.pack(len(data))
     return RECORD_HEAD.pack(Opcode.CHUNK, len(rest) + len(data)) + rest
@@ -221,25 +221,25 @@ def pack_chunk(
 
 
 class IndexEntry(NamedTuple):
-    """Where a message is in its chunk."""
+    """Time and position of a message in its chunk."""
 
     log_ns: int
     offset: int
 
 
 def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
-    """A record of (time, offset, time, offset, ...) of a channel's messages in a chunk."""
+    """Return a message index record from (time, offset, time, offset, …) of a channel in a chunk."""
     rest = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)
     return RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, len(rest)) + rest
 
 
 def message_count(index: bytes | memoryview) -> int:
-    """How many messages a packed message index tells of."""
+    """Return the number of messages in an encoded message index."""
     return max(0, len(index) - _INDEX_HEAD) // _ENTRY.size
 
 
 def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntry]]:
-    """(channel, its entries). Raises `ValueError` for what is none."""
+    """Parse a message index: (channel, entries). Raises `ValueError`."""
     try:
         channel, size = _ENTRIES.unpack_from(content)
         whole = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
@@ -252,12 +252,21 @@ def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntr
 
 @dataclass(slots=True)
 class ChunkInfo:
-    """What is known of a chunk without reading it.
+    """Metadata of a chunk.
 
-    `offset`, `length`: of its record in the file. `packed_offsets`: where each channel's message index is, as
-    it stands in the file: of ten thousand chunks only a few are asked. `index_bytes`: of all these indexes.
-    `is_run`: messages that stand outside of chunks, one behind the other. `packed_counts`: how many each
-    channel has, where they were counted because no index tells.
+    Attributes:
+        start_ns: Time of the first message.
+        end_ns: Time of the last message.
+        offset: Offset of its record in the file.
+        length: Length of its record.
+        packed_offsets: Offsets of the message indexes by channel, encoded as in the file; few of them are
+            used.
+        index_bytes: Total size of the message indexes.
+        compression: Name of the compression.
+        compressed_bytes: Size in the file.
+        uncompressed_bytes: Size in memory.
+        is_run: True for consecutive messages outside of chunks.
+        packed_counts: Number of messages by channel, if counted because there are no indexes.
     """
 
     start_ns: int
@@ -274,24 +283,24 @@ class ChunkInfo:
 
     @property
     def channels(self) -> list[int]:
-        """The channels that have messages in it."""
+        """Channels with messages in the chunk."""
         return [channel for channel, _offset in _OFFSET.iter_unpack(self.packed_offsets)]
 
     @property
     def index_offsets(self) -> dict[int, int]:
-        """Where the message index of each channel begins in the file."""
+        """Offset of the message index in the file by channel."""
         return dict(_OFFSET.iter_unpack(self.packed_offsets))
 
     def has_index_at(self, offset: int) -> bool:
-        """Whether a message index can be there: they stand one behind the other, after the chunk."""
+        """Return True if a message index can be at the offset: they follow the chunk."""
         after = self.offset + self.length
         return after <= offset < after + self.index_bytes
 
     @property
     def counts(self) -> dict[int, int]:
-        """How many messages each channel has: its index has 16 bytes for each, and the next one follows.
+        """Number of messages by channel, from the distances of the indexes (16 bytes per message).
 
-        Channels without an index are missing: to count theirs the chunk must be read.
+        Channels without an index are missing; the chunk must be read to count them.
         """
         if self.packed_counts:
             return dict(_OFFSET.iter_unpack(self.packed_counts))
@@ -307,7 +316,7 @@ class ChunkInfo:
 
     @property
     def channel_count(self) -> int:
-        """How many channels have messages in it."""
+        """Number of channels with messages in the chunk."""
         return len(self.packed_offsets) // _OFFSET.size
 
 
@@ -316,12 +325,12 @@ _second = itemgetter(1)
 
 
 def pack_offsets(offsets: Mapping[int, int]) -> bytes:
-    """`ChunkInfo.packed_offsets` of these."""
+    """Encode `ChunkInfo.packed_offsets`."""
     return b"".join([_OFFSET.pack(*each) for each in offsets.items()])
 
 
 def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
-    """A chunk index. Raises `ValueError` for what is none."""
+    """Parse a chunk index record. Raises `ValueError`."""
     try:
         start_ns, end_ns, offset, length, size = _INFO.unpack_from(content)
         at = _INFO.size + size
@@ -338,7 +347,7 @@ def read_chunk_info(content: bytes | memoryview) -> ChunkInfo:
 
 
 def pack_chunk_info(info: ChunkInfo) -> bytes:
-    """A chunk index as bytes."""
+    """Encode a chunk index record."""
     letters = info.compression.encode("ascii")
     rest = (
         _INFO.pack(info.start_ns, info.end_ns, info.offset, info.length, len(info.packed_offsets))

@@ -1,8 +1,8 @@
-"""JSON Schema of message types: those of `nep.geometry` and `nep.sensor`, and what a program declares.
+"""JSON Schemas of message types: those of `nep.geometry` and `nep.sensor`, and declared types.
 
-A viewer learns from it which fields there are before a message came. Viewers read little of JSON Schema:
-scalars, objects and lists of these. So a field of any other form is left out, which a schema may do, and a
-type of which nothing is known is an object with any fields.
+Viewers list the fields of a topic from them before the first message. They support little of JSON Schema:
+scalars, objects, and lists of these. Other fields are left out, and unknown types are objects with any
+fields.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ def _known() -> Mapping[str, type]:
 
 
 def schema_of(msg_type: str) -> bytes:
-    """The JSON Schema of a type's messages, by its name in the graph."""
+    """Return the JSON Schema of a message type by its name."""
     declared = _known().get(msg_type)
     return ANY_OBJECT if declared is None else json_schema(declared)
 
 
 @cache
 def json_schema(declared: type) -> bytes:
-    """The JSON Schema of a dataclass or a TypedDict whose instances are published."""
+    """Return the JSON Schema of a dataclass or TypedDict."""
     made = _of(declared, 0) or {"type": "object"}
     return orjson.dumps({"title": getattr(declared, "MSG_TYPE", declared.__name__), **made})
 
 
 def _of(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - any annotation
-    """The schema of an annotation; None where it has no form that viewers read."""
+    # None if viewers don't support it.
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint in _SCALARS:
         return {"type": _SCALARS[hint]}

@@ -15,7 +15,7 @@ _SPEND_EVERY = 1_000
 
 
 class Place(NamedTuple):
-    """A record in a file. ``begin``: the first bytes of its content, as many as were read with its head."""
+    """Record in a file. ``begin``: the first bytes of its content that were read with its header."""
 
     offset: int
     opcode: int
@@ -24,7 +24,7 @@ class Place(NamedTuple):
 
     @property
     def end(self) -> int:
-        """Offset of the record that follows."""
+        """Offset of the next record."""
         return self.offset + HEAD_BYTES + self.length
 
 
@@ -35,10 +35,10 @@ def walk(
     offset: int = len(MAGIC),
     begin_bytes: int = 64,
 ) -> Iterator[Place]:
-    """Yield the records from an offset on, up to ``size`` or to bytes that can't be a record.
+    """Iterate over the records from an offset, up to ``size`` or to invalid bytes.
 
     The file is read in windows that grow while records are short: millions of empty records take a second,
-    and of gigabytes of chunks only the heads are read. Raises `RecordingTooLargeError`, `OSError`.
+    and of gigabytes of chunks only the headers are read. Raises `RecordingTooLargeError` or `OSError`.
     """
     window, base, step, count = b"", offset, _SMALL_WINDOW, 0
     while offset + HEAD_BYTES <= size:
