@@ -3,9 +3,9 @@
     python tools/reference.py            write it anew
     python tools/reference.py --check    1 when what is written is no longer true
 
-It reads the sources and imports nothing of nep. Of a docstring, sentences that begin with an argument's
-name go into the table of arguments, and those that begin with "Raises" below it. `tests/test_reference.py`
-compares the pages with the code, so they can't grow old.
+It reads the sources and imports nothing of nep. Sections of docstrings in Google style become tables of
+arguments and attributes, with errors and results below; so do sentences that begin with an argument's name or
+with "Raises". `tests/test_reference.py` compares the pages with the code.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ INTERNAL = frozenset({
     "Message.seen_ns", "Node.open_parameters", "NodeParameter.as_map", "NodeParameter.form",
     "NodeParameter.with_value", "Publisher.refuse", "Respondent.service", "Server.join",
     "Server.run_one", "Server.spun", "Subscriber.decoded", "Subscriber.is_typed",
-    "Subscriber.payloads", "Subscriber.taken", "Subscriber.typed", "Subscriber.want_messages",
+    "Subscriber.payloads", "Subscriber.decoded_unshared", "Subscriber.typed", "Subscriber.want_messages",
     "Subscriber.want_payloads",
     "Timer.callback", "Timer.due", "Timer.run_if_due", "Timer.take_turn",
 })  # fmt: skip
@@ -97,6 +97,8 @@ _SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
 _SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
 _LISTED = re.compile(r"^`(\w+)`\s+(.*)$")
 _IN_COLUMNS = re.compile(r"`\w+`\s{2,}")
+_SECTION = re.compile(r"(Args|Attributes|Raises|Returns|Yields):\n")
+_ENTRY = re.compile(r"    (\w+): (.*)")
 _PAGE = re.compile(r"\bdocs/([\w-]+\.md)")
 _CODE = "    "
 
@@ -119,6 +121,10 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
         if paragraph.startswith(_CODE):
             paragraphs.append(paragraph)
             continue
+        if section := _SECTION.match(paragraph):
+            is_first = False
+            _add_section(section[1], paragraph[section.end() :], paragraphs, told, raises)
+            continue
         listed = _listed(paragraph)
         if listed:
             told.update(listed)
@@ -136,6 +142,25 @@ def words_of(docstring: str, names: Iterable[str]) -> Words:
         if kept:
             paragraphs.append(" ".join(kept))
     return Words(tuple(paragraphs), told, tuple(raises))
+
+
+def _add_section(
+    title: str, content: str, paragraphs: list[str], named: dict[str, str], raises: list[str]
+) -> None:
+    """Add a section of a docstring in Google style."""
+    if title in {"Returns", "Yields"}:
+        paragraphs.append(f"**{title}** {' '.join(content.split())}")
+        return
+    entries: list[tuple[str, str]] = []
+    for line in content.splitlines():
+        if entry := _ENTRY.fullmatch(line):
+            entries.append((entry[1], entry[2]))
+        elif entries:
+            entries[-1] = entries[-1][0], f"{entries[-1][1]} {line.strip()}"
+    if title == "Raises":
+        raises += [f"`{name}`: {text}" for name, text in entries]
+    else:
+        named.update(entries)
 
 
 def _listed(paragraph: str) -> Mapping[str, str]:
@@ -301,7 +326,7 @@ class Reference:
             f"| {self._linked(words.names.get(each.name, ''))} |"
             for each in listed
         ]
-        return ["\n".join(("| argument | type | if left out | |", "|---|---|---|---|", *rows))]
+        return ["\n".join(("| argument | type | default | description |", "|---|---|---|---|", *rows))]
 
     def _attributes(self, attributes: Sequence[griffe.Attribute], words: Words, made: object) -> list[str]:
         """A table; those without a type of their own have that of the argument of their name."""
@@ -313,7 +338,7 @@ class Reference:
             known = each.annotation if each.annotation is not None else given.get(each.name)
             kind = self._type(known) or _BEGINNINGS.get(str(each.value), "")
             rows.append(f"| `{each.name}` | {_cell(kind)} | {self._linked(said)} |")
-        return ["\n".join(("| attribute | type | |", "|---|---|---|", *rows))] if rows else []
+        return ["\n".join(("| attribute | type | description |", "|---|---|---|", *rows))] if rows else []
 
     def _signature(self, found: griffe.Function, name: str, *, has_result: bool = True) -> str:
         result = self._type(found.returns) if has_result else ""
