@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nep.version import __version__ as __version__
 
 
-def _imported(name: str) -> object:
+def _load_attribute(name: str) -> object:
     # Lazy import: `import nep` takes 1 ms, so that the `nep` command can install its Ctrl+C handler before
     # the slow imports. All public names are imported together: a later import would fail in a program that
     # has reached its open-file limit or changed its working directory.
@@ -54,9 +54,9 @@ def _is_submodule(name: str) -> bool:
 
 
 def __dir__() -> list[str]:
-    _imported("__all__")
+    _load_attribute("__all__")
     return sorted(globals())
 
 
 if not TYPE_CHECKING:  # type checkers would accept any name
-    __getattr__ = _imported
+    __getattr__ = _load_attribute

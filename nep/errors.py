@@ -71,7 +71,7 @@ __all__ = [
 ]
 
 _MAX_WORD_LENGTH = 200
-_LONGEST = 500
+_MAX_REASON_LENGTH = 500
 """Maximum length of a reason received from another program."""
 
 
@@ -120,6 +120,7 @@ class ServiceTimeoutError(WaitTimeoutError):
     Attributes:
         service: The name of the service.
         timeout_s: The time limit in seconds.
+        what: The expected reply, for the message.
     """
 
     def __init__(self, service: str, timeout_s: float) -> None:
@@ -133,6 +134,7 @@ class NoServerError(WaitTimeoutError):
     Attributes:
         service: The name of the service.
         timeout_s: The time limit in seconds.
+        what: The name of the service.
         known: Names of the services that have a server.
         address: The expected fixed address, or "" for services registered at a master.
     """
@@ -425,7 +427,7 @@ class RequestRefusedError(NepError):
     """
 
     def __init__(self, reason: str) -> None:
-        self.reason = escaped(shortened(reason, _LONGEST))
+        self.reason = escaped(shortened(reason, _MAX_REASON_LENGTH))
         super().__init__(self.reason)
 
 
@@ -513,7 +515,7 @@ class DecodeError(NepError, ValueError):
     def __init__(self, codec: str, size_bytes: int, reason: str) -> None:
         self.codec = codec
         self.size_bytes = size_bytes
-        self.reason = reason = escaped(shortened(reason, _LONGEST))  # may quote untrusted input
+        self.reason = reason = escaped(shortened(reason, _MAX_REASON_LENGTH))  # may quote untrusted input
         super().__init__(
             _("cannot decode {size_bytes} bytes as '{codec}'; {reason}").format(
                 size_bytes=size_bytes, codec=codec, reason=reason

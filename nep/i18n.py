@@ -72,9 +72,9 @@ LEAST_SHARE = 0.9
 """Minimum translated share of a language that users can select."""
 LOCALE = Path(__file__).with_name("locale")
 
-_BLOCK_HOLE = re.compile(r"%[A-Za-z_]\w*")
-_PRINTF_HOLE = re.compile(r"%(?:\(\w+\)[sdr]|\d)")
-_LISTS = {
+_BLOCK_PLACEHOLDER = re.compile(r"%[A-Za-z_]\w*")
+_PRINTF_PLACEHOLDER = re.compile(r"%(?:\(\w+\)[sdr]|\d)")
+_LIST_PATTERNS = {
     "and": {"2": "{0} and {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} and {1}"},
     "or": {"2": "{0} or {1}", "start": "{0}, {1}", "middle": "{0}, {1}", "end": "{0} or {1}"},
 }
@@ -85,100 +85,108 @@ _MONTHS = (
 _log = logging.getLogger(__name__)
 
 
-class _Meant(str):
+class _ContextMessage(str):
     """English message with a translation context."""
 
     __slots__ = ("context",)
 
     def __new__(cls, context: str, message: str) -> Self:
-        made = super().__new__(cls, message)
-        made.context = context
-        return made
+        instance = super().__new__(cls, message)
+        instance.context = context
+        return instance
 
     context: str
 
 
-class _Words:
+class _Catalogue:
     """Catalogue of one language, with a cache of checked translations."""
 
     def __init__(self, language: str, found: GNUTranslations | None, facts: Mapping[str, object]) -> None:
         self.language = language
-        self._found = found
-        self._facts = facts
+        self._translations = found
+        self._metadata = facts
         self._checked: dict[tuple[str | None, str], str] = {}
-        self._is_wrong: set[str] = set()
+        self._rejected: set[str] = set()
 
     def one(self, context: str | None, english: str) -> str:
-        if self._found is None or not english:
+        if self._translations is None or not english:
             return english
         key = context, english
         if key not in self._checked:
-            told = self._found.gettext(english) if context is None else self._found.pgettext(context, english)
-            self._checked[key] = told if self._fits(told, (english,)) else english
+            translation = (
+                self._translations.gettext(english)
+                if context is None
+                else self._translations.pgettext(context, english)
+            )
+            self._checked[key] = (
+                translation if self._has_same_placeholders(translation, (english,)) else english
+            )
         return self._checked[key]
 
     def many(self, singular: str, plural: str, count: int) -> str:
-        if self._found is not None:
-            told = self._found.ngettext(singular, plural, count)
-            if self._fits(told, (singular, plural)):
-                return told
+        if self._translations is not None:
+            translation = self._translations.ngettext(singular, plural, count)
+            if self._has_same_placeholders(translation, (singular, plural)):
+                return translation
         return singular if count == 1 else plural
 
-    def _fits(self, told: str, english: Sequence[str]) -> bool:
+    def _has_same_placeholders(self, translation: str, english: Sequence[str]) -> bool:
         # Both must have the same placeholders. A mismatch is logged once.
-        if told in english or holes(told) in [holes(each) for each in english]:
+        if translation in english or holes(translation) in [holes(each) for each in english]:
             return True
-        if told not in self._is_wrong:
-            self._is_wrong.add(told)
-            _log.warning("the translation '%s' has not the holes of '%s'; English is shown", told, english[0])
+        if translation not in self._rejected:
+            self._rejected.add(translation)
+            _log.warning(
+                "the translation '%s' has not the holes of '%s'; English is shown", translation, english[0]
+            )
         return False
 
     def fact(self, name: str, default: str) -> str:
-        found = self._facts.get(name)
+        found = self._metadata.get(name)
         return found if isinstance(found, str) else default
 
     def months(self) -> Sequence[str]:
-        found = self._facts.get("months")
+        found = self._metadata.get("months")
         return found if isinstance(found, list) else _MONTHS
 
     def list_pattern(self, kind: str) -> Mapping[str, str]:
-        found = self._facts.get(kind)
-        return found if isinstance(found, dict) else _LISTS[kind]
+        found = self._metadata.get(kind)
+        return found if isinstance(found, dict) else _LIST_PATTERNS[kind]
 
 
-_now: _Words | None = None
+_current: _Catalogue | None = None
 
 
-def _standard() -> ModuleType:
+def _gettext_module() -> ModuleType:
     # Imported lazily: English doesn't need gettext.
     return import_module("gettext")
 
 
-def _words() -> _Words:
-    return _now if _now is not None else install(os.environ.get(LANG_VARIABLE, ENGLISH))
+def _current_catalogue() -> _Catalogue:
+    return _current if _current is not None else install(os.environ.get(LANG_VARIABLE, ENGLISH))
 
 
-def install(wanted: str, folder: Path = LOCALE) -> _Words:
+def install(wanted: str, folder: Path = LOCALE) -> _Catalogue:
     """Set the language of this process; fall back to English if the catalogue is missing or unreadable.
 
     Args:
         wanted: Language code, such as "es" or "es_MX.UTF-8".
         folder: Folder of the catalogues.
     """
-    global _now  # noqa: PLW0603 - one language per process
+    global _current  # noqa: PLW0603 - one language per process
     chosen = best_match(wanted, folder)
     found = None
     if chosen != ENGLISH:
         file = folder / chosen / "LC_MESSAGES" / f"{DOMAIN}.mo"
         try:
             with file.open("rb") as stream:
-                found = _standard().GNUTranslations(stream)
+                found = _gettext_module().GNUTranslations(stream)
         except Exception as error:  # noqa: BLE001 - a damaged catalogue may raise any exception
             _log.warning("the words of '%s' can't be read from '%s': %s", chosen, file, error)
             chosen = ENGLISH
     facts = known_languages(folder).get(chosen, {}) if chosen != ENGLISH else {}
-    _now = _Words(chosen, found, facts)
-    return _now
+    _current = _Catalogue(chosen, found, facts)
+    return _current
 
 
 def begin(chosen: str = "") -> None:
@@ -187,15 +195,15 @@ def begin(chosen: str = "") -> None:
     The system's language is used only if its translation is complete enough to be offered. Child processes
     inherit the language through the environment, and argparse's own messages follow it.
     """
-    install(os.environ.get(LANG_VARIABLE) or chosen or _computers_language())
+    install(os.environ.get(LANG_VARIABLE) or chosen or _supported_system_language())
     os.environ[LANG_VARIABLE] = language()
     if language() != ENGLISH:
         os.environ["LANGUAGE"] = language()
-        _standard().bindtextdomain(DOMAIN, str(LOCALE))
-        _standard().textdomain(DOMAIN)
+        _gettext_module().bindtextdomain(DOMAIN, str(LOCALE))
+        _gettext_module().textdomain(DOMAIN)
 
 
-def _computers_language() -> str:
+def _supported_system_language() -> str:
     found = best_match(system_language())
     return found if found in dict(offered()) else ENGLISH
 
@@ -205,7 +213,10 @@ def editor_words(folder: Path = LOCALE) -> Mapping[str, str]:
     file = folder / language() / "LC_MESSAGES" / EDITOR_WORDS
     if language() == ENGLISH or not file.is_file():
         return {}
-    return {str(english): str(told) for english, told in json.loads(file.read_text(encoding="utf-8")).items()}
+    return {
+        str(english): str(translation)
+        for english, translation in json.loads(file.read_text(encoding="utf-8")).items()
+    }
 
 
 def offered(folder: Path = LOCALE) -> list[tuple[str, str]]:
@@ -220,12 +231,14 @@ def offered(folder: Path = LOCALE) -> list[tuple[str, str]]:
 
 def language() -> str:
     """Return the code of the current language, such as "es"."""
-    return _words().language
+    return _current_catalogue().language
 
 
 def gettext(message: str) -> str:
     """Translate a message to the current language. Fill its placeholders afterwards with ``format``."""
-    return _words().one(message.context if isinstance(message, _Meant) else None, message)
+    return _current_catalogue().one(
+        message.context if isinstance(message, _ContextMessage) else None, message
+    )
 
 
 _ = gettext
@@ -233,17 +246,17 @@ _ = gettext
 
 def pgettext(context: str, message: str) -> str:
     """Translate a message that has several meanings; `context` says which one is meant."""
-    return _words().one(context, message)
+    return _current_catalogue().one(context, message)
 
 
 def translate(context: str | None, message: str) -> str:
     """Translate text of data files. `tools/words.py` doesn't extract messages from calls of this function."""
-    return _words().one(context, message)
+    return _current_catalogue().one(context, message)
 
 
 def ngettext(singular: str, plural: str, count: int) -> str:
     """Translate a message with the plural form for `count`. Fill its placeholders afterwards."""
-    return _words().many(singular, plural, count)
+    return _current_catalogue().many(singular, plural, count)
 
 
 def lazy(message: str) -> str:
@@ -256,14 +269,14 @@ def plazy(context: str, message: str) -> str:
 
     Translate it with `_` when it is shown.
     """
-    return _Meant(context, message)
+    return _ContextMessage(context, message)
 
 
 def listed(items: Sequence[str], kind: Literal["and", "or"] = "and") -> str:
     """Join items to a list in the current language: "a, b and c" or "a, b or c"."""
     if len(items) < 2:
         return "".join(items)
-    pattern = _words().list_pattern(kind)
+    pattern = _current_catalogue().list_pattern(kind)
     if len(items) == 2:
         return pattern["2"].format(*items)
     text = pattern["end"].format(items[-2], items[-1])
@@ -274,7 +287,7 @@ def listed(items: Sequence[str], kind: Literal["and", "or"] = "and") -> str:
 
 def number(value: float, spec: str = "g") -> str:
     """Format a number with the decimal and group separators of the current language."""
-    words = _words()
+    words = _current_catalogue()
     text = format(value, spec)
     signs = {".": words.fact("decimal", "."), ",": words.fact("group", ",")}
     return text if signs == {".": ".", ",": ","} else "".join(signs.get(each, each) for each in text)
@@ -282,7 +295,7 @@ def number(value: float, spec: str = "g") -> str:
 
 def day_text(day: int, month: int, year: int | None = None) -> str:
     """Format a date in the current language: "17 November" or "17 November 2025"."""
-    words = _words()
+    words = _current_catalogue()
     pattern = (
         words.fact("day", "{day} {month}")
         if year is None
@@ -304,7 +317,7 @@ def holes(text: str) -> frozenset[str]:
         }
     except ValueError:
         fields = {each for each in text if each in "{}"}
-    return frozenset((*fields, *_BLOCK_HOLE.findall(text), *_PRINTF_HOLE.findall(text)))
+    return frozenset((*fields, *_BLOCK_PLACEHOLDER.findall(text), *_PRINTF_PLACEHOLDER.findall(text)))
 
 
 @lru_cache(maxsize=4)
@@ -325,31 +338,31 @@ def best_match(wanted: str, folder: Path = LOCALE) -> str:
     plain = re.split(r"[.@]", wanted.replace("-", "_"))[0].lower()
     if plain == PSEUDO:
         return PSEUDO
-    there = {name.lower(): name for name in known_languages(folder)}
-    return there.get(plain) or there.get(plain.partition("_")[0]) or ENGLISH
+    available = {name.lower(): name for name in known_languages(folder)}
+    return available.get(plain) or available.get(plain.partition("_")[0]) or ENGLISH
 
 
 def system_language(environ: Mapping[str, str] = os.environ, platform: str = sys.platform) -> str:
     """Return the locale of the operating system, such as "es_MX"; English if it can't be determined."""
     for name in ("LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
-        told = environ.get(name, "").partition(":")[0]
-        if told:
-            return ENGLISH if told.partition(".")[0] in {"C", "POSIX"} else told
-    ask = _ASK.get(platform)
+        value = environ.get(name, "").partition(":")[0]
+        if value:
+            return ENGLISH if value.partition(".")[0] in {"C", "POSIX"} else value
+    query = _LOCALE_QUERIES.get(platform)
     try:
-        return (ask() if ask is not None else "") or ENGLISH
+        return (query() if query is not None else "") or ENGLISH
     except (OSError, ValueError, AttributeError, LookupError):
         return ENGLISH
 
 
-def _ask_windows() -> str:
+def _query_windows() -> str:
     kernel = import_module("ctypes").windll.kernel32
     return str(import_module("locale").windows_locale.get(int(kernel.GetUserDefaultUILanguage()), ""))
 
 
-def _ask_macos() -> str:
+def _query_macos() -> str:
     file = Path.home() / "Library" / "Preferences" / ".GlobalPreferences.plist"
     return str(import_module("plistlib").loads(file.read_bytes())["AppleLanguages"][0])
 
 
-_ASK: Mapping[str, Callable[[], str]] = {"win32": _ask_windows, "darwin": _ask_macos}
+_LOCALE_QUERIES: Mapping[str, Callable[[], str]] = {"win32": _query_windows, "darwin": _query_macos}

@@ -14,7 +14,7 @@ from nep.i18n import _
 
 __all__ = ["bounded_str", "control_in", "escaped", "harmless", "quotable", "shortened"]
 
-_QUOTED = 200
+_MAX_QUOTED_LENGTH = 200
 """Default maximum length of a quoted value."""
 
 _MAX_SHOWN_DEPTH = 8
@@ -28,14 +28,14 @@ _CONTROLS = (
     "\ud800-\udfff"  # lone surrogates can't be encoded
 )
 _CONTROL = re.compile(f"[{_CONTROLS}]")
-_CONTROL_IN_LINES = re.compile(f"(?![\n\t])[{_CONTROLS}]")
+_CONTROL_EXCEPT_NEWLINES = re.compile(f"(?![\n\t])[{_CONTROLS}]")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def control_in(text: str) -> str:
     r"""Return the first control character of `text`, escaped (`\x1b`), or "" if it has none."""
     found = _CONTROL.search(text)
-    return "" if found is None else _readable(found)
+    return "" if found is None else _escape_match(found)
 
 
 def escaped(text: str, *, lines: bool = False) -> str:
@@ -45,7 +45,7 @@ def escaped(text: str, *, lines: bool = False) -> str:
         text: The text.
         lines: Keep newlines and tabs, where a forged line can't be mistaken for another message.
     """
-    return (_CONTROL_IN_LINES if lines else _CONTROL).sub(_readable, text)
+    return (_CONTROL_EXCEPT_NEWLINES if lines else _CONTROL).sub(_escape_match, text)
 
 
 def harmless(text: str, *, lines: bool = False) -> str:
@@ -56,7 +56,7 @@ def harmless(text: str, *, lines: bool = False) -> str:
         lines: Keep newlines and tabs instead of replacing them by spaces.
     """
     if lines:
-        return _CONTROL_IN_LINES.sub("", text)
+        return _CONTROL_EXCEPT_NEWLINES.sub("", text)
     return _CONTROL.sub("", re.sub("[\n\t\u2028\u2029]", " ", text))
 
 
@@ -67,15 +67,15 @@ def shortened(text: str, most: int) -> str:
     return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))
 
 
-def bounded_str(value: object, max_length: int = _QUOTED) -> str:
+def bounded_str(value: object, max_length: int = _MAX_QUOTED_LENGTH) -> str:
     r"""Return `str(value)` of an untrusted value, shortened to `max_length` characters.
 
     Never raises, whatever the type, size or nesting; the cost depends on `max_length`, not on the value. The
     result is valid UTF-8: lone surrogates are written as `\udc80`. An exception without a message becomes its
     class name.
     """
-    text = shortened(value, max_length) if isinstance(value, str) else _rendered(value, max_length)
-    return _SURROGATE.sub(_readable, text)
+    text = shortened(value, max_length) if isinstance(value, str) else _render_bounded(value, max_length)
+    return _SURROGATE.sub(_escape_match, text)
 
 
 def quotable(value: object) -> str:
@@ -83,10 +83,10 @@ def quotable(value: object) -> str:
     return escaped(bounded_str(value))
 
 
-def _rendered(value: object, max_length: int) -> str:
+def _render_bounded(value: object, max_length: int) -> str:
     text = ""
     try:
-        for piece in _pieces(value, max_length, 0):
+        for piece in _iter_pieces(value, max_length, 0):
             text += piece
             if len(text) > max_length:
                 return text[:max_length] + "…"
@@ -95,7 +95,7 @@ def _rendered(value: object, max_length: int) -> str:
     return text or type(value).__name__
 
 
-def _pieces(value: object, max_length: int, depth: int) -> Iterator[str]:
+def _iter_pieces(value: object, max_length: int, depth: int) -> Iterator[str]:
     if isinstance(value, Mapping | list | tuple | set | frozenset):
         opening, closing = "[]" if isinstance(value, list | tuple) else "{}"
         yield opening
@@ -104,20 +104,20 @@ def _pieces(value: object, max_length: int, depth: int) -> Iterator[str]:
         else:
             for number, item in enumerate(islice(value, max_length)):
                 yield ", " if number else ""
-                yield from _pieces(item, max_length, depth + 1)
+                yield from _iter_pieces(item, max_length, depth + 1)
                 if isinstance(value, Mapping):
                     yield ": "
-                    yield from _pieces(value[item], max_length, depth + 1)
+                    yield from _iter_pieces(value[item], max_length, depth + 1)
         yield closing
     elif isinstance(value, str | bytes | bytearray):
         yield repr(value[: max_length + 1])
     elif type(value) is int and value.bit_length() > _MAX_INT_BITS:
         yield _("a number of {count} digits").format(count=int(value.bit_length() * 0.30103) + 1)
     else:
-        yield _str_of(value)
+        yield _safe_str(value)
 
 
-def _str_of(value: object) -> str:
+def _safe_str(value: object) -> str:
     try:
         text = str(value)
     except BaseException:  # noqa: BLE001 - __str__ of any class may raise anything
@@ -125,5 +125,5 @@ def _str_of(value: object) -> str:
     return text or type(value).__name__
 
 
-def _readable(found: re.Match[str]) -> str:
+def _escape_match(found: re.Match[str]) -> str:
     return ascii(found.group())[1:-1]

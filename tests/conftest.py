@@ -254,7 +254,7 @@ def pseudo(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is marked for translators is said in the pseudo-language (`tests.pseudo` finds what is not)."""
     from tests.pseudo import words
 
-    monkeypatch.setattr("nep.i18n._now", words())
+    monkeypatch.setattr("nep.i18n._current", words())
 
 
 @pytest.fixture

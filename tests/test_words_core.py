@@ -341,8 +341,8 @@ def test_what_is_no_request_or_answer() -> None:
 def test_what_was_left_out_of_a_log_or_a_terminal() -> None:
     handler = LogHandler("zz", lambda: pytest.fail("nothing is published"), burst=0)
     handler.emit(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))
-    said(handler._left_out_record()["text"])
-    text = handler._plain(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))["text"]
+    said(handler._drop_record_locked()["text"])
+    text = handler._to_plain(logging.LogRecord("x", logging.INFO, "x.py", 1, "x" * 9000, (), None))["text"]
     said(str(text).replace("x", ""))
     handler.close()
     terminal = Terminal(io.StringIO())

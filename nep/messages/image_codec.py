@@ -66,8 +66,8 @@ class ImageFormat:
     Encoded files and `raw_image` are sent unchanged. Raises `ValueError` for invalid values.
 
     Attributes:
-        kind: "jpeg" (`uint8` with one or three channels), "png", "raw", or "auto" (see
-            `nep.messages.image_codec`).
+        kind: "jpeg" (`uint8` with one or three channels), "png", "raw", or "auto": JPEG for such
+            arrays, PNG for other 8-bit and 16-bit images, else raw.
         quality: JPEG quality, 1 to 100.
         width: Maximum width in pixels; wider images are scaled down, keeping the aspect ratio. Images of 16
             bits and more (depth, labels) are subsampled instead of interpolated.

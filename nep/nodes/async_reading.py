@@ -20,7 +20,7 @@ else:
 
 __all__ = ["AsyncMessages", "AsyncReader"]
 
-_TURN = 64
+_MAX_READS_PER_TURN = 64
 """Number of messages read without waiting before other coroutines get a turn."""
 
 
@@ -33,44 +33,44 @@ class AsyncReader:
     def __init__(self, transport: SubscriberTransport, poll: Callable[[], Message | None]) -> None:
         self._transport = transport
         self._poll = poll
-        self._at_once = 0
+        self._reads_in_turn = 0
 
     async def receive(self, timeout_s: float | None) -> Message | None:
         """Return the next message, or None after `timeout_s` seconds. Cancelling it loses no message."""
-        self._at_once += 1
-        if self._at_once >= _TURN:
-            self._at_once = 0
+        self._reads_in_turn += 1
+        if self._reads_in_turn >= _MAX_READS_PER_TURN:
+            self._reads_in_turn = 0
             await give_way()
         message = self._poll()
         if message is not None or timeout_s == 0.0:
             return message
-        self._at_once = 0
+        self._reads_in_turn = 0
         loop = asyncio.get_running_loop()
         deadline = None if timeout_s is None else loop.time() + timeout_s
         while deadline is None or loop.time() < deadline:
-            await self._rung(loop, deadline)
+            await self._wait_until_ready(loop, deadline)
             message = self._poll()
             if message is not None:
                 return message
         return None
 
-    async def _rung(self, loop: asyncio.AbstractEventLoop, deadline: float | None) -> None:
+    async def _wait_until_ready(self, loop: asyncio.AbstractEventLoop, deadline: float | None) -> None:
         # Wait until there may be a message, at most until `deadline`.
-        rung = loop.create_future()
+        ready = loop.create_future()
 
-        def call() -> None:
-            if not rung.done():
-                rung.set_result(None)
+        def set_ready() -> None:
+            if not ready.done():
+                ready.set_result(None)
 
         waits = loop_wait()
-        late = None if deadline is None else loop.call_at(deadline, call)
-        waits.watch(self._transport, call)
+        timeout = None if deadline is None else loop.call_at(deadline, set_ready)
+        waits.watch(self._transport, set_ready)
         try:
-            await rung
+            await ready
         finally:
-            waits.unwatch(self._transport, call)
-            if late is not None:
-                late.cancel()
+            waits.unwatch(self._transport, set_ready)
+            if timeout is not None:
+                timeout.cancel()
 
 
 class AsyncMessages:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from nep.backends.base import SubscriberTransport
 from nep.backends.services import CallQueue
 from nep.nodes.loop_wait import LoopWait, give_way, loop_wait
-from nep.nodes.work import NOTHING, Work
+from nep.nodes.work import NO_MESSAGE, Work
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ else:
 
 __all__ = ["spin"]
 
-_TURNS = 64
+_MAX_BUSY_TURNS = 64
 """Number of busy turns before other coroutines get a turn."""
 
 
@@ -29,88 +29,88 @@ async def spin(work: Work, timeout_s: float | None) -> None:
     """Run the work of a node until it is stopped or closed, or for `timeout_s` seconds."""
     loop = asyncio.get_running_loop()
     deadline = math.inf if timeout_s is None else work.clock() + timeout_s
-    rests = _Rests(work, loop, loop_wait())
-    work.watch(rests)
+    waiter = _LoopWaiter(work, loop, loop_wait())
+    work.watch(waiter)
     turns = 0
     try:
         while work.is_running and work.clock() < deadline:
-            if await _turn(work):
-                turns = (turns + 1) % _TURNS
+            if await _run_turn(work):
+                turns = (turns + 1) % _MAX_BUSY_TURNS
                 if not turns:
                     await give_way()
                 continue
-            await rests.rest(min(work.due_s, deadline - work.clock()))
+            await waiter.rest(min(work.due_s, deadline - work.clock()))
         work.check_not_forked()
     finally:
-        work.unwatch(rests)
-        rests.end()
-        work.begin_anew()
+        work.unwatch(waiter)
+        waiter.end()
+        work.reset_stop()
 
 
-async def _turn(work: Work) -> bool:
+async def _run_turn(work: Work) -> bool:
     # One turn: every due timer, one call per server, one message per callback. Returns False if idle.
     has_called = work.run_servers()
     for timer in work.timers:
         if timer.take_turn():
             has_called = True
-            await _until_done(timer.callback())
+            await _await_result(timer.callback())
         if not work.is_running:
             return True
     for callback in work.callbacks:
         if not work.is_running:
             break
-        given = work.given(callback)
-        if given is not NOTHING:
+        item = work.next_item(callback)
+        if item is not NO_MESSAGE:
             has_called = True
-            await _until_done(callback.call(given))
+            await _await_result(callback.call(item))
     return has_called
 
 
-async def _until_done(returned: object) -> None:
+async def _await_result(returned: object) -> None:
     if inspect.isawaitable(returned):
         await returned
 
 
-class _Rests:
+class _LoopWaiter:
     """Waiter of a node that spins in an event loop: woken by messages, calls and `wake` (a `Wakes`)."""
 
     def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
         self._work = work
         self._loop = loop
         self._waits = waits
-        self._rung = asyncio.Event()
+        self._ready = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
-        self._calls: list[CallQueue] = []
+        self._queues: list[CallQueue] = []
         """Queues of servers that wake this waiter until `end`."""
 
     def wake(self) -> None:
         # Thread-safe.
         with suppress(RuntimeError):  # the loop is closed
-            self._loop.call_soon_threadsafe(self._rung.set)
+            self._loop.call_soon_threadsafe(self._ready.set)
 
     async def rest(self, timeout_s: float) -> None:
         # Wait until there may be work, at most `timeout_s`.
         for subscriber in self._work.waiting:
             if subscriber not in self._watched:
-                call = self._watched[subscriber] = self._caller(subscriber)
+                call = self._watched[subscriber] = self._ready_callback(subscriber)
                 self._waits.watch(subscriber, call)
         for queue in self._work.services.queues:
-            if queue not in self._calls:
+            if queue not in self._queues:
                 if not queue.enter_wait(self.wake):
                     return
-                self._calls.append(queue)
-        late = None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._rung.set)
+                self._queues.append(queue)
+        late = None if math.isinf(timeout_s) else self._loop.call_later(max(0.0, timeout_s), self._ready.set)
         try:
-            await self._rung.wait()
+            await self._ready.wait()
         finally:
-            self._rung.clear()
+            self._ready.clear()
             if late is not None:
                 late.cancel()
 
-    def _caller(self, subscriber: SubscriberTransport) -> Callable[[], None]:
+    def _ready_callback(self, subscriber: SubscriberTransport) -> Callable[[], None]:
         def call() -> None:
             self._watched.pop(subscriber, None)
-            self._rung.set()
+            self._ready.set()
 
         return call
 
@@ -118,6 +118,6 @@ class _Rests:
         for subscriber, call in self._watched.items():
             self._waits.unwatch(subscriber, call)
         self._watched.clear()
-        for queue in self._calls:
+        for queue in self._queues:
             queue.leave_wait(self.wake)
-        self._calls.clear()
+        self._queues.clear()

@@ -55,7 +55,7 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
     finally:
         for each in works:
             each.unwatch(waits)
-            each.begin_anew()
+            each.reset_stop()
         waits.close()
 
 
@@ -64,7 +64,7 @@ def _still_running(works: Sequence[Work]) -> list[Work]:
     running = [each for each in works if each.is_running]
     for each in works:
         if each not in running:
-            each.begin_anew()
+            each.reset_stop()
     return running
 
 

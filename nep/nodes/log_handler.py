@@ -56,13 +56,13 @@ TEXT_LIMIT = 8_000
 """Maximum length of a record's text in characters; longer texts are truncated."""
 
 _ERROR_TEXT_LIMIT = 1_000
-_SHOWN = 2_000
-_SAY_LEFT_OUT_S = 1.0
+_MAX_SHOWN_ERRORS = 2_000
+_DROP_REPORT_INTERVAL_S = 1.0
 _FLUSH_S = 1.0
-_AGAIN_S = 1.0
-_WAITING = 1_000
-_OWN = "nep_published_by"
-_ERRORS = ("error", "critical")
+_OPEN_RETRY_S = 1.0
+_MAX_QUEUED = 1_000
+_PUBLISHED_BY = "nep_published_by"
+_ERROR_LEVELS = ("error", "critical")
 _ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "debug"}
 
 
@@ -99,8 +99,8 @@ class LogRecord:
             "node": self.node,
             "stamp_ns": self.stamp_ns,
         }
-        more = {"file": self.file, "line": self.line, "pid": self.pid}
-        return plain | {key: value for key, value in more.items() if value is not None}
+        optional = {"file": self.file, "line": self.line, "pid": self.pid}
+        return plain | {key: value for key, value in optional.items() if value is not None}
 
     @classmethod
     def from_plain(cls, payload: object, stamp_ns: int | None = None) -> LogRecord:
@@ -110,17 +110,17 @@ class LogRecord:
             payload: Any received value.
             stamp_ns: The time stamp of a record that has none.
         """
-        given = payload if isinstance(payload, Mapping) else {"text": payload}
-        text, stamp = given.get("text"), _number(given.get("stamp_ns"))
+        fields = payload if isinstance(payload, Mapping) else {"text": payload}
+        text, stamp = fields.get("text"), _int_or_none(fields.get("stamp_ns"))
         return cls(
-            level_of(given.get("level")),
+            level_of(fields.get("level")),
             "" if text is None else bounded_str(text, TEXT_LIMIT),
-            _word(given.get("name")),
-            _word(given.get("node")),
+            _short_text(fields.get("name")),
+            _short_text(fields.get("node")),
             stamp if stamp is not None and 0 < stamp < 1 << 63 else stamp_ns or 0,
-            _word(given.get("file")) or None,
-            _number(given.get("line")),
-            _number(given.get("pid")),
+            _short_text(fields.get("file")) or None,
+            _int_or_none(fields.get("line")),
+            _int_or_none(fields.get("pid")),
         )
 
 
@@ -142,13 +142,13 @@ class ShownErrors:
 
     def is_new(self, record: LogRecord) -> bool:
         """Return True for a record that is not an error, and once for each error."""
-        if record.level not in _ERRORS:
+        if record.level not in _ERROR_LEVELS:
             return True
         key = (record.node, record.stamp_ns, record.text[:100])
         if key in self._shown:
             return False
         self._shown[key] = None
-        if len(self._shown) > _SHOWN:
+        if len(self._shown) > _MAX_SHOWN_ERRORS:
             del self._shown[next(iter(self._shown))]
         return True
 
@@ -211,9 +211,9 @@ class LogHandler(logging.Handler):
         self._errors_publisher: LogPublisher | None = None
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
         self._tokens, self._counted_at = float(burst), clock()
-        self._waiting: deque[dict[str, object]] = deque()
-        self._left_out = 0
-        self._told_at = float("-inf")
+        self._queue: deque[dict[str, object]] = deque()
+        self._dropped = 0
+        self._reported_at = float("-inf")
         self._has_work = threading.Condition()
         self._thread: threading.Thread | None = None
         self._is_closed = False
@@ -222,35 +222,35 @@ class LogHandler(logging.Handler):
     @property
     def left_out(self) -> int:
         """Number of dropped records not yet reported."""
-        return self._left_out
+        return self._dropped
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a record for the handler's thread."""
-        if getattr(record, _OWN, None) is self or threading.current_thread() is self._thread:
+        if getattr(record, _PUBLISHED_BY, None) is self or threading.current_thread() is self._thread:
             return  # received twice (from the node's logger and the root), or caused by publishing itself
-        setattr(record, _OWN, self)
+        setattr(record, _PUBLISHED_BY, self)
         with self._has_work:
             if self._is_closed:
                 return
-            if not self._may():
-                self._left_out += 1
+            if not self._take_token_locked():
+                self._dropped += 1
                 return
         try:
-            plain = self._plain(record)
+            plain = self._to_plain(record)
         except Exception:  # noqa: BLE001 - a logging error must not end the program
             self.handleError(record)
             return
         with self._has_work:
-            if len(self._waiting) >= _WAITING:
-                self._left_out += 1
+            if len(self._queue) >= _MAX_QUEUED:
+                self._dropped += 1
                 return
             try:
-                self._begin()
+                self._start_thread_locked()
             # the interpreter is shutting down (Python 3.12+), or no thread can be started
             except RuntimeError:
-                self._left_out += 1
+                self._dropped += 1
                 return
-            self._waiting.append(plain)
+            self._queue.append(plain)
             self._has_work.notify()
 
     def close(self, timeout_s: float = _FLUSH_S) -> None:
@@ -271,12 +271,12 @@ class LogHandler(logging.Handler):
         self._is_closed = True
         self._has_work = threading.Condition()
         self._thread = None
-        self._waiting.clear()
-        self._left_out = 0
+        self._queue.clear()
+        self._dropped = 0
 
     # ---- worker thread
 
-    def _may(self) -> bool:
+    def _take_token_locked(self) -> bool:
         # Token bucket. Called with the lock held.
         now = self._clock()
         self._tokens = min(float(self._burst), self._tokens + (now - self._counted_at) * self._rate_hz)
@@ -286,14 +286,14 @@ class LogHandler(logging.Handler):
         self._tokens -= 1.0
         return True
 
-    def _plain(self, record: logging.LogRecord) -> dict[str, object]:
+    def _to_plain(self, record: logging.LogRecord) -> dict[str, object]:
         text = record.getMessage()
         if record.exc_info and record.exc_info[0] is not None:
             text += "\n" + "".join(traceback.format_exception(*record.exc_info)).rstrip()
         if len(text) > TEXT_LIMIT:
             text = _("{text}… ({count} characters)").format(text=text[:TEXT_LIMIT], count=len(text))
         return LogRecord(
-            _named(record.levelno),
+            _level_name(record.levelno),
             text,
             record.name,
             self._node,
@@ -303,25 +303,25 @@ class LogHandler(logging.Handler):
             os.getpid(),
         ).to_plain()
 
-    def _begin(self) -> None:
+    def _start_thread_locked(self) -> None:
         if self._thread is None:
             thread = threading.Thread(target=self._run, name=f"{self._node} log", daemon=True)
             thread.start()
             self._thread = thread
 
     def _run(self) -> None:
-        publisher = self._opened()
+        publisher = self._open_with_retry()
         if publisher is None:
             return
-        while (records := self._next()) is not None:
+        while (records := self._next_batch()) is not None:
             for record in records:
                 try:
                     publisher.publish(record)
                 except NepError:
                     return  # the node is closed
-            self._keep_errors([record for record in records if record["level"] in _ERRORS])
+            self._publish_last_errors([record for record in records if record["level"] in _ERROR_LEVELS])
 
-    def _keep_errors(self, records: list[dict[str, object]]) -> None:
+    def _publish_last_errors(self, records: list[dict[str, object]]) -> None:
         # Republish the latched list with these errors.
         if not records or self._open_errors is None:
             return
@@ -333,7 +333,7 @@ class LogHandler(logging.Handler):
                 self._errors_publisher = self._open_errors()
             self._errors_publisher.publish(list(self._errors))
 
-    def _opened(self) -> LogPublisher | None:
+    def _open_with_retry(self) -> LogPublisher | None:
         # Retry until a publisher can be opened; None when the handler is closed.
         while True:
             try:
@@ -342,31 +342,31 @@ class LogHandler(logging.Handler):
                 return None
             except NepError:
                 with self._has_work:
-                    if self._is_closed or self._has_work.wait_for(lambda: self._is_closed, _AGAIN_S):
+                    if self._is_closed or self._has_work.wait_for(lambda: self._is_closed, _OPEN_RETRY_S):
                         return None
 
-    def _next(self) -> list[dict[str, object]] | None:
+    def _next_batch(self) -> list[dict[str, object]] | None:
         # Blocks until there are records; None at the end.
         with self._has_work:
-            while not self._waiting and not self._is_closed:
+            while not self._queue and not self._is_closed:
                 # the number of dropped records is reported once a second, and at the end of the burst
-                told = self._has_work.wait(_SAY_LEFT_OUT_S if self._left_out else None)
-                if not told and self._left_out:
+                was_notified = self._has_work.wait(_DROP_REPORT_INTERVAL_S if self._dropped else None)
+                if not was_notified and self._dropped:
                     break
-            records = list(self._waiting)
-            self._waiting.clear()
-            if not records and not self._left_out:
+            records = list(self._queue)
+            self._queue.clear()
+            if not records and not self._dropped:
                 return None
-            if self._left_out and (self._is_closed or self._is_time()):
-                records.append(self._left_out_record())
+            if self._dropped and (self._is_closed or self._is_report_due_locked()):
+                records.append(self._drop_record_locked())
             return records
 
-    def _is_time(self) -> bool:
-        return self._clock() - self._told_at >= _SAY_LEFT_OUT_S
+    def _is_report_due_locked(self) -> bool:
+        return self._clock() - self._reported_at >= _DROP_REPORT_INTERVAL_S
 
-    def _left_out_record(self) -> dict[str, object]:
-        count, self._left_out = self._left_out, 0
-        self._told_at = self._clock()
+    def _drop_record_locked(self) -> dict[str, object]:
+        count, self._dropped = self._dropped, 0
+        self._reported_at = self._clock()
         text = ngettext(
             "{count} log record was left out: more than {rate_hz} a second",
             "{count} log records were left out: more than {rate_hz} a second",
@@ -384,13 +384,13 @@ def handler_of(node: LogNode) -> LogHandler:
     )
 
 
-def _named(level: int) -> str:
+def _level_name(level: int) -> str:
     return LEVELS[0] if level < logging.INFO else LEVELS[min(4, level // 10 - 1)]
 
 
-def _word(given: object) -> str:
+def _short_text(given: object) -> str:
     return given[:200] if isinstance(given, str) else ""
 
 
-def _number(given: object) -> int | None:
+def _int_or_none(given: object) -> int | None:
     return given if isinstance(given, int) and not isinstance(given, bool) else None

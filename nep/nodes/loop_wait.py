@@ -28,7 +28,7 @@ else:
 
 __all__ = ["LoopWait", "give_way", "loop_wait"]
 
-_LOOK_S = 1.0
+_LOOP_CHECK_S = 1.0
 """Interval at which the thread checks for a loop closed without `asyncio.run`'s shutdown."""
 _JOIN_S = 5.0
 
@@ -81,10 +81,10 @@ class LoopWait:
         self._id = id(loop)
         self._wait = SharedWait()
         self._calls: dict[SubscriberTransport, list[Call]] = {}
-        self._orders: deque[tuple[bool, SubscriberTransport]] = deque()
-        self._is_over = False
+        self._requests: deque[tuple[bool, SubscriberTransport]] = deque()
+        self._is_stopped = False
         self._thread = threading.Thread(target=self._run, name="nep-async", daemon=True)
-        self._farewell = self._until_shutdown()
+        self._shutdown_hook = self._until_shutdown()
 
     def start(self) -> None:
         """Start the thread, and register its shutdown with the loop (`asyncio.run`)."""
@@ -93,18 +93,18 @@ class LoopWait:
         except BaseException:
             self._wait.close()
             raise
-        _step(self._farewell.asend(None))
+        _run_to_first_yield(self._shutdown_hook.asend(None))
 
     def serves(self, loop: asyncio.AbstractEventLoop) -> bool:
         """Return True if this wait belongs to `loop` and is running."""
-        return self._loop() is loop and not self._is_over
+        return self._loop() is loop and not self._is_stopped
 
     def watch(self, subscriber: SubscriberTransport, call: Call) -> None:
         """Call `call` once when the subscriber may have a message or is closed."""
         calls = self._calls.setdefault(subscriber, [])
         calls.append(call)
         if len(calls) == 1:
-            self._order(True, subscriber)
+            self._request(True, subscriber)
 
     def unwatch(self, subscriber: SubscriberTransport, call: Call) -> None:
         """Cancel a `watch`. May be called after the call."""
@@ -113,11 +113,11 @@ class LoopWait:
             calls.remove(call)
             if not calls:
                 del self._calls[subscriber]
-                self._order(False, subscriber)
+                self._request(False, subscriber)
 
     def close(self) -> None:
         """Stop the thread."""
-        self._is_over = True
+        self._is_stopped = True
         self._wait.wake()
         if threading.current_thread() is not self._thread:
             self._thread.join(_JOIN_S)
@@ -129,11 +129,11 @@ class LoopWait:
         finally:
             self.close()
 
-    def _order(self, is_armed: bool, subscriber: SubscriberTransport) -> None:
-        self._orders.append((is_armed, subscriber))
+    def _request(self, is_armed: bool, subscriber: SubscriberTransport) -> None:
+        self._requests.append((is_armed, subscriber))
         self._wait.wake()
 
-    def _ring(self, subscribers: list[SubscriberTransport]) -> None:
+    def _call_ready(self, subscribers: list[SubscriberTransport]) -> None:
         # Runs in the loop.
         for subscriber in subscribers:
             for call in self._calls.pop(subscriber, ()):
@@ -143,43 +143,43 @@ class LoopWait:
 
     def _run(self) -> None:
         try:
-            while not self._is_over:
-                rung = self._wait.wait(_LOOK_S)
-                rung += self._obeyed()
-                if not self._has_told(rung):
+            while not self._is_stopped:
+                ready = self._wait.wait(_LOOP_CHECK_S)
+                ready += self._apply_requests()
+                if not self._notify_loop(ready):
                     return
         finally:
-            self._is_over = True
+            self._is_stopped = True
             self._wait.close()
             with _lock:
                 if _waits.get(self._id) is self:
                     del _waits[self._id]
 
-    def _obeyed(self) -> list[SubscriberTransport]:
+    def _apply_requests(self) -> list[SubscriberTransport]:
         # Returns subscribers that may already have a message.
-        rung = []
-        while self._orders:
-            is_armed, subscriber = self._orders.popleft()
+        ready = []
+        while self._requests:
+            is_armed, subscriber = self._requests.popleft()
             if not is_armed:
                 self._wait.disarm(subscriber)
             elif not self._wait.arm(subscriber):
-                rung.append(subscriber)
-        return rung
+                ready.append(subscriber)
+        return ready
 
-    def _has_told(self, rung: list[SubscriberTransport]) -> bool:
+    def _notify_loop(self, ready: list[SubscriberTransport]) -> bool:
         # Returns False when the loop is gone.
         loop = self._loop()
         if loop is None or loop.is_closed():
             return False
-        if rung:
+        if ready:
             try:
-                loop.call_soon_threadsafe(self._ring, rung)
+                loop.call_soon_threadsafe(self._call_ready, ready)
             except RuntimeError:  # closed in the meantime
                 return False
         return True
 
 
-def _step(awaitable: Coroutine[None, None, None]) -> None:
+def _run_to_first_yield(awaitable: Coroutine[None, None, None]) -> None:
     # Runs the generator to its first yield; it awaits nothing before that.
     with suppress(StopIteration):
         awaitable.send(None)

@@ -31,9 +31,9 @@ from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
 from nep.messages.image_codec import ImageFormat
 from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.abilities import codec_with, history_for, is_pattern_for, quality_for
 from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
 from nep.nodes.async_spinning import spin as spin_in_loop
+from nep.nodes.backend_checks import codec_with, history_for, is_pattern_for, quality_for
 from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, handler_of
 from nep.nodes.publisher import Publisher
@@ -43,7 +43,7 @@ from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, sink_of
 from nep.nodes.work import Callback, Work
 from nep.patterns.parameters.owned import MSG_TYPE, Parameters, place_of
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
-from nep.patterns.services.owned import OwnedServices
+from nep.patterns.services.owned import ServiceRegistry
 from nep.patterns.services.service_node import ServiceNode
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
@@ -61,14 +61,14 @@ __all__ = ["Node", "spin"]
 FLUSH_S = 2.0
 """Time in seconds that closing waits for published messages to be delivered."""
 
-_WORKER_PRIORITY = 10
+_FINALIZER_PRIORITY = 10
 """Exit priority >= 0: runs before a worker joins its own children, which may need published messages."""
 
-_alive: set[Node] = set()
+_open_nodes: set[Node] = set()
 """Open nodes, referenced until they are closed: a publisher may outlive the variable of its node."""
 _inherited: list[Node] = []
 """Nodes of the parent process after a fork. Referenced for ever, because they must not be finalized."""
-_closed_in = 0
+_finalizer_pid = 0
 """Process id in which closing is registered with `multiprocessing`."""
 
 
@@ -141,11 +141,11 @@ class Node(ServiceNode):
             computer=computer_id(),
         )
         self._transport: Transport = self._backend.open(record)
-        self._services = OwnedServices(
+        self._services = ServiceRegistry(
             self._transport, self._backend, self._wait_s, self._new_id, self._wake, self._closed_error
         )
         self._work = Work(name, self._transport, time.monotonic, self._services)
-        _alive.add(self)
+        _open_nodes.add(self)
         _close_with_worker()
         forks.watch(self)
 
@@ -248,21 +248,21 @@ class Node(ServiceNode):
             ClosedError: The node is closed.
             ValueError: An argument is invalid.
         """
-        connected = for_messages(self._configured(configuration))
-        kept = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
+        connected = for_messages(self._resolve_configuration(configuration))
+        history_length = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
-            _own_topic(topic),
+            _check_user_topic(topic),
             name_of(msg_type),
             codec_with(codec_of(self._backend, msg_type), image),
-            flag("latched", latched) or kept > 0,
+            flag("latched", latched) or history_length > 0,
             connected,
             self._wait_s,
             number,
             flag("batch", batch),
             quality_for(self._backend, qos),
-            kept,
+            history_length,
         )
         transport = self._open_transport().publisher(spec)
         publisher = Publisher(transport, spec, self._publishers.discard, is_strict=self._is_strict)
@@ -314,9 +314,9 @@ class Node(ServiceNode):
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
-            _own_topic(topic),
+            _check_user_topic(topic),
             name_of(msg_type),
-            for_messages(self._configured(configuration)),
+            for_messages(self._resolve_configuration(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
@@ -325,7 +325,7 @@ class Node(ServiceNode):
             qos=quality_for(self._backend, qos),
             is_pattern=flag("wildcards", wildcards) and is_pattern_for(self._backend, topic, configuration),
         )
-        return self._subscribed(self._open_transport().subscriber(spec), spec, msg_type)
+        return self._add_subscriber(self._open_transport().subscriber(spec), spec, msg_type)
 
     def new_callback(
         self,
@@ -368,9 +368,9 @@ class Node(ServiceNode):
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
-            _own_topic(topic),
+            _check_user_topic(topic),
             name_of(msg_type),
-            for_messages(self._configured(configuration)),
+            for_messages(self._resolve_configuration(configuration)),
             self._wait_s,
             one_of("keep", keep, ("all", "latest")),
             at_least("max_messages", max_messages, 1),
@@ -379,7 +379,7 @@ class Node(ServiceNode):
             is_pattern=is_pattern_for(self._backend, topic, configuration),
         )
         incoming = transport.subscriber(spec)
-        subscriber = self._subscribed(incoming, spec, msg_type)
+        subscriber = self._add_subscriber(incoming, spec, msg_type)
         self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
         return subscriber
 
@@ -428,7 +428,7 @@ class Node(ServiceNode):
                 raise
         return publisher
 
-    def _configured(self, configuration: object) -> Configuration:
+    def _resolve_configuration(self, configuration: object) -> Configuration:
         if configuration is None:
             return self.hybrid()
         if not isinstance(configuration, Hybrid | Direct):
@@ -440,10 +440,10 @@ class Node(ServiceNode):
             )
         return configuration
 
-    def _subscribed(
+    def _add_subscriber(
         self, transport: SubscriberTransport, spec: SubscriberSpec, msg_type: MsgType
     ) -> Subscriber:
-        subscriber = new_subscriber(transport, spec, self._forget, msg_type)
+        subscriber = new_subscriber(transport, spec, self._remove_subscriber, msg_type)
         with self._lock:
             self._subscribers.add(subscriber)
             is_late = self._is_closed
@@ -452,10 +452,10 @@ class Node(ServiceNode):
             raise self._closed_error()
         return subscriber
 
-    def _forget(self, subscriber: Subscriber) -> None:
+    def _remove_subscriber(self, subscriber: Subscriber) -> None:
         with self._lock:
             self._subscribers.discard(subscriber)
-        self._work.forget_callback(subscriber)
+        self._work.remove_callback(subscriber)
 
     # ---- spinning
 
@@ -548,7 +548,7 @@ class Node(ServiceNode):
         limit("timeout_s", timeout_s)
         _close((self,), timeout_s)
 
-    def _end_log(self, timeout_s: float) -> None:
+    def _close_log(self, timeout_s: float) -> None:
         if self._log_handler is not None:
             self._log_handler.close(timeout_s)
 
@@ -559,7 +559,7 @@ class Node(ServiceNode):
                 return False
             self._is_closed = True
             publishers = tuple(self._publishers)
-        _alive.discard(self)
+        _open_nodes.discard(self)
         self._work.close()
         for publisher in publishers:
             publisher.node_closes()
@@ -587,7 +587,7 @@ class Node(ServiceNode):
         self._services.forked()
         if self._parameters is not None:
             self._parameters.forked()
-        _alive.discard(self)
+        _open_nodes.discard(self)
         _inherited.append(self)
 
     def _open_transport(self) -> Transport:
@@ -608,7 +608,7 @@ class Node(ServiceNode):
         return f"Node({self.name!r}, {self._backend.name!r}, master={self._master!r})"
 
 
-def _own_topic(topic: str) -> str:
+def _check_user_topic(topic: str) -> str:
     # Service names start with a reserved prefix.
     if check_topic(topic).startswith(PREFIX):
         raise BadTopicError(topic, _("names that begin with '{prefix}' are services'").format(prefix=PREFIX))
@@ -642,26 +642,26 @@ def _close(nodes: Sequence[Node], timeout_s: float) -> None:
     # Closes all within `timeout_s`; all begin to close before one waits, so that none waits for another.
     started = time.monotonic()
     for each in nodes:
-        each._end_log(0.0)  # noqa: SLF001 - private to this module
+        each._close_log(0.0)  # noqa: SLF001 - private to this module
     for each in nodes:  # the logs must be flushed before the publishers close
-        each._end_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
+        each._close_log(max(0.0, started + timeout_s / 4 - time.monotonic()))  # noqa: SLF001
     for each in [each for each in nodes if each._begin_close()]:  # noqa: SLF001
         each._finish_close(max(0.0, started + timeout_s - time.monotonic()))  # noqa: SLF001
 
 
 def _close_all() -> None:
-    _close(tuple(_alive), FLUSH_S)
+    _close(tuple(_open_nodes), FLUSH_S)
 
 
 def _close_with_worker() -> None:
     # A forked worker of `multiprocessing` skips the interpreter's exit handlers, so closing is registered
     # with `multiprocessing` itself. It forgets registrations made before it starts: register when a node is
     # created.
-    global _closed_in  # noqa: PLW0603 - one per process
+    global _finalizer_pid  # noqa: PLW0603 - one per process
     parent_of_worker = getattr(sys.modules.get("multiprocessing.process"), "parent_process", None)
-    if _closed_in != os.getpid() and parent_of_worker is not None and parent_of_worker() is not None:
-        _closed_in = os.getpid()
-        sys.modules["multiprocessing.util"].Finalize(None, _close_all, exitpriority=_WORKER_PRIORITY)
+    if _finalizer_pid != os.getpid() and parent_of_worker is not None and parent_of_worker() is not None:
+        _finalizer_pid = os.getpid()
+        sys.modules["multiprocessing.util"].Finalize(None, _close_all, exitpriority=_FINALIZER_PRIORITY)
 
 
 atexit.register(_close_all)

@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 _LOOPBACK = "127.0.0.1"
-_INSTEAD: Mapping[str, str] = {
+_REPLACEMENTS: Mapping[str, str] = {
     "publisher": "node.new_pub(topic, msg_type)",
     "subscriber": "node.new_sub(topic, msg_type)",
     "surveyor": "node.new_surveyor(topic, timeout)",
@@ -49,11 +49,11 @@ _INSTEAD: Mapping[str, str] = {
 
 def original_hint(name: str) -> str:
     """Return the replacement for a name of the original module that nep lacks, or "" for any other name."""
-    instead = _INSTEAD.get(name)
-    if instead is None:
+    replacement = _REPLACEMENTS.get(name)
+    if replacement is None:
         return ""
-    said = _("the original module's '{name}' is written '{instead}' here; see docs/original-nep.md")
-    return said.format(name=name, instead=instead)
+    template = _("the original module's '{name}' is written '{instead}' here; see docs/original-nep.md")
+    return template.format(name=name, instead=replacement)
 
 
 class FixedServer:

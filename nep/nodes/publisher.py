@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing_extensions import Self
 
-__all__ = ["Publisher", "Unsendable", "place_of"]
+__all__ = ["Publisher", "RejectedPayloads", "path_of"]
 
 _logger = logging.getLogger("nep")
-_LOOK_S = 1.0
+_VALIDATE_INTERVAL_S = 1.0
 """Interval at which a payload of an unsubscribed topic is encoded to detect errors early."""
-_SHARE = 50
-_LOOKED_AT = 10_000
-_DEEPEST = 50
-_LONGEST = 300
+_VALIDATE_PAUSE_FACTOR = 50
+_MAX_NODES_CHECKED = 10_000
+_MAX_DEPTH = 50
+_MAX_TEXT_LENGTH = 300
 
-_DATA = (bytes, memoryview)  # created once: checked for every unsubscribed message
+_BYTES_TYPES = (bytes, memoryview)  # created once: checked for every unsubscribed message
 
 
 class Publisher:
@@ -63,14 +63,16 @@ class Publisher:
         self._is_forked = False
         self._transport = transport
         self._spec = spec
-        self._nulls = JsonEncoder(spec.topic, encode=spec.codec.encode) if spec.codec.name == "json" else None
-        self._encode = spec.codec.encode if self._nulls is None else self._nulls.encode
-        self._unsendable = Unsendable(spec.topic, spec.codec.encode, transport.report)
+        self._json_encoder = (
+            JsonEncoder(spec.topic, encode=spec.codec.encode) if spec.codec.name == "json" else None
+        )
+        self._encode = spec.codec.encode if self._json_encoder is None else self._json_encoder.encode
+        self._rejected = RejectedPayloads(spec.topic, spec.codec.encode, transport.report)
         self._is_latched = spec.is_latched
         self.is_closed = False
         """True if the publisher or its node was closed."""
         if isinstance(transport, PublishesQuickly) and (encode := ordinary(spec.codec)) is not None:
-            self._quickly(transport, encode)
+            self._install_fast_publish(transport, encode)
 
     @property
     def topic(self) -> str:
@@ -116,17 +118,17 @@ class Publisher:
     @property
     def nulled(self) -> int:
         """Number of messages in which NaN or infinity was replaced by ``null``, which JSON lacks."""
-        return 0 if self._nulls is None else self._nulls.count
+        return 0 if self._json_encoder is None else self._json_encoder.count
 
     @property
     def refused(self) -> int:
         """Number of payloads that could not be encoded; the reason is logged and an alert in the graph."""
-        return self._unsendable.count
+        return self._rejected.count
 
     @property
     def problem(self) -> str:
         """Reason why the newest payload was rejected, or "" if it could be encoded."""
-        return self._unsendable.problem
+        return self._rejected.problem
 
     def publish(self, payload: object, *, strict: bool = False) -> None:
         """Encode and send a payload. Never blocks.
@@ -152,15 +154,15 @@ class Publisher:
             self._skip(payload)
             return
         try:
-            made = payload if isinstance(payload, Encoded) else self._encode(payload)
+            encoded_payload = payload if isinstance(payload, Encoded) else self._encode(payload)
         except Exception as error:  # noqa: BLE001 - a payload of any class may raise anything
             self._check(payload)
-            self._unsendable.add(payload, error)
+            self._rejected.add(payload, error)
             return
-        if made is payload or self._unsendable.problem:
-            self._send(made)
+        if encoded_payload is payload or self._rejected.problem:
+            self._send(encoded_payload)
         else:
-            self._transport.send(made)
+            self._transport.send(encoded_payload)
 
     def _publish_strictly(self, payload: object) -> None:
         if self.is_closed:
@@ -169,25 +171,25 @@ class Publisher:
             if isinstance(payload, Encoded):
                 self._check(payload)
                 check_sendable(payload)
-                made = payload
+                encoded_payload = payload
             else:
-                made = self._encode(payload)
+                encoded_payload = self._encode(payload)
         except Exception as error:
             self._check(payload)  # raises a more specific error
-            raise self._unsendable.error(payload, error, self._spec.codec.name) from error
-        self._unsendable.resolve()
+            raise self._rejected.error(payload, error, self._spec.codec.name) from error
+        self._rejected.resolve()
         if self._transport.is_heard or self._is_latched:
-            self._transport.send(made)
+            self._transport.send(encoded_payload)
         else:
             self._transport.skip()
 
-    def _quickly(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
+    def _install_fast_publish(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
         # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
-        look = None if self._nulls is None else self._nulls.look
+        on_null = None if self._json_encoder is None else self._json_encoder.look
         kind = bytes if self._spec.codec.name == "bytes" else None
-        quick = transport.quick_publish(QuickPublish(self, kind, encode, look, self.publish))
-        quick.__doc__ = Publisher.publish.__doc__
-        setattr(self, "publish", quick)  # noqa: B010 - mypy rejects the assignment to a method
+        fast_publish = transport.quick_publish(QuickPublish(self, kind, encode, on_null, self.publish))
+        fast_publish.__doc__ = Publisher.publish.__doc__
+        setattr(self, "publish", fast_publish)  # noqa: B010 - mypy rejects the assignment to a method
 
     def publish_bytes(self, data: bytes | memoryview, extension: Mapping[str, object] | None = None) -> None:
         """Send data that is already encoded. Thread-safe.
@@ -207,18 +209,18 @@ class Publisher:
 
     def refuse(self, payload: object, error: Exception) -> None:
         """Count and report a payload that the caller could not encode, as `publish` does."""
-        self._unsendable.add(payload, error)
+        self._rejected.add(payload, error)
 
-    def _send(self, made: Encoded) -> None:
-        if type(made.data) is not bytes or made.extension is not None:
-            self._check(made)
+    def _send(self, encoded_payload: Encoded) -> None:
+        if type(encoded_payload.data) is not bytes or encoded_payload.extension is not None:
+            self._check(encoded_payload)
         try:
-            self._transport.send(made)
+            self._transport.send(encoded_payload)
         except WireError as error:  # in the extension
-            self._unsendable.add(made, error)
+            self._rejected.add(encoded_payload, error)
             return
-        if self._unsendable.problem:
-            self._unsendable.resolve()
+        if self._rejected.problem:
+            self._rejected.resolve()
 
     def _check(self, payload: object) -> None:
         # Raises `EncodeError` for errors visible without encoding.
@@ -226,7 +228,7 @@ class Publisher:
             self._spec.codec.check(payload)
             return
         codec, data, extension = self._spec.codec.name, payload.data, payload.extension
-        if not isinstance(data, _DATA):
+        if not isinstance(data, _BYTES_TYPES):
             raise EncodeError(codec, type(data).__name__, _("give its 'bytes'"))
         if extension is not None and not isinstance(extension, Mapping):
             raise EncodeError(codec, type(extension).__name__, _("an extension is a map"))
@@ -236,7 +238,7 @@ class Publisher:
         if self.is_closed:
             raise ClosedError(f"publisher '{self.topic}'", is_forked=self._is_forked)
         self._check(payload)
-        if self._unsendable.try_out(payload):
+        if self._rejected.is_valid(payload):
             self._transport.skip()
 
     # ---- names of the original module
@@ -323,7 +325,7 @@ class Publisher:
         return f"Publisher({self.topic!r}, {self.msg_type!r})"
 
 
-class Unsendable:
+class RejectedPayloads:
     """Payloads of one publisher that can't be encoded: count, log and report them.
 
     Args:
@@ -348,14 +350,14 @@ class Unsendable:
         self._encode = encode
         self._report = report
         self._clock = clock
-        self._look_at = clock()
-        self._place_at = clock()
-        self._known = ("", "")
+        self._validate_at = clock()
+        self._locate_at = clock()
+        self._located = ("", "")
 
-    def try_out(self, payload: object) -> bool:
+    def is_valid(self, payload: object) -> bool:
         """Encode an unsubscribed payload at most once per interval; return False if it can't be encoded."""
         started = self._clock()
-        if started < self._look_at:
+        if started < self._validate_at:
             return True
         try:
             check_sendable(payload) if isinstance(payload, Encoded) else self._encode(payload)
@@ -364,19 +366,19 @@ class Unsendable:
         else:
             self.resolve()
         ended = self._clock()
-        self._look_at = ended + max(_LOOK_S, _SHARE * (ended - started))
+        self._validate_at = ended + max(_VALIDATE_INTERVAL_S, _VALIDATE_PAUSE_FACTOR * (ended - started))
         return not self.problem
 
     def add(self, payload: object, error: Exception) -> None:
         """Count a payload that can't be encoded because of `error`."""
         self.count += 1
-        said = _said(error)
+        reason = _error_text(error)
         now = self._clock()
-        if self._known[0] != said and (now >= self._place_at or not self._known[0]):
-            self._place_at = now + _LOOK_S  # finding the path may take long
-            place = "" if getattr(error, "place", "") else _place_of(payload, self._encode)
-            self._known = (said, f"{said}; it is at '{place}'" if place else said)
-        sentence = self._known[1] if self._known[0] == said else said
+        if self._located[0] != reason and (now >= self._locate_at or not self._located[0]):
+            self._locate_at = now + _VALIDATE_INTERVAL_S  # finding the path may take long
+            place = "" if getattr(error, "place", "") else _escaped_path_of(payload, self._encode)
+            self._located = (reason, f"{reason}; it is at '{place}'" if place else reason)
+        sentence = self._located[1] if self._located[0] == reason else reason
         if is_logged(self.count):
             _logger.warning(
                 "a message on '%s' cannot be sent (%d so far): %s", self._topic, self.count, sentence
@@ -388,8 +390,8 @@ class Unsendable:
     def error(self, payload: object, error: Exception, codec: str) -> EncodeError:
         """Return the exception to raise for a payload, with the path of the offending value."""
         if not isinstance(error, EncodeError):
-            error = EncodeError(codec, type(payload).__name__, _said(error))
-        place = error.place or _place_of(payload, self._encode)
+            error = EncodeError(codec, type(payload).__name__, _error_text(error))
+        place = error.place or _escaped_path_of(payload, self._encode)
         if not place or error.place:
             return error
         return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
@@ -401,14 +403,14 @@ class Unsendable:
             self._report("")
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     try:
-        said = str(error)
+        text = str(error)
     except Exception:  # noqa: BLE001 - an exception class of the payload may raise anything
-        said = ""
+        text = ""
     if not isinstance(error, EncodeError | WireError):
-        said = f"{type(error).__name__}: {said}"
-    return escaped(shortened(said, _LONGEST))
+        text = f"{type(error).__name__}: {text}"
+    return escaped(shortened(text, _MAX_TEXT_LENGTH))
 
 
 def check_sendable(payload: Encoded) -> None:
@@ -417,25 +419,29 @@ def check_sendable(payload: Encoded) -> None:
         extension_part(payload.extension)
 
 
-def _place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+def _escaped_path_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     try:
-        return "" if isinstance(payload, Encoded) else escaped(shortened(place_of(payload, encode), _LONGEST))
+        return (
+            ""
+            if isinstance(payload, Encoded)
+            else escaped(shortened(path_of(payload, encode), _MAX_TEXT_LENGTH))
+        )
     except Exception:  # noqa: BLE001 - keys of any class may raise anything
         return ""
 
 
-def place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+def path_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
     Empty for the payload itself, or when none is found among ten thousand values.
     """
-    path, value, left = "", payload, _LOOKED_AT
-    for _level in range(_DEEPEST):
-        for step, part in _parts(value):
-            left -= 1
-            if left <= 0:
+    path, value, nodes_left = "", payload, _MAX_NODES_CHECKED
+    for _level in range(_MAX_DEPTH):
+        for step, part in _children(value):
+            nodes_left -= 1
+            if nodes_left <= 0:
                 return path
-            if not _can(part, encode):
+            if not _is_encodable(part, encode):
                 path, value = path + step, part
                 break
         else:
@@ -443,17 +449,17 @@ def place_of(payload: object, encode: Callable[[object], Encoded]) -> str:
     return path.removeprefix(".")
 
 
-def _can(value: object, encode: Callable[[object], Encoded]) -> bool:
+def _is_encodable(value: object, encode: Callable[[object], Encoded]) -> bool:
     try:
         encode(value)
-    except Exception:  # noqa: BLE001 - see `Unsendable.try_out`
+    except Exception:  # noqa: BLE001 - see `RejectedPayloads.is_valid`
         return False
     return True
 
 
-def _parts(value: object) -> list[tuple[str, object]]:
+def _children(value: object) -> list[tuple[str, object]]:
     if isinstance(value, Mapping):
         return [(f".{str(key)[:100]}", part) for key, part in value.items()]
     if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview):
-        return [(f"[{number}]", part) for number, part in enumerate(value[:_LOOKED_AT])]
+        return [(f"[{number}]", part) for number, part in enumerate(value[:_MAX_NODES_CHECKED])]
     return []

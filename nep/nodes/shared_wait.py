@@ -13,11 +13,11 @@ from nep.system.wakeup import Waker
 
 __all__ = ["SharedWait"]
 
-_LOOK_S = 0.01
+_POLL_INTERVAL_S = 0.01
 """Polling interval for subscribers that can't notify."""
 
 
-class _Bell:
+class _ReadyCallback:
     """Callback object that a subscriber wakes (a `Wakes`)."""
 
     def __init__(self, waits: SharedWait, subscriber: SubscriberTransport) -> None:
@@ -46,64 +46,64 @@ class SharedWait:
                 raise TooManyFilesError("a thread that waits", opened(), limit()) from error
             raise
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
-        self._bells: dict[SubscriberTransport, _Bell] = {}
-        self._looked_at: set[SubscriberTransport] = set()
-        self._rung: deque[SubscriberTransport] = deque()
+        self._armed: dict[SubscriberTransport, _ReadyCallback] = {}
+        self._polled: set[SubscriberTransport] = set()
+        self._ready: deque[SubscriberTransport] = deque()
 
     def arm(self, subscriber: SubscriberTransport) -> bool:
         """Arm a subscriber. Return False if it may already have a message or is closed. Idempotent."""
-        if subscriber in self._bells or subscriber in self._looked_at:
+        if subscriber in self._armed or subscriber in self._polled:
             return True
         if getattr(subscriber, "enter_wait", None) is None:  # an older plug-in
-            self._looked_at.add(subscriber)
+            self._polled.add(subscriber)
             return not subscriber.is_closed
-        bell = _Bell(self, subscriber)
-        if not subscriber.enter_wait(bell):
+        callback = _ReadyCallback(self, subscriber)
+        if not subscriber.enter_wait(callback):
             return False
-        self._bells[subscriber] = bell
+        self._armed[subscriber] = callback
         if subscriber.fd >= 0:
             try:
                 self._selector.register(subscriber.fd, selectors.EVENT_READ, subscriber)
             except (OSError, ValueError, KeyError):  # not pollable
-                subscriber.leave_wait(self._bells.pop(subscriber))
-                self._looked_at.add(subscriber)
+                subscriber.leave_wait(self._armed.pop(subscriber))
+                self._polled.add(subscriber)
         return True
 
     def disarm(self, subscriber: SubscriberTransport) -> None:
         """Disarm a subscriber."""
-        self._looked_at.discard(subscriber)
-        bell = self._bells.pop(subscriber, None)
-        if bell is not None:
+        self._polled.discard(subscriber)
+        callback = self._armed.pop(subscriber, None)
+        if callback is not None:
             if subscriber.fd >= 0:
                 with suppress(
                     OSError, ValueError, KeyError
                 ):  # closed; its number may belong to another file now
                     self._selector.unregister(subscriber.fd)
-            subscriber.leave_wait(bell)
+            subscriber.leave_wait(callback)
 
     def disarm_all(self) -> None:
         """Disarm all subscribers."""
-        for subscriber in list(self._bells):
+        for subscriber in list(self._armed):
             self.disarm(subscriber)
-        self._looked_at.clear()
+        self._polled.clear()
 
     def wait(self, timeout_s: float) -> list[SubscriberTransport]:
         """Wait for a subscriber or `wake`, at most `timeout_s`. Return and disarm ready subscribers."""
-        ready = self._selector.select(min(timeout_s, _LOOK_S) if self._looked_at else timeout_s)
+        ready = self._selector.select(min(timeout_s, _POLL_INTERVAL_S) if self._polled else timeout_s)
         self._waker.clear()
-        self._rung.extend(key.data for key, _events in ready if key.data is not None)
-        self._rung.extend(self._looked_at)
-        rung: dict[SubscriberTransport, None] = {}
-        while self._rung:
-            subscriber = self._rung.popleft()
-            if subscriber in self._bells or subscriber in self._looked_at:
+        self._ready.extend(key.data for key, _events in ready if key.data is not None)
+        self._ready.extend(self._polled)
+        ready_subscribers: dict[SubscriberTransport, None] = {}
+        while self._ready:
+            subscriber = self._ready.popleft()
+            if subscriber in self._armed or subscriber in self._polled:
                 self.disarm(subscriber)
-                rung[subscriber] = None
-        return list(rung)
+                ready_subscribers[subscriber] = None
+        return list(ready_subscribers)
 
     def ring(self, subscriber: SubscriberTransport) -> None:
         """Mark a subscriber as ready and end the wait. Thread-safe."""
-        self._rung.append(subscriber)
+        self._ready.append(subscriber)
         self._waker.wake()
 
     def wake(self) -> None:

@@ -51,8 +51,8 @@ class Subscriber:
         self._transport = transport
         self._spec = spec
         self._ready = transport.ready
-        self._quick = transport if isinstance(transport, GivesPayloads) else None
-        self.payloads = _NO_PAYLOADS if self._quick is None else self._quick.payloads
+        self._payload_source = transport if isinstance(transport, GivesPayloads) else None
+        self.payloads = _NO_PAYLOADS if self._payload_source is None else self._payload_source.payloads
         """Decoded payloads that are read next, for callers that don't need the messages."""
         self._empty = codec_for(spec.msg_type).empty
         self._async_reader = AsyncReader(transport, self._poll_first)
@@ -131,18 +131,18 @@ class Subscriber:
                     return True, message.kind.decode(message.raw, message.extension)
                 return True, message.decoded
             except DecodeError as error:
-                self._tell(error)
-        return self._listen_on(block_mode, timeout_s)
+                self._report_problem(error)
+        return self._wait_and_listen(block_mode, timeout_s)
 
-    def _listen_on(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
+    def _wait_and_listen(self, block_mode: bool, timeout_s: float | None) -> tuple[bool, object]:
         limit = None if block_mode and timeout_s is None else timeout_s or 0.0
         deadline = time.monotonic() + limit if limit else None
         while True:
-            came = self._receive_to_listen(limit)
-            if came is None:
+            message = self._receive_for_listen(limit)
+            if message is None:
                 return False, self._empty()
             try:
-                return True, self.decoded(came)
+                return True, self.decoded(message)
             except DecodeError:
                 if deadline is not None:
                     limit = max(0.0, deadline - time.monotonic())
@@ -194,21 +194,21 @@ class Subscriber:
         self.want_messages()
         return self._receive(timeout_s)
 
-    def _receive_to_listen(self, timeout_s: float | None) -> Message | None:
+    def _receive_for_listen(self, timeout_s: float | None) -> Message | None:
         self.want_payloads()
         return self._receive(timeout_s)
 
     def want_payloads(self) -> None:
         """Read only payloads from now on, unless a problem is reported or the payloads are typed."""
-        if self._quick is not None:
-            self._quick.wants_payloads = not (self._problem or self.is_typed)
+        if self._payload_source is not None:
+            self._payload_source.wants_payloads = not (self._problem or self.is_typed)
 
     def want_messages(self) -> None:
         """Read whole messages from now on, also from data that was already read."""
-        if self._quick is not None:
-            self._quick.wants_payloads = False
+        if self._payload_source is not None:
+            self._payload_source.wants_payloads = False
             if self.payloads:
-                self._quick.restore()
+                self._payload_source.restore()
 
     def _receive(self, timeout_s: float | None) -> Message | None:
         if self._ready:  # already read
@@ -220,13 +220,13 @@ class Subscriber:
             return self._poll()
         wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
         message = self._transport.receive(wait_s)
-        return message or self._receive_on(None if timeout_s is None else timeout_s - wait_s)
+        return message or self._receive_after_slice(None if timeout_s is None else timeout_s - wait_s)
 
-    def _receive_on(self, timeout_s: float | None) -> Message | None:
+    def _receive_after_slice(self, timeout_s: float | None) -> Message | None:
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             if self._transport.is_closed:
-                raise self._closed()
+                raise self._closed_error()
             left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return None
@@ -249,11 +249,11 @@ class Subscriber:
         limit = seconds("timeout_s", timeout_s)
         deadline = None if limit is None else time.monotonic() + limit
         while True:
-            came = await self.receive_async(limit)
-            if came is None:
+            message = await self.receive_async(limit)
+            if message is None:
                 return False, self._empty()
             try:
-                return True, self.decoded(came)
+                return True, self.decoded(message)
             except DecodeError:
                 limit = None if deadline is None else max(0.0, deadline - time.monotonic())
 
@@ -266,10 +266,10 @@ class Subscriber:
 
     def _poll(self) -> Message | None:
         if self._transport.is_closed:
-            raise self._closed()
+            raise self._closed_error()
         return self._transport.poll()
 
-    def _closed(self) -> ClosedError:
+    def _closed_error(self) -> ClosedError:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def typed(self, message: Message) -> Message:
@@ -285,24 +285,24 @@ class Subscriber:
         try:
             payload = message.payload
         except DecodeError as error:
-            self._tell(error)
+            self._report_problem(error)
             raise
         if self._problem:
             self._problem = ""
             self._transport.report("")
         return payload
 
-    def taken(self, message: Message) -> object:
+    def decoded_unshared(self, message: Message) -> object:
         """Return the payload of a message that is not shared, without caching it."""
         if self._problem or message.decoded is not UNDECODED:
             return self.decoded(message)
         try:
             return message.kind.decode(message.raw, message.extension)
         except DecodeError as error:
-            self._tell(error)
+            self._report_problem(error)
             raise
 
-    def _tell(self, error: DecodeError) -> None:
+    def _report_problem(self, error: DecodeError) -> None:
         self._unreadable += 1
         if is_logged(self._unreadable):
             _logger.warning(

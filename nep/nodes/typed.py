@@ -62,27 +62,27 @@ class TypedSubscriber(Subscriber):
     ) -> None:
         super().__init__(transport, spec, on_close)
         self._reader = typed.TypedReader(typed.message_type(msg_type))
-        self._empty = _nothing
+        self._empty = _empty_payload
 
     def typed(self, message: Message) -> Message:
         """Return the message with a typed payload."""
         return self._reader.typed(message)
 
-    def taken(self, message: Message) -> object:
+    def decoded_unshared(self, message: Message) -> object:
         """Return the typed payload of a message that is not shared."""
         return self.decoded(self._reader.typed(message))
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """Return (True, payload) of the next message, or (False, None) without one."""
         seconds("timeout_s", timeout_s)
-        return self._listen_on(block_mode, timeout_s)
+        return self._wait_and_listen(block_mode, timeout_s)
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """Return the next message with a typed payload, or None after the time limit."""
         message = super().receive(timeout_s)
         return None if message is None else self._reader.typed(message)
 
-    def _receive_to_listen(self, timeout_s: float | None) -> Message | None:
+    def _receive_for_listen(self, timeout_s: float | None) -> Message | None:
         return self.receive(timeout_s)
 
     def _poll_first(self) -> Message | None:
@@ -90,7 +90,7 @@ class TypedSubscriber(Subscriber):
         return None if message is None else self._reader.typed(message)
 
 
-def _nothing() -> object:
+def _empty_payload() -> object:
     return None
 
 

@@ -12,12 +12,12 @@ from nep.errors import ClosedError, DecodeError, NepError
 from nep.i18n import _
 from nep.nodes.subscriber import SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
-from nep.patterns.services.owned import OwnedServices
+from nep.patterns.services.owned import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
 
-__all__ = ["NOTHING", "Callback", "Work"]
+__all__ = ["NO_MESSAGE", "Callback", "Work"]
 
-NOTHING = object()
+NO_MESSAGE = object()
 """Returned instead of a message when there is none."""
 
 
@@ -37,7 +37,7 @@ class Work:
     """
 
     def __init__(
-        self, node_name: str, transport: Transport, clock: Callable[[], float], services: OwnedServices
+        self, node_name: str, transport: Transport, clock: Callable[[], float], services: ServiceRegistry
     ) -> None:
         self.clock = clock
         self.transport = transport
@@ -63,15 +63,15 @@ class Work:
                     self._coroutine = self._coroutine or callback.subscriber.topic
         self.wake()
 
-    def forget_callback(self, subscriber: Subscriber) -> None:
+    def remove_callback(self, subscriber: Subscriber) -> None:
         """Remove the callback of a closed subscriber."""
         with self._lock:
             self.callbacks = tuple(each for each in self.callbacks if each.subscriber is not subscriber)
-            self._look_again()
+            self._update_coroutine_locked()
 
     def new_timer(self, period_s: float, callback: Callable[[], object]) -> Timer:
         """Create and start a timer. See `Timer`."""
-        timer = Timer(period_s, callback, self.clock, self._forget_timer)
+        timer = Timer(period_s, callback, self.clock, self._remove_timer)
         with self._lock:
             if self.is_closed:
                 timer.node_closes()
@@ -82,12 +82,12 @@ class Work:
         self.wake()  # a spinning thread may have to wake earlier now
         return timer
 
-    def _forget_timer(self, timer: Timer) -> None:
+    def _remove_timer(self, timer: Timer) -> None:
         with self._lock:
             self.timers = tuple(each for each in self.timers if each is not timer)
-            self._look_again()
+            self._update_coroutine_locked()
 
-    def _look_again(self) -> None:
+    def _update_coroutine_locked(self) -> None:
         # Call with the lock held.
         if self._coroutine:
             topics = (each.subscriber.topic for each in self.callbacks if is_coroutine_function(each.call))
@@ -106,7 +106,7 @@ class Work:
         self._is_stopped.set()
         self.wake()
 
-    def begin_anew(self) -> None:
+    def reset_stop(self) -> None:
         """Reset the stop request: the spin has ended."""
         self._is_stopped.clear()
 
@@ -174,7 +174,7 @@ class Work:
             has_run = self.run_servers() or has_run
         return self._run_callbacks() or has_run
 
-    def _run_on(self, until: float) -> bool:
+    def _run_until(self, until: float) -> bool:
         # A single callback gets messages until the time `until`; several callbacks get one message each.
         callbacks = self.callbacks
         if len(callbacks) != 1 or self.services.has_servers or self._coroutine:
@@ -184,31 +184,31 @@ class Work:
             until = min(until, next_due(self.timers))
         if callbacks[0].with_message:
             return self._run_callbacks() or has_run
-        return self._run_payloads(callbacks, until) or has_run
+        return self._run_single_callback(callbacks, until) or has_run
 
-    def _run_payloads(self, callbacks: tuple[Callback, ...], until: float) -> bool:
+    def _run_single_callback(self, callbacks: tuple[Callback, ...], until: float) -> bool:
         # Returns True if there may be more.
         subscriber, transport, call, _with_message = callbacks[0]
         ready, clock, is_stopped = transport.ready, self.clock, self._is_stopped.is_set
-        taken, payloads, is_brisk = subscriber.taken, subscriber.payloads, False
+        decoded_unshared, payloads, is_burst = subscriber.decoded_unshared, subscriber.payloads, False
         subscriber.want_payloads()
         while not is_stopped() and callbacks is self.callbacks:
             try:
                 if payloads:
                     payload = payloads.popleft()
                 elif ready:
-                    payload = taken(ready.popleft())
+                    payload = decoded_unshared(ready.popleft())
                 else:
                     found = None if transport.is_closed else transport.poll()
                     if found is None:
-                        return is_brisk
-                    payload = taken(found)
+                        return is_burst
+                    payload = decoded_unshared(found)
             except (DecodeError, IndexError):
                 continue  # already logged and reported; or another thread took the last one
             call(payload)
             if not (payloads or ready):
-                return is_brisk
-            is_brisk = True  # several were received together: there may be more
+                return is_burst
+            is_burst = True  # several were received together: there may be more
             if clock() >= until:
                 break
         return True
@@ -233,7 +233,7 @@ class Work:
                 break
             if subscriber.payloads:
                 subscriber.want_messages()
-            try:  # inlined from `given`, which takes a third longer per message
+            try:  # inlined from `next_item`, which takes a third longer per message
                 message = transport.ready.popleft()
             except IndexError:
                 found = None if transport.is_closed else transport.poll()
@@ -251,8 +251,8 @@ class Work:
             call(message if with_message else payload)
         return has_more
 
-    def given(self, callback: Callback) -> object:
-        """Return the next message or payload for a callback, or `NOTHING` without one that can be decoded."""
+    def next_item(self, callback: Callback) -> object:
+        """Return the next message or payload for a callback, or `NO_MESSAGE` without one."""
         subscriber, transport = callback.subscriber, callback.transport
         if subscriber.payloads:
             subscriber.want_messages()
@@ -261,14 +261,14 @@ class Work:
         except IndexError:
             found = None if transport.is_closed else transport.poll()
             if found is None:
-                return NOTHING
+                return NO_MESSAGE
             message = found
         if subscriber.is_typed:
             message = subscriber.typed(message)
         try:
             payload = subscriber.decoded(message)
         except DecodeError:
-            return NOTHING  # already logged and reported
+            return NO_MESSAGE  # already logged and reported
         return message if callback.with_message else payload
 
     # ---- waiting
@@ -302,7 +302,7 @@ class Work:
                 left = SLICE_S if deadline is None else min(SLICE_S, deadline - self.clock())
                 if left <= 0.0:
                     return
-                if self._run_on(self.clock() + left):
+                if self._run_until(self.clock() + left):
                     continue
                 if self.timers:
                     left = min(left, self.due_s)
@@ -310,4 +310,4 @@ class Work:
                     self._wait(left)
             self.check_not_forked()
         finally:
-            self.begin_anew()
+            self.reset_stop()

@@ -16,7 +16,7 @@ __all__ = ["MSG_TYPE", "OnChange", "ParameterHost", "Parameters", "place_of"]
 
 MSG_TYPE = "nep/patterns/parameters"
 """Message type of the latched topic that publishes a node's parameters."""
-_MOST = 1_000
+_MAX_PARAMETERS = 1_000
 
 OnChange = Callable[[Mapping[str, object]], "str | None"]
 """Callback invoked before values change; a returned string rejects the change."""
@@ -57,7 +57,7 @@ class Parameters:
         self._host = host
         self._known: Mapping[str, NodeParameter] = {}
         self._watchers: tuple[OnChange, ...] = ()
-        self._changing = threading.RLock()
+        self._lock = threading.RLock()
         self._topic: StateTopic | None = None
 
     # ---- declaring and reading
@@ -92,7 +92,7 @@ class Parameters:
             ParameterError: The name is declared already, or the default is not allowed.
             NepError: As `Node.new_pub` does, at the first parameter of a node.
         """
-        made = declared(
+        parameter = declared(
             name,
             default,
             kind=type,
@@ -102,18 +102,20 @@ class Parameters:
             choices=choices,
             is_read_only=read_only,
         )
-        with self._changing:
+        with self._lock:
             if name in self._known:
                 raise ParameterError(name, shown(default), _("it is declared already; use 'set'"))
-            if len(self._known) >= _MOST:
+            if len(self._known) >= _MAX_PARAMETERS:
                 raise ParameterError(
-                    name, shown(default), _("a node has {most} parameters at most").format(most=_MOST)
+                    name,
+                    shown(default),
+                    _("a node has {most} parameters at most").format(most=_MAX_PARAMETERS),
                 )
             if self._topic is None:
-                self._topic = self._host.open_parameters(place_of(self._host.id), self._answer)
-            self._known = {**self._known, name: made}
-            self._tell()
-        return made.typed_value
+                self._topic = self._host.open_parameters(place_of(self._host.id), self._handle_request)
+            self._known = {**self._known, name: parameter}
+            self._publish()
+        return parameter.typed_value
 
     def get(self, name: str) -> object:
         """Return the value of a parameter. Raises `ParameterError` for an unknown name."""
@@ -127,7 +129,7 @@ class Parameters:
         try:
             return self._known[name]
         except KeyError:
-            raise self._unknown(name) from None
+            raise self._unknown_error(name) from None
 
     def list(self) -> tuple[NodeParameter, ...]:
         """Return all parameters in the order of their declaration."""
@@ -158,11 +160,11 @@ class Parameters:
         The callback rejects the whole change by returning a string, the reason, or by raising. It runs in the
         thread that calls `set`; for requests of others that is a thread of the node.
         """
-        with self._changing:
+        with self._lock:
             self._watchers = (*self._watchers, callback)
 
     def _set(self, values: Mapping[str, object], *, is_own: bool) -> None:
-        with self._changing:
+        with self._lock:
             changed: dict[str, NodeParameter] = {}
             for name, value in values.items():
                 before = self.describe(name)
@@ -175,21 +177,21 @@ class Parameters:
             if not changed:
                 return
             for watcher in self._watchers:
-                said = watcher({name: each.typed_value for name, each in changed.items()})
-                if isinstance(said, str) and said:
-                    raise ParameterError(", ".join(changed), "", said)
+                reason = watcher({name: each.typed_value for name, each in changed.items()})
+                if isinstance(reason, str) and reason:
+                    raise ParameterError(", ".join(changed), "", reason)
             self._known = {**self._known, **changed}
-            self._tell()
+            self._publish()
 
-    def _unknown(self, name: str) -> ParameterError:
+    def _unknown_error(self, name: str) -> ParameterError:
         known = tuple(self._known)
         shown = escaped(bounded_str(name, 60))
-        said = did_you_mean(shown, known) if known else _("there are none")
-        return ParameterError(shown, "", _("there is none; {said}").format(said=said))
+        hint = did_you_mean(shown, known) if known else _("there are none")
+        return ParameterError(shown, "", _("there is none; {said}").format(said=hint))
 
     # ---- for others
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         if self._topic is not None:
             with suppress(ClosedError):  # the node is closed
                 self._topic.publish(self._state())
@@ -197,7 +199,7 @@ class Parameters:
     def _state(self) -> dict[str, object]:
         return {"node": self._host.name, "parameters": [each.as_map() for each in self._known.values()]}
 
-    def _answer(self, request: object) -> object:
+    def _handle_request(self, request: object) -> object:
         # Runs in a thread of the server.
         values = request.get("set", {}) if isinstance(request, Mapping) else None
         if not isinstance(values, Mapping) or not all(isinstance(each, str) for each in values):
@@ -210,5 +212,5 @@ class Parameters:
 
     def forked(self) -> None:
         """Detach from the host in a forked child process. Takes no lock."""
-        self._changing = threading.RLock()
+        self._lock = threading.RLock()
         self._topic = None

@@ -27,9 +27,9 @@ KINDS: Mapping[str, type] = {
 }
 _VALUE_MAX_BYTES = 2**20
 _CHOICES_MAX = 1000
-_DESCRIPTION_LETTERS = 1000
-_SHOWN = 60
-_MOST = 2**63 - 1
+_MAX_DESCRIPTION_LENGTH = 1000
+_MAX_SHOWN_LENGTH = 60
+_MAX_INT = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,10 @@ class NodeParameter:
 
     def with_value(self, value: object) -> NodeParameter:
         """Return a copy with another value. Raises `ParameterError` if the value is not allowed."""
-        return replace(self, value=self._checked(value))
+        return replace(self, value=self._validate(value))
 
-    def _checked(self, value: object) -> object:
-        found = self._of_kind(value if self.form is None else self._plain(self.form, value))
+    def _validate(self, value: object) -> object:
+        found = self._convert(value if self.form is None else self._plain(self.form, value))
         if isinstance(found, int | float) and not isinstance(found, bool):
             if self.minimum is not None and found < self.minimum:
                 raise self._error(value, _("the least is {least}").format(least=self.minimum))
@@ -87,24 +87,24 @@ class NodeParameter:
         except ValueError as error:
             raise self._error(value, str(error)) from error
 
-    def _of_kind(self, value: object) -> object:
+    def _convert(self, value: object) -> object:
         # ints are accepted as floats, and 2.0 as an int
         if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
             return self._number(value)
         if type(value) is not KINDS[self.kind]:
             raise self._error(value, _("give a '{kind}'").format(kind=self.kind))
-        return self._copied(value)
+        return self._json_copy(value)
 
     def _number(self, value: float) -> float:
         if not _is_finite(value):
             raise self._error(value, _("give a finite number"))
         if self.kind == "float":
             return float(value)
-        if int(value) != value or abs(value) > _MOST:
+        if int(value) != value or abs(value) > _MAX_INT:
             raise self._error(value, _("give a whole number"))
         return int(value)
 
-    def _copied(self, value: object) -> object:
+    def _json_copy(self, value: object) -> object:
         # Round trip through JSON: validates the value, and protects it from changes in place.
         try:
             data = orjson.dumps(value)
@@ -162,13 +162,13 @@ def declared(
             raise ParameterError(
                 check_topic(name), shown(default), _("only numbers have limits, and finite ones")
             )
-    bare = NodeParameter(check_topic(name), None, word, None, _told(description), form=form)
+    bare = NodeParameter(check_topic(name), None, word, None, _clean_description(description), form=form)
     if len(choices) > _CHOICES_MAX:
         raise ParameterError(name, shown(default), _("it has too many choices"))
     allowed = tuple(bare.with_value(each).value for each in choices)
-    made = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
-    value = made.with_value(default).value
-    return replace(made, value=value, default=value)
+    parameter = replace(bare, minimum=minimum, maximum=maximum, choices=allowed, is_read_only=is_read_only)
+    value = parameter.with_value(default).value
+    return replace(parameter, value=value, default=value)
 
 
 def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
@@ -180,14 +180,14 @@ def _form_of(name: str, kind: object, default: object) -> ParameterForm | None:
         raise ParameterError(check_topic(name), shown(default), str(error)) from error
 
 
-def _told(description: object) -> str:
+def _clean_description(description: object) -> str:
     text = str(description).encode("utf-8", "replace").decode()
-    return shortened(text, _DESCRIPTION_LETTERS)
+    return shortened(text, _MAX_DESCRIPTION_LENGTH)
 
 
 def _is_finite(value: object) -> bool:
     if isinstance(value, int) and not isinstance(value, bool):
-        return abs(value) <= _MOST
+        return abs(value) <= _MAX_INT
     return isinstance(value, float) and math.isfinite(value)
 
 
@@ -197,4 +197,4 @@ def shown(value: object) -> str:
         written = repr(value)
     except Exception:  # noqa: BLE001 - `repr` of any class may raise; ints may have too many digits
         written = f"a '{type(value).__name__}'"
-    return escaped(shortened(written, _SHOWN))
+    return escaped(shortened(written, _MAX_SHOWN_LENGTH))

@@ -35,7 +35,7 @@ class RemoteParameters:
 
         Raises the exceptions of `Client.call`.
         """
-        return self._asked({})
+        return self._request({})
 
     def get(self, name: str) -> object:
         """Return the value of a parameter.
@@ -45,8 +45,8 @@ class RemoteParameters:
         """
         found = {bounded_str(each.get("name")): each for each in self.list()}
         if name not in found:
-            said = did_you_mean(name, tuple(found)) if found else _("there are none")
-            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=said))
+            hint = did_you_mean(name, tuple(found)) if found else _("there are none")
+            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=hint))
         return found[name].get("value")
 
     def set(self, name: str, value: object) -> None:
@@ -60,14 +60,14 @@ class RemoteParameters:
 
     def set_all(self, values: Mapping[str, object]) -> None:
         """Set several parameters: all of them, or none. Raises as `set` does."""
-        self._asked({"set": dict(values)})
+        self._request({"set": dict(values)})
 
-    def _asked(self, request: Mapping[str, object]) -> tuple[Mapping[str, object], ...]:
-        answer = self._client.call(request)
-        said = answer if isinstance(answer, Mapping) else {}
-        if "refused" in said:
-            raise RequestRefusedError(str(said["refused"]))
-        found = said.get("parameters")
+    def _request(self, request: Mapping[str, object]) -> tuple[Mapping[str, object], ...]:
+        result = self._client.call(request)
+        reply = result if isinstance(result, Mapping) else {}
+        if "refused" in reply:
+            raise RequestRefusedError(str(reply["refused"]))
+        found = reply.get("parameters")
         return tuple(each for each in found if isinstance(each, Mapping)) if isinstance(found, list) else ()
 
     def close(self) -> None:
@@ -99,5 +99,5 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
     if any(name in {each.id, each.name} for each in graph.nodes.values()):
         raise NepError(_("the node '{name}' has declared no parameters").format(name=escaped(name)))
     known = tuple(sorted(set(able.values())))
-    said = did_you_mean(name, known) if known else _("no node has parameters")
-    raise NepError(_("no node is called '{name}'; {said}").format(name=escaped(name), said=said))
+    hint = did_you_mean(name, known) if known else _("no node has parameters")
+    raise NepError(_("no node is called '{name}'; {said}").format(name=escaped(name), said=hint))

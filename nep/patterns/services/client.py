@@ -35,7 +35,7 @@ Limit = float | Literal["default"] | None
 
 SLICE_S = 0.1
 """Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
-_LOOK_S = 0.5
+_SERVICE_QUERY_S = 0.5
 """Time limit for querying the existing services when one was not found."""
 _JOIN_S = 2.0
 
@@ -47,6 +47,10 @@ class Client:
 
         with node.new_client("add", timeout_s=2.0) as add:
             print(add.call({"a": 1, "b": 2}))
+
+    Attributes:
+        service: Name of the service.
+        timeout_s: Default time limit of calls in seconds; None for no limit.
     """
 
     def __init__(
@@ -66,7 +70,7 @@ class Client:
         self._on_close = on_close
         self._is_forked = False
         self._lock = threading.Lock()
-        self._ends: _Ends | None = None
+        self._future_thread: _FutureThread | None = None
         self._sent: Future[object] | None = None
 
     @property
@@ -105,7 +109,7 @@ class Client:
             DecodeError: The reply can't be decoded.
         """
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        call = self._begin(request, self._limit(timeout_s), outcomes.put)
+        call = self._start_call(request, self._resolve_timeout(timeout_s), outcomes.put)
         try:
             while True:
                 with contextlib.suppress(queue.Empty):
@@ -117,7 +121,7 @@ class Client:
             self._transport.forget(call)
             raise
         try:
-            return self._answer(outcome)
+            return self._result(outcome)
         except NoServerError as error:
             raise self._with_known(error) from None
 
@@ -129,12 +133,14 @@ class Client:
         are those of `call`.
         """
         with self._lock:
-            if self._ends is None:
-                self._ends = _Ends(f"nep-client-{self.service}")
-            ends = self._ends
+            if self._future_thread is None:
+                self._future_thread = _FutureThread(f"nep-client-{self.service}")
+            ends = self._future_thread
         future: Future[object] = Future()
-        call = self._begin(
-            request, self._limit(timeout_s), lambda outcome: ends.add(lambda: self._settle(future, outcome))
+        call = self._start_call(
+            request,
+            self._resolve_timeout(timeout_s),
+            lambda outcome: ends.add(lambda: self._settle(future, outcome)),
         )
         future.add_done_callback(lambda ended: self._transport.forget(call) if ended.cancelled() else None)
         return future
@@ -146,16 +152,16 @@ class Client:
 
         def then(outcome: Outcome) -> None:
             with contextlib.suppress(RuntimeError):  # the loop is closed
-                loop.call_soon_threadsafe(_set, future, outcome)
+                loop.call_soon_threadsafe(_set_result, future, outcome)
 
-        call = self._begin(request, self._limit(timeout_s), then)
+        call = self._start_call(request, self._resolve_timeout(timeout_s), then)
         try:
             outcome = await future
         except BaseException:  # cancelled
             self._transport.forget(call)
             raise
         try:
-            return self._answer(outcome)
+            return self._result(outcome)
         except NoServerError as error:
             raise await loop.run_in_executor(None, self._with_known, error) from None
 
@@ -184,22 +190,24 @@ class Client:
 
     # ---- outcome
 
-    def _begin(self, request: object, timeout_s: float | None, then: Callable[[Outcome], None]) -> OpenCall:
+    def _start_call(
+        self, request: object, timeout_s: float | None, then: Callable[[Outcome], None]
+    ) -> OpenCall:
         if self._transport.is_closed:
             raise self._closed_error()
         return self._transport.begin(self._codec.encode(request).data, timeout_s, then)
 
-    def _limit(self, timeout_s: Limit) -> float | None:
+    def _resolve_timeout(self, timeout_s: Limit) -> float | None:
         return self.timeout_s if timeout_s == "default" else seconds("timeout_s", timeout_s)
 
-    def _answer(self, outcome: Outcome) -> object:
+    def _result(self, outcome: Outcome) -> object:
         if isinstance(outcome, NepError):
             raise outcome
         if outcome.kind == CallKind.ANSWER:
             codec = codec_numbered(outcome.codec)
             if codec is None:
-                said = _("this version has no such codec; update nep")
-                raise DecodeError(str(outcome.codec), len(outcome.data), said)
+                reason = _("this version has no such codec; update nep")
+                raise DecodeError(str(outcome.codec), len(outcome.data), reason)
             return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
         name, reason = read_failure(outcome.data)
         if outcome.kind == CallKind.ERROR:
@@ -212,17 +220,17 @@ class Client:
         # Adds the existing services to the error.
         if error.address:
             return error
-        return NoServerError(error.service, error.timeout_s, self._transport.known(_LOOK_S))
+        return NoServerError(error.service, error.timeout_s, self._transport.known(_SERVICE_QUERY_S))
 
     def _settle(self, future: Future[object], outcome: Outcome) -> None:
         if not future.set_running_or_notify_cancel():
             return
         try:
-            answer = self._answer(outcome)
+            result = self._result(outcome)
         except Exception as error:  # noqa: BLE001 - raised when the result is read
             future.set_exception(error)
         else:
-            future.set_result(answer)
+            future.set_result(result)
 
     # ---- closing
 
@@ -237,7 +245,7 @@ class Client:
     def join(self) -> None:
         """Stop the thread of futures, when its calls have ended."""
         with self._lock:
-            ends, self._ends = self._ends, None
+            ends, self._future_thread = self._future_thread, None
         if ends is not None:
             ends.close()
 
@@ -245,7 +253,7 @@ class Client:
         """Mark the client as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
         self._lock = threading.Lock()
-        self._ends = None
+        self._future_thread = None
         self._transport.forked()
 
     def _closed_error(self) -> ClosedError:
@@ -261,7 +269,7 @@ class Client:
         return f"Client({self.service!r})"
 
 
-class _Ends:
+class _FutureThread:
     """Thread that resolves futures, so that their slow callbacks don't block a socket."""
 
     def __init__(self, name: str) -> None:
@@ -282,6 +290,6 @@ class _Ends:
             self._thread.join(_JOIN_S)
 
 
-def _set(future: asyncio.Future[Outcome], outcome: Outcome) -> None:
+def _set_result(future: asyncio.Future[Outcome], outcome: Outcome) -> None:
     if not future.done():
         future.set_result(outcome)

@@ -20,12 +20,12 @@ from nep.patterns.services.typed import CallTypes
 from nep.protocol.service_wire import check_service, check_survey
 from nep.system.arguments import at_least, plain_function, seconds, text
 
-__all__ = ["OwnedServices"]
+__all__ = ["ServiceRegistry"]
 
 S = TypeVar("S", bound=Server)
 
 
-class OwnedServices:
+class ServiceRegistry:
     """Factory and registry of a node's servers and clients, which are closed with the node. Thread-safe.
 
     Args:
@@ -83,7 +83,7 @@ class OwnedServices:
         types: CallTypes,
     ) -> Respondent:
         """Create a respondent. See `Node.new_respondent`."""
-        self._able_to_survey()
+        self._survey_transport()
         return self._serve(Respondent, check_survey(survey), callback, configuration, threads, types)
 
     def _serve(
@@ -102,16 +102,16 @@ class OwnedServices:
         at_least("threads", threads, 0)
         if threads and callback is None:
             raise ValueError(_("threads need a callback to run; give one"))
-        able = self._able()
+        transport = self._service_transport()
         id_, number = self._new_id()
         spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)
-        made = kind(able.server(spec), service, callback, threads, self._forget, types)
+        server = kind(transport.server(spec), service, callback, threads, self._remove, types)
         with self._lock:
-            self._servers = (*self._servers, made)
+            self._servers = (*self._servers, server)
             self.has_servers = True
-        self._check_open(made)
+        self._close_if_late(server)
         self._wake()  # a spinning thread serves its calls from now on
-        return made
+        return server
 
     def client(
         self,
@@ -124,11 +124,13 @@ class OwnedServices:
         """Create a client. See `Node.new_client`."""
         spec = self._client_spec(check_service(service), configuration, msg_type)
         limit_s = seconds("timeout_s", timeout_s)
-        made = Client(self._able().client(spec), service, spec.codec, limit_s, self._forget, types)
+        client = Client(
+            self._service_transport().client(spec), service, spec.codec, limit_s, self._remove, types
+        )
         with self._lock:
-            self._clients = (*self._clients, made)
-        self._check_open(made)
-        return made
+            self._clients = (*self._clients, client)
+        self._close_if_late(client)
+        return client
 
     def surveyor(
         self,
@@ -141,18 +143,18 @@ class OwnedServices:
         """Create a surveyor. See `Node.new_surveyor`."""
         spec = self._client_spec(check_survey(survey), configuration, msg_type)
         limit_s = seconds("timeout", timeout_s)
-        able = self._able_to_survey()
-        made = Surveyor(able.survey(spec), spec.service, spec.codec, limit_s, self._forget, types)
+        transport = self._survey_transport()
+        surveyor = Surveyor(transport.survey(spec), spec.service, spec.codec, limit_s, self._remove, types)
         with self._lock:
-            self._clients = (*self._clients, made)
-        self._check_open(made)
-        return made
+            self._clients = (*self._clients, surveyor)
+        self._close_if_late(surveyor)
+        return surveyor
 
-    def _check_open(self, made: Server | Client | Surveyor) -> None:
+    def _close_if_late(self, created: Server | Client | Surveyor) -> None:
         # Raises `ClosedError`. The node may have been closed concurrently, without this object in its
         # registry.
         if self._is_closed:
-            made.close()
+            created.close()
             raise self._closed_error()
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
@@ -161,7 +163,7 @@ class OwnedServices:
         id_, number = self._new_id()
         return ClientSpec(id_, service, codec, configuration, self._wait_s, number, msg_type)
 
-    def _able(self) -> ServiceTransport:
+    def _service_transport(self) -> ServiceTransport:
         if not hasattr(self._transport, "server"):
             raise NepError(
                 _("the back end '{backend}' has no services; use 'zeromq' for them").format(
@@ -170,17 +172,17 @@ class OwnedServices:
             )
         return cast("ServiceTransport", self._transport)
 
-    def _able_to_survey(self) -> ServiceTransport:
-        able = self._able()
-        if not hasattr(able, "survey"):
+    def _survey_transport(self) -> ServiceTransport:
+        transport = self._service_transport()
+        if not hasattr(transport, "survey"):
             raise NepError(
                 _("the back end '{backend}' has no surveys; use 'zeromq' for them").format(
                     backend=self._backend.name
                 )
             )
-        return able
+        return transport
 
-    def _forget(self, closed: Server | Client | Surveyor) -> None:
+    def _remove(self, closed: Server | Client | Surveyor) -> None:
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self.has_servers = bool(self._servers)

@@ -28,7 +28,7 @@ _logger = logging.getLogger("nep.patterns.services")
 
 SLICE_S = 0.1
 """Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
-_END_S = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 
 Callback = Callable[[object], object]
 """Function of the request that returns the reply, or a `concurrent.futures.Future` of it.
@@ -48,6 +48,9 @@ class Server:
 
         node.new_server("add", lambda request: {"sum": request["a"] + request["b"]})
         node.spin()
+
+    Attributes:
+        service: Name of the service.
     """
 
     def __init__(
@@ -65,11 +68,11 @@ class Server:
         self._callback = callback
         self._on_close = on_close
         self._is_forked = False
-        self._asked: IncomingCall | None = None
-        self._asked_lock = threading.Lock()
+        self._open_request: IncomingCall | None = None
+        self._open_request_lock = threading.Lock()
         self._failures = 0
         self._threads = tuple(
-            threading.Thread(target=self._work, name=f"nep-server-{service}-{number}", daemon=True)
+            threading.Thread(target=self._run_thread, name=f"nep-server-{service}-{number}", daemon=True)
             for number in range(1, threads + 1)
         )
         for thread in self._threads:
@@ -114,72 +117,72 @@ class Server:
         """Serve the oldest waiting call; return True if there was one. Called by the spinning thread."""
         call = self._transport.calls.take()
         if call is not None:
-            self._carry_out(call)
+            self._execute(call)
         return call is not None
 
-    def _work(self) -> None:
+    def _run_thread(self) -> None:
         while not self._transport.calls.is_closed:
             call = self._transport.calls.take(SLICE_S)
             if call is None:
                 continue
             try:
-                self._carry_out(call)
+                self._execute(call)
             except BaseException:  # also SystemExit: the client has its reply, and the thread must go on
                 _logger.exception("a thread of the server of '%s' was to end; it goes on", self.service)
 
-    def _carry_out(self, call: IncomingCall) -> None:
+    def _execute(self, call: IncomingCall) -> None:
         if call.is_late:
             call.answer(failure(CallKind.REFUSED, "", _("nobody waits for the answer any more")))
             return
         try:
-            request = self._decoded(call)
+            request = self._decode_request(call)
         except DecodeError as error:
             call.answer(failure(CallKind.REFUSED, "", str(error)))
             return
         try:
             answer = self._callback(request) if self._callback is not None else None
             if isinstance(answer, Future):
-                answer.add_done_callback(partial(self._answer_later, call))
+                answer.add_done_callback(partial(self._reply_when_done, call))
                 return
-            reply = self._encoded(answer, call.codec)
+            reply = self._encode_reply(answer, call.codec)
         except Exception as error:  # noqa: BLE001 - sent to the client
-            reply = self._failure(error)
+            reply = self._log_failure(error)
         except BaseException as error:  # KeyboardInterrupt: reply, then let it propagate out of `spin`
-            call.answer(_failed(error))
+            call.answer(_error_reply(error))
             raise
         call.answer(reply)
 
-    def _answer_later(self, call: IncomingCall, done: Future[object]) -> None:
+    def _reply_when_done(self, call: IncomingCall, done: Future[object]) -> None:
         try:
-            reply = self._encoded(done.result(), call.codec)
+            reply = self._encode_reply(done.result(), call.codec)
         except BaseException as error:  # noqa: BLE001 - includes CancelledError
-            reply = self._failure(error)
+            reply = self._log_failure(error)
         call.answer(reply)
 
-    def _failure(self, error: BaseException) -> Reply:
+    def _log_failure(self, error: BaseException) -> Reply:
         # Logged at increasing intervals.
         self._failures += 1
         if is_logged(self._failures):
             _logger.warning(
                 "the callback of '%s' failed (%d so far)", self.service, self._failures, exc_info=error
             )
-        return _failed(error)
+        return _error_reply(error)
 
-    def _decoded(self, call: IncomingCall) -> object:
+    def _decode_request(self, call: IncomingCall) -> object:
         codec = codec_numbered(call.codec)
         if codec is None:
             reason = _("this version has no such codec; update nep")
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 
-    def _encoded(self, answer: object, number: int) -> Reply:
+    def _encode_reply(self, answer: object, number: int) -> Reply:
         codec = codec_numbered(number)
         if codec is None:
             reason = _("this version has no such codec; update nep")
             raise EncodeError(str(number), type(answer).__name__, reason)
-        its = self._types.answer
-        given = {} if answer is None and its.is_any else answer
-        return Reply(CallKind.ANSWER, its.codec(codec).encode(given).data, number)
+        answer_type = self._types.answer
+        value = {} if answer is None and answer_type.is_any else answer
+        return Reply(CallKind.ANSWER, answer_type.codec(codec).encode(value).data, number)
 
     # ---- without a callback: API of the original NEP
 
@@ -200,7 +203,7 @@ class Server:
                     service=self.service
                 )
             )
-        if self._asked is not None:
+        if self._open_request is not None:
             raise NepError(_("answer the last request first; use 'send_info'"))
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._transport.calls.is_closed:
@@ -211,12 +214,12 @@ class Server:
                     return None
                 continue
             try:
-                request = self._decoded(call)
+                request = self._decode_request(call)
             except DecodeError as error:
                 call.answer(failure(CallKind.REFUSED, "", str(error)))
                 continue
-            with self._asked_lock:
-                self._asked = call
+            with self._open_request_lock:
+                self._open_request = call
             return request
         raise self._closed_error()
 
@@ -230,17 +233,17 @@ class Server:
         """
         if self._transport.is_closed:
             raise self._closed_error()
-        with self._asked_lock:
-            call = self._asked
+        with self._open_request_lock:
+            call = self._open_request
             if call is None:
                 raise NepError(_("there is no request to answer; call 'listen_info' first"))
-            reply = self._encoded(answer, call.codec)
-            self._asked = None
+            reply = self._encode_reply(answer, call.codec)
+            self._open_request = None
         call.answer(reply)
 
     # ---- closing
 
-    def close(self, timeout_s: float = _END_S) -> None:
+    def close(self, timeout_s: float = _CLOSE_TIMEOUT_S) -> None:
         """Unregister and close; waiting calls are rejected. Idempotent.
 
         Args:
@@ -265,9 +268,9 @@ class Server:
     def forked(self) -> None:
         """Mark the server as closed in a forked child process. See `nep.system.forks`."""
         self._is_forked = True
-        self._asked = None
+        self._open_request = None
         self._threads = ()
-        self._asked_lock = threading.Lock()
+        self._open_request_lock = threading.Lock()
         self._transport.forked()
 
     def _closed_error(self) -> ClosedError:
@@ -283,7 +286,7 @@ class Server:
         return f"Server({self.service!r})"
 
 
-def _failed(error: BaseException) -> Reply:
+def _error_reply(error: BaseException) -> Reply:
     # The client gets the class and the message, but no traceback.
     try:
         reason = str(error)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from nep.backends.base import Transport
 from nep.backends.connection import Configuration
 from nep.patterns.services.client import Client
-from nep.patterns.services.owned import OwnedServices
+from nep.patterns.services.owned import ServiceRegistry
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
 from nep.patterns.services.typed import call_types
@@ -19,14 +19,14 @@ __all__ = ["ServiceNode"]
 class ServiceNode(ABC):
     """Methods of a node for services and surveys."""
 
-    _services: OwnedServices
+    _services: ServiceRegistry
 
     @abstractmethod
     def _open_transport(self) -> Transport:
         """Return the open transport. Raises `ClosedError`."""
 
     @abstractmethod
-    def _configured(self, configuration: object) -> Configuration:
+    def _resolve_configuration(self, configuration: object) -> Configuration:
         """Return the configuration, or the node's default for None. Raises `ValueError`."""
 
     def new_server(
@@ -63,7 +63,7 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(request=request, answer=answer)
-        configured = self._configured(configuration)
+        configured = self._resolve_configuration(configuration)
         return self._services.server(service, callback, configured, threads, msg_type, types)
 
     def new_client(
@@ -96,7 +96,9 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(request=request, answer=answer)
-        return self._services.client(service, self._configured(configuration), msg_type, timeout_s, types)
+        return self._services.client(
+            service, self._resolve_configuration(configuration), msg_type, timeout_s, types
+        )
 
     def new_respondent(
         self,
@@ -125,7 +127,9 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(question=question, answer=answer)
-        return self._services.respondent(survey, callback, self._configured(configuration), threads, types)
+        return self._services.respondent(
+            survey, callback, self._resolve_configuration(configuration), threads, types
+        )
 
     def new_surveyor(
         self,
@@ -159,4 +163,6 @@ class ServiceNode(ABC):
         types = call_types(question=question, answer=answer)
         timeout_s = seconds("timeout", timeout)
         timeout_s = None if timeout_s is None else timeout_s / 1000
-        return self._services.surveyor(survey, self._configured(configuration), msg_type, timeout_s, types)
+        return self._services.surveyor(
+            survey, self._resolve_configuration(configuration), msg_type, timeout_s, types
+        )

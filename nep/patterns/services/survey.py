@@ -36,6 +36,10 @@ class Surveyor:
 
         for answer in surveyor.answers({"unit": "%"}, timeout_s=0.5):
             print(answer)
+
+    Attributes:
+        survey: Name of the survey.
+        timeout_s: Default time limit of questions in seconds; None for no limit.
     """
 
     def __init__(
@@ -105,18 +109,18 @@ class Surveyor:
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         deadline = None if limit_s is None else time.monotonic() + limit_s
         calls = self._transport.begin_all(self._codec.encode(question).data, limit_s, outcomes.put)
-        return self._collected(calls, outcomes, deadline, expect)
+        return self._collect(calls, outcomes, deadline, expect)
 
-    def _collected(
+    def _collect(
         self,
         calls: Sequence[OpenCall],
         outcomes: queue.SimpleQueue[Outcome],
         deadline: float | None,
         expect: int | None,
     ) -> Iterator[object]:
-        left, wanted = len(calls), len(calls) if expect is None else expect
+        pending, remaining = len(calls), len(calls) if expect is None else expect
         try:
-            while left and wanted:
+            while pending and remaining:
                 wait_s = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
                 outcome = None
                 with contextlib.suppress(queue.Empty):
@@ -129,15 +133,15 @@ class Surveyor:
                     continue
                 if isinstance(outcome, ClosedError):
                     raise outcome
-                left -= 1
+                pending -= 1
                 with contextlib.suppress(NepError):
-                    answer = self._read(outcome)
-                    wanted -= 1
+                    answer = self._decode_answer(outcome)
+                    remaining -= 1
                     yield answer
         finally:
             self._transport.forget_all(calls)
 
-    def _read(self, outcome: Outcome) -> object:
+    def _decode_answer(self, outcome: Outcome) -> object:
         # Raises `NepError` for a failure.
         try:
             if isinstance(outcome, NepError):
@@ -218,7 +222,7 @@ class Respondent(Server):
             NepError: As `listen_info` does.
         """
         question = self.listen_info(None if block_mode else 0.0)
-        return (False, {}) if self._asked is None else (True, question)
+        return (False, {}) if self._open_request is None else (True, question)
 
     def send_json(self, answer: object) -> None:
         """Answer the question that `listen_json` returned. Raises as `send_info` does."""

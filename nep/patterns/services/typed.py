@@ -21,7 +21,7 @@ else:
 
 __all__ = ["UNTYPED", "CallTypes", "PayloadType", "call_types"]
 
-_SHOWN = 60
+_MAX_SHOWN_LENGTH = 60
 
 
 class PayloadType:
@@ -73,7 +73,7 @@ def call_types(**given: object) -> CallTypes:
         if each is not None and not isinstance(each, type):
             raise WrongTypeError(
                 _("{name} is {given}, not a class; give a dataclass or a TypedDict").format(
-                    name=name, given=escaped(shortened(repr(each), _SHOWN))
+                    name=name, given=escaped(shortened(repr(each), _MAX_SHOWN_LENGTH))
                 )
             )
         declared.append(PayloadType(each))

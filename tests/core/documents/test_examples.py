@@ -39,7 +39,7 @@ def locale(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def language(request: pytest.FixtureRequest, locale: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """The language of the parameter; Spanish without one."""
     chosen: str = getattr(request, "param", "es")
-    monkeypatch.setattr(i18n, "_now", None)
+    monkeypatch.setattr(i18n, "_current", None)
     i18n.install(chosen, locale)
     assert i18n.language() == chosen
     return chosen

@@ -39,7 +39,7 @@ def run(task: Coroutine[Any, Any, Any]) -> Any:
 
 async def armed(sub: nep.Subscriber) -> None:
     """Until the loop's thread waits for this one."""
-    while sub._transport not in loop_wait()._wait._bells:
+    while sub._transport not in loop_wait()._wait._armed:
         await give_way()
 
 
@@ -130,7 +130,7 @@ def test_whoever_is_cancelled_has_taken_no_message(make: Make) -> None:
         await armed(sub)
         pub.publish(1)
         # The thread has told the loop, and the loop has not told the coroutine yet.
-        eventually(lambda: sub._transport not in loop_wait()._wait._bells)
+        eventually(lambda: sub._transport not in loop_wait()._wait._armed)
         first.cancel()
         with pytest.raises(asyncio.CancelledError):
             await first

@@ -15,7 +15,7 @@ from nep.errors import WireError
 from nep.masters.graph import Graph
 from nep.masters.master import Master
 from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX, PatternIndex
-from nep.nodes.abilities import is_pattern_for
+from nep.nodes.backend_checks import is_pattern_for
 from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,

@@ -8,7 +8,7 @@ import pytest
 
 import nep
 from nep.messages.codecs import CODECS
-from nep.nodes.publisher import Unsendable, place_of
+from nep.nodes.publisher import RejectedPayloads, path_of
 from nep.system.log_rarely import is_logged
 
 
@@ -26,15 +26,15 @@ class Told:
         self.now += self.takes_s
         return CODECS["json"].encode(payload)
 
-    def new(self) -> Unsendable:
-        return Unsendable("t", self.encode, self.problems.append, lambda: self.now)
+    def new(self) -> RejectedPayloads:
+        return RejectedPayloads("t", self.encode, self.problems.append, lambda: self.now)
 
 
 def test_unheard_payloads_are_looked_at_once_a_second() -> None:
     told = Told()
     unsendable = told.new()
     for _ in range(1000):
-        assert unsendable.try_out(1)
+        assert unsendable.is_valid(1)
         told.now += 0.01
     assert told.encoded == 10
 
@@ -44,7 +44,7 @@ def test_a_payload_that_takes_long_is_looked_at_less_often() -> None:
     told.takes_s = 0.5
     unsendable = told.new()
     for _ in range(10_000):
-        unsendable.try_out(1)
+        unsendable.is_valid(1)
         told.now += 0.01
     assert told.encoded * 0.5 / told.now < 0.025
 
@@ -52,10 +52,10 @@ def test_a_payload_that_takes_long_is_looked_at_less_often() -> None:
 def test_an_unheard_payload_that_cannot_be_sent_is_told_until_one_can() -> None:
     told = Told()
     unsendable = told.new()
-    assert not unsendable.try_out(object())
+    assert not unsendable.is_valid(object())
     assert unsendable.count == 1
     told.now += 1.0
-    assert unsendable.try_out(1)
+    assert unsendable.is_valid(1)
     assert told.problems == ["cannot encode a 'object' as 'json'; 'object' has no form in it", ""]
 
 
@@ -95,13 +95,13 @@ def test_good_and_bad_messages_in_turn_are_logged_rarely(caplog: pytest.LogCaptu
     ],
 )
 def test_where_in_a_payload_it_is(payload: object, place: str) -> None:
-    assert place_of(payload, CODECS["json"].encode) == place
+    assert path_of(payload, CODECS["json"].encode) == place
 
 
 def test_a_payload_that_holds_itself_has_an_end() -> None:
     endless: list[object] = []
     endless.append(endless)
-    assert place_of(endless, CODECS["json"].encode).startswith("[0][0]")
+    assert path_of(endless, CODECS["json"].encode).startswith("[0][0]")
 
 
 def test_the_rule_of_rare_logging() -> None:

@@ -64,7 +64,7 @@ def test_what_english_pages_call_commands_is_what_they_are_called() -> None:
 def test_other_languages_call_commands_what_they_are_called_there(
     monkeypatch: pytest.MonkeyPatch, language: str, page: str
 ) -> None:
-    monkeypatch.setattr("nep.i18n._now", None)
+    monkeypatch.setattr("nep.i18n._current", None)
     i18n.install(language)
     words = i18n.gettext
     path = r"\*([^>*]+) > ([^*]+)\*"

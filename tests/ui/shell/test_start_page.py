@@ -244,7 +244,7 @@ def test_the_shipped_examples_are_read_with_their_blocks() -> None:
 def test_what_an_example_is_called_and_does_is_said_in_the_language_of_studio(
     monkeypatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("nep.i18n._now", None)
+    monkeypatch.setattr("nep.i18n._current", None)
     extract(tmp_path)
     compile_all(tmp_path)
     install(PSEUDO, tmp_path)
