@@ -137,7 +137,9 @@ class _Catalogue:
         if translation not in self._rejected:
             self._rejected.add(translation)
             _log.warning(
-                "the translation '%s' has not the holes of '%s'; English is shown", translation, english[0]
+                "the translation '%s' doesn't have the placeholders of '%s'; using English",
+                translation,
+                english[0],
             )
         return False
 
@@ -182,7 +184,7 @@ def install(wanted: str, folder: Path = LOCALE) -> _Catalogue:
             with file.open("rb") as stream:
                 found = _gettext_module().GNUTranslations(stream)
         except Exception as error:  # noqa: BLE001 - a damaged catalogue may raise any exception
-            _log.warning("the words of '%s' can't be read from '%s': %s", chosen, file, error)
+            _log.warning("can't load the catalogue of '%s' from '%s': %s", chosen, file, error)
             chosen = ENGLISH
     facts = known_languages(folder).get(chosen, {}) if chosen != ENGLISH else {}
     _current = _Catalogue(chosen, found, facts)

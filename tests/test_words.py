@@ -203,7 +203,7 @@ def test_a_damaged_catalogue_is_english(data, spanish, tmp_path, caplog) -> None
     install("es", tmp_path)
     assert i18n.language() == "en"
     assert _("wait for {robot}") == "wait for {robot}"
-    assert "can't be read" in caplog.text
+    assert "can't load" in caplog.text
 
 
 def test_which_language() -> None:

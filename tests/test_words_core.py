@@ -347,4 +347,4 @@ def test_what_was_left_out_of_a_log_or_a_terminal() -> None:
     handler.close()
     terminal = Terminal(io.StringIO())
     terminal._lines_dropped, terminal._is_closing = 2, True
-    said(terminal._next())
+    said(terminal._next_text())

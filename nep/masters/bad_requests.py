@@ -14,17 +14,17 @@ from nep.text import escaped, shortened
 __all__ = ["BadRequests", "who_sends"]
 
 _logger = logging.getLogger("nep.master")
-_LINES, _LINES_A_S = 10.0, 0.2
+_LOG_BURST, _LOG_RATE_HZ = 10.0, 0.2
 """Burst and rate (per second) of log lines: each connection may be another sender."""
-_SENDERS = 100
+_MAX_SENDERS = 100
 """Maximum number of senders; beyond it the one inactive for longest is evicted."""
-_SHOWN = 5
+_MAX_ALERTS = 5
 """Number of senders with an alert of their own."""
-_SHOWN_S = 10.0
+_ALERT_DURATION_S = 10.0
 """Duration of an alert after the newest malformed request."""
-_SAME_S = 1.0
+_ALERT_INTERVAL_S = 1.0
 """Minimum time between changes of the alerts, each of which is sent to all observers of the graph."""
-_LONGEST = 200
+_MAX_REASON_LENGTH = 200
 """Maximum length of a reason, which may quote untrusted input."""
 _HINT = lazy(
     "It may be of another version of nep, or no nep program; see what connects to the master's port."
@@ -45,45 +45,47 @@ class BadRequests:
     def __init__(self) -> None:
         self._senders: OrderedDict[str, _Sender] = OrderedDict()
         self._alerts: tuple[Alert, ...] = ()
-        self._told_at = 0.0
-        self._may_log, self._counted_at = _LINES, 0.0
+        self._alerts_at = 0.0
+        self._log_tokens, self._refilled_at = _LOG_BURST, 0.0
 
     def add(self, sender: str, name: str, reason: str, now: float) -> None:
         """Count a request of `sender`, called `name` in messages. Logs the first, tenth, … of each sender."""
         known = self._senders.pop(sender, None) or _Sender(name)
         self._senders[sender] = known
-        known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _LONGEST)), now
+        known.name, known.reason, known.newest_at = name, escaped(shortened(reason, _MAX_REASON_LENGTH)), now
         known.count += 1
-        self._may_log = min(_LINES, self._may_log + (now - self._counted_at) * _LINES_A_S)
-        self._counted_at = now
-        if is_logged(known.count) and self._may_log >= 1.0:
-            self._may_log -= 1.0
+        self._log_tokens = min(_LOG_BURST, self._log_tokens + (now - self._refilled_at) * _LOG_RATE_HZ)
+        self._refilled_at = now
+        if is_logged(known.count) and self._log_tokens >= 1.0:
+            self._log_tokens -= 1.0
             _logger.warning("%s", _sentence(known))
-        while len(self._senders) > _SENDERS:
+        while len(self._senders) > _MAX_SENDERS:
             self._senders.popitem(last=False)
 
     def alerts(self, now: float) -> tuple[Alert, ...]:
         """Return an alert for each of the newest senders, and one for all others. Constant for a second."""
-        if (self._senders or self._alerts) and now >= self._told_at + _SAME_S:
-            self._told_at = now
-            self._alerts = self._tell(now)
+        if (self._senders or self._alerts) and now >= self._alerts_at + _ALERT_INTERVAL_S:
+            self._alerts_at = now
+            self._alerts = self._current_alerts(now)
         return self._alerts
 
-    def _tell(self, now: float) -> tuple[Alert, ...]:
+    def _current_alerts(self, now: float) -> tuple[Alert, ...]:
         shown = [
             (sender, known)
             for sender, known in reversed(self._senders.items())
-            if now - known.newest_at < _SHOWN_S
+            if now - known.newest_at < _ALERT_DURATION_S
         ]
-        told = [Alert(f"request:{sender}", _sentence(known), _(_HINT)) for sender, known in shown[:_SHOWN]]
-        if len(shown) > _SHOWN:
+        alerts = [
+            Alert(f"request:{sender}", _sentence(known), _(_HINT)) for sender, known in shown[:_MAX_ALERTS]
+        ]
+        if len(shown) > _MAX_ALERTS:
             sentence = ngettext(
                 "{count} more program sends what the master does not understand",
                 "{count} more programs send what the master does not understand",
-                len(shown) - _SHOWN,
-            ).format(count=len(shown) - _SHOWN)
-            told.append(Alert("request:", sentence, _(_HINT)))
-        return tuple(sorted(told, key=lambda each: each.id))
+                len(shown) - _MAX_ALERTS,
+            ).format(count=len(shown) - _MAX_ALERTS)
+            alerts.append(Alert("request:", sentence, _(_HINT)))
+        return tuple(sorted(alerts, key=lambda each: each.id))
 
 
 def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:

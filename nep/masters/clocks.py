@@ -12,7 +12,7 @@ __all__ = ["Clocks", "Differences"]
 
 Differences = dict[str, tuple[int, int]]
 """By node id: offset to add to its times for the requester's clock, and its uncertainty (ns)."""
-_HERE = NodeClock(0, 0, None)
+_MASTER_CLOCK = NodeClock(0, 0, None)
 
 
 class Clocks:
@@ -35,7 +35,7 @@ class Clocks:
         Implausible values count as unknown.
         """
         if told is not None and self.is_here(member):
-            member.clock = _HERE
+            member.clock = _MASTER_CLOCK
         elif told is not None and len(told) == 2 and is_clock(*told):
             member.clock = NodeClock(*told, now)
         else:

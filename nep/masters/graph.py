@@ -70,7 +70,7 @@ from nep.protocol.requests import (
 __all__ = ["Graph", "Outgoing", "with_hosts", "without"]
 
 
-_WAITING_MAX = 10_000
+_MAX_WAITING = 10_000
 """Maximum number of requests that wait while the master is learning."""
 
 
@@ -120,7 +120,7 @@ class Graph:
         """Clocks of the nodes."""
         self._viewer = GraphViewer(self._registry)
         self._leases = Leases(self._registry, lease_s)
-        self._learnt_at = now + learn_s
+        self._learning_until = now + learn_s
         self._waiting: list[tuple[AddPublisher | AddSubscriber, int, str, bool]] = []
 
     # ---- called by the server
@@ -151,14 +151,14 @@ class Graph:
         out: list[Outgoing] = []
         try:
             if is_foreign:
-                self._admit(request, sender, out)
-            if isinstance(request, AddPublisher | AddSubscriber) and now < self._learnt_at:
-                if len(self._waiting) >= _WAITING_MAX:
+                self._authorize(request, sender, out)
+            if isinstance(request, AddPublisher | AddSubscriber) and now < self._learning_until:
+                if len(self._waiting) >= _MAX_WAITING:
                     reason = _("too many programs register while the master is starting; ask again")
                     raise WireError(reason, code="busy")
                 self._waiting.append((request, call, sender, is_foreign))
                 return tuple(out)
-            reply = self._carry_out(request, now, sender, out)
+            reply = self._execute(request, now, sender, out)
         except WireError as error:
             reply = Refused(self.epoch, self.revision, error.reason, error.code)
         out.append(Outgoing(sender, reply, call))
@@ -167,7 +167,7 @@ class Graph:
     def tick(self, now: float) -> tuple[Outgoing, ...]:
         """Finish learning, expire leases, adapt the renewal interval."""
         out: list[Outgoing] = []
-        if self._waiting and now >= self._learnt_at:
+        if self._waiting and now >= self._learning_until:
             waiting, self._waiting = self._waiting, []
             for request, call, sender, is_foreign in waiting:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
@@ -179,7 +179,7 @@ class Graph:
     @property
     def learning_end(self) -> float | None:
         """Time at which `tick` must be called for waiting requests, or None."""
-        return self._learnt_at if self._waiting else None
+        return self._learning_until if self._waiting else None
 
     def silent(self, now: float) -> tuple[Outgoing, ...]:
         """Return probes for nodes that missed a renewal.
@@ -199,7 +199,7 @@ class Graph:
         for node_id in node_ids:
             member = self._registry.members.get(node_id)
             if member is not None:
-                self._forget(member, out, is_closed=False)
+                self._unregister_node(member, out, is_closed=False)
         return tuple(out)
 
     def view(self) -> GraphView:
@@ -213,7 +213,7 @@ class Graph:
         """
         if said.revision < self._registry.publishers_revision:
             return None
-        member = self._renewed_member(said, now, sender)
+        member = self._renew_member(said, now, sender)
         if member is None:
             return None
         self._leases.renew(member, now)
@@ -225,22 +225,22 @@ class Graph:
 
     # ---- authorization
 
-    def _admit(self, request: Request, sender: str, out: list[Outgoing]) -> None:
+    def _authorize(self, request: Request, sender: str, out: list[Outgoing]) -> None:
         # Raises `WireError`. A proven owner of an id evicts an unproven one.
         check_request(request)
         if isinstance(request, Join | AddPublisher | AddSubscriber):
-            self._admit_node(request.node, sender, out)
+            self._authorize_node(request.node, sender, out)
             records = records_of(request)
             for record in records:
-                self._admit_record(request.node, record, out)
-            self._admit_more(request, len(records))
+                self._authorize_record(request.node, record, out)
+            self._check_limits(request, len(records))
             return
         node_id = node_of(request)
         member = None if node_id is None else self._registry.members.get(node_id)
         if member is not None and member.route != sender and not isinstance(request, Renew):
             raise WireError(_("a node speaks for itself only"), code="speaker")
 
-    def _admit_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
+    def _authorize_node(self, node: NodeRecord, sender: str, out: list[Outgoing]) -> None:
         if node.key and not is_proven(node):
             reason = _("the node's id '{id}' does not come from its key").format(id=node.id)
             raise WireError(reason, code="node-key")
@@ -260,9 +260,9 @@ class Graph:
             reason = _("the node '{id}' is another program's").format(id=node.id)
             raise WireError(reason, code="node-taken")
         if not is_proven(known.node):
-            self._forget(known, out, is_closed=False)
+            self._unregister_node(known, out, is_closed=False)
 
-    def _admit_record(
+    def _authorize_record(
         self, node: NodeRecord, record: PublisherRecord | SubscriberRecord, out: list[Outgoing]
     ) -> None:
         if record.number and not is_proven(node, record):
@@ -284,11 +284,11 @@ class Graph:
                 code="record-taken",
             )
         if is_publisher:
-            self._unlist_publisher(owner, record.id, out)
+            self._unregister_publisher(owner, record.id, out)
         else:
             self._registry.remove_subscriber(owner.node.id, record.id)
 
-    def _admit_more(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
+    def _check_limits(self, request: Join | AddPublisher | AddSubscriber, count: int) -> None:
         registry = self._registry
         member = registry.members.get(request.node.id)
         own = 0 if member is None else len(member.publishers) + len(member.subscribers)
@@ -300,7 +300,7 @@ class Graph:
                 ),
                 code="limit",
             )
-        self._admit_patterns(request)
+        self._check_pattern_limits(request)
         all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
         if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
             raise WireError(
@@ -310,7 +310,7 @@ class Graph:
                 code="limit",
             )
 
-    def _admit_patterns(self, request: Join | AddPublisher | AddSubscriber) -> None:
+    def _check_pattern_limits(self, request: Join | AddPublisher | AddSubscriber) -> None:
         new = {each.id for each in records_of(request) if isinstance(each, SubscriberRecord) and each.pattern}
         if not new:
             return
@@ -331,7 +331,7 @@ class Graph:
 
     # ---- requests
 
-    def _carry_out(self, request: Request, now: float, sender: str, out: list[Outgoing]) -> Reply:
+    def _execute(self, request: Request, now: float, sender: str, out: list[Outgoing]) -> Reply:
         if isinstance(request, AddPublisher):
             return self._add_publisher(request, now, sender, out)
         if isinstance(request, AddSubscriber):
@@ -345,10 +345,10 @@ class Graph:
         if isinstance(request, ReportAlerts):
             self._registry.report_alerts(request.source, request.alerts)
         elif not isinstance(request, Ping | Listen):
-            self._note(request, out)
+            self._update(request, out)
         return Done(self.epoch, self.revision)
 
-    def _note(
+    def _update(
         self,
         request: RemovePublisher | RemoveSubscriber | Leave | ReportMissing,
         out: list[Outgoing],
@@ -362,25 +362,25 @@ class Graph:
         else:
             member = self._registry.members.get(request.node_id)
             if member is not None:
-                self._forget(member, out, is_closed=True)
+                self._unregister_node(member, out, is_closed=True)
 
-    def _meet(
+    def _register_node(
         self, node: NodeRecord, now: float, sender: str, *, is_managed: bool | None = None
     ) -> RegisteredNode:
-        member = self._registry.meet(node, now, is_managed=is_managed)
+        member = self._registry.add_node(node, now, is_managed=is_managed)
         self._registry.bind(member, sender)
         return member
 
     def _add_publisher(self, request: AddPublisher, now: float, sender: str, out: list[Outgoing]) -> Reply:
         check_record(request.publisher)
-        member = self._meet(request.node, now, sender)
+        member = self._register_node(request.node, now, sender)
         id = request.publisher.id
         # a publisher unlisted for its silence may report new endpoints before it rejoins
         is_new = id not in member.publishers and id not in self._registry.departed
-        self._place(member, request.publisher, out, is_new=is_new)
+        self._register_publisher(member, request.publisher, out, is_new=is_new)
         expected: list[Expected] = []
         hung: list[Expected] = []
-        for other, subscriber in self._registry.hearing(request.publisher.topic):
+        for other, subscriber in self._registry.receivers_of(request.publisher.topic):
             if not other.is_managed:
                 entry = Expected(subscriber.record.id, other.node.id, other.node.name)
                 # hung for this node: not waited for. Hung for another node: waited for unless its renewal is
@@ -391,7 +391,7 @@ class Graph:
 
     def _add_subscriber(self, request: AddSubscriber, now: float, sender: str, out: list[Outgoing]) -> Reply:
         check_record(request.subscriber)
-        member = self._meet(request.node, now, sender)
+        member = self._register_node(request.node, now, sender)
         self._registry.add_subscriber(member, request.subscriber)
         found = tuple(
             remote
@@ -406,22 +406,22 @@ class Graph:
         records: tuple[PublisherRecord | SubscriberRecord, ...] = (*request.publishers, *request.subscribers)
         for record in records:
             check_record(record)
-        member = self._meet(request.node, now, sender, is_managed=request.managed)
-        kept = {record.id for record in request.publishers}
-        for gone in [known for known in member.publishers if known not in kept]:
+        member = self._register_node(request.node, now, sender, is_managed=request.managed)
+        registered = {record.id for record in request.publishers}
+        for gone in [known for known in member.publishers if known not in registered]:
             self._registry.remove_publisher(member.node.id, gone)
-        kept = {record.id for record in request.subscribers}
-        for gone in [known for known in member.subscribers if known not in kept]:
+        registered = {record.id for record in request.subscribers}
+        for gone in [known for known in member.subscribers if known not in registered]:
             self._registry.remove_subscriber(member.node.id, gone)
         for subscriber in request.subscribers:
             self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
-            self._place(member, publisher, out, is_new=False)
+            self._register_publisher(member, publisher, out, is_new=False)
         topics = self._registry.topics_heard_by(member)
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
 
-    def _renewed_member(self, said: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
+    def _renew_member(self, said: RawRenewal, now: float, sender: str) -> RegisteredNode | None:
         # None: the node must join again.
         member = self._member_at(said.node_id, sender)
         if member is None or said.epoch != self.epoch:
@@ -437,7 +437,7 @@ class Graph:
         return member if member is not None and member.route == sender else None
 
     def _renew(self, request: Renew, now: float, sender: str) -> Reply:
-        said = RawRenewal(
+        renewal = RawRenewal(
             0,
             request.node_id,
             request.epoch,
@@ -447,7 +447,7 @@ class Graph:
             request.cpu_ratio,
             request.clock,
         )
-        member = self._renewed_member(said, now, sender)
+        member = self._renew_member(renewal, now, sender)
         if member is None:
             unknown = self._member_at(request.node_id, sender)
             if unknown is not None:
@@ -465,36 +465,36 @@ class Graph:
         clocks = self.clocks.differences(member, now)
         return Renewed(self.epoch, self.revision, False, changed, last_seqs, next_s=next_s, clocks=clocks)
 
-    def _unlist_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
+    def _unregister_publisher(self, member: RegisteredNode, publisher: int, out: list[Outgoing]) -> None:
         # For a publisher that did not unregister itself.
         last_seq = member.publishers[publisher].last_seq
         record = self._registry.remove_publisher(member.node.id, publisher)
         if record is not None:
             gone = PublisherGone(self.epoch, self.revision, record.id, record.topic, False, last_seq)
-            self._tell(record, gone, out)
+            self._notify_subscribers(record, gone, out)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
         member = self._registry.members.get(request.node_id)
         known = member.publishers.get(request.id) if member is not None else None
         if known is not None:
-            self._registry.reached(known, request.last_seq, known.last_stamp_ns)
+            self._registry.update_last_message(known, request.last_seq, known.last_stamp_ns)
         record = self._registry.remove_publisher(request.node_id, request.id)
         if record is not None:
             gone = PublisherGone(
                 self.epoch, self.revision, record.id, record.topic, is_closed=True, last_seq=request.last_seq
             )
-            self._tell(record, gone, out)
+            self._notify_subscribers(record, gone, out)
 
     # ---- notifying subscribers
 
-    def _place(
+    def _register_publisher(
         self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing], *, is_new: bool
     ) -> None:
         if self._registry.add_publisher(member, record) and record.endpoints:
             remote = self._registry.remote(member, record)
-            self._tell(record, PublisherCame(self.epoch, self.revision, remote, is_new), out)
+            self._notify_subscribers(record, PublisherCame(self.epoch, self.revision, remote, is_new), out)
 
-    def _forget(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
+    def _unregister_node(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
         publishers = list(member.publishers.values())
         self._registry.forget(member.node.id)
         for publisher in publishers:
@@ -506,11 +506,11 @@ class Graph:
                 is_closed=is_closed,
                 last_seq=publisher.last_seq,
             )
-            self._tell(publisher.record, gone, out)
+            self._notify_subscribers(publisher.record, gone, out)
 
-    def _tell(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
-        told: set[str] = set()
-        for member, _subscriber in self._registry.hearing(record.topic):
-            if not member.is_managed and member.node.id not in told:
-                told.add(member.node.id)
+    def _notify_subscribers(self, record: PublisherRecord, push: Push, out: list[Outgoing]) -> None:
+        notified: set[str] = set()
+        for member, _subscriber in self._registry.receivers_of(record.topic):
+            if not member.is_managed and member.node.id not in notified:
+                notified.add(member.node.id)
                 out.append(Outgoing(member.node.id, push))

@@ -17,18 +17,18 @@ __all__ = ["LEASE_S", "Leases", "RawRenewal", "is_renewal", "read_renewal", "ren
 
 LEASE_S = 3.0
 """Lease of a node that renews every second; nodes with longer intervals have as much more."""
-_LATE_S = 0.4
+_LATE_AFTER_S = 0.4
 """Delay of a renewal after which the node is probed."""
-_RENEWALS_A_S = 125
+_MAX_RENEWALS_PER_S = 125
 """Maximum renewals per second of all nodes; with more nodes the interval grows."""
-_LONGEST_RENEW_S = 5.0
+_MAX_RENEW_S = 5.0
 """Maximum renewal interval."""
 _SLOT_S = 0.1
 """Width of a slot: renewals with longer intervals are grouped, because wake-ups cost most."""
 
-_BEGINS = b"\x83\xa2do\xa5renew"
+_RENEWAL_PREFIX = b"\x83\xa2do\xa5renew"
 """First bytes of our own renewals. Others may order the fields differently; they take the general path."""
-_SMALL_BYTES, _LISTS_MAX = 4096, 20_000
+_SMALL_BYTES, _MAX_LISTS = 4096, 20_000
 
 
 class Leases:
@@ -38,7 +38,7 @@ class Leases:
         self._registry = registry
         self._grace_s = lease_s - RENEW_S
         self._renew_s = RENEW_S
-        self._paced_at = 0
+        self._paced_revision = 0
         """Registry revision for which the interval was computed."""
         self._slot_size = 0
         self._slots: dict[int, int] = {}
@@ -46,12 +46,12 @@ class Leases:
 
     def set_pace(self, now: float) -> None:
         """Compute the renewal interval; each node gets it with its next renewal."""
-        self._slots = {slot: told for slot, told in self._slots.items() if slot * _SLOT_S > now}
-        if self._paced_at == self._registry.revision:
+        self._slots = {slot: count for slot, count in self._slots.items() if slot * _SLOT_S > now}
+        if self._paced_revision == self._registry.revision:
             return
-        self._paced_at = self._registry.revision
+        self._paced_revision = self._registry.revision
         nodes = sum(not member.is_managed for member in self._registry.members.values())
-        self._renew_s = min(_LONGEST_RENEW_S, max(RENEW_S, nodes / _RENEWALS_A_S))
+        self._renew_s = min(_MAX_RENEW_S, max(RENEW_S, nodes / _MAX_RENEWALS_PER_S))
         self._slot_size = 1 + int(nodes * _SLOT_S / self._renew_s)
 
     def renew(self, member: RegisteredNode, now: float) -> float:
@@ -74,11 +74,11 @@ class Leases:
 
     def is_late(self, member: RegisteredNode, now: float) -> bool:
         """Return True if the node missed a renewal."""
-        return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_S
+        return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_AFTER_S
 
     def late(self, now: float) -> list[str]:
         """Return the nodes that missed a renewal."""
-        return self._overdue(now, _LATE_S)
+        return self._overdue(now, _LATE_AFTER_S)
 
     def lapsed(self, now: float) -> list[str]:
         """Return the nodes whose lease has expired."""
@@ -108,19 +108,19 @@ class RawRenewal(NamedTuple):
 
 def is_renewal(body: bytes) -> bool:
     """Return True if a body looks like one of our own renewals, for `read_renewal`."""
-    return body.startswith(_BEGINS)
+    return body.startswith(_RENEWAL_PREFIX)
 
 
 def read_renewal(body: bytes) -> RawRenewal | None:
     """Parse a usual renewal; return None for anything else."""
-    if not body.startswith(_BEGINS):
+    if not body.startswith(_RENEWAL_PREFIX):
         return None
     try:
         envelope: Any = (
-            unpack_bounded(body, _LISTS_MAX, _LISTS_MAX) if len(body) > _SMALL_BYTES else unpack(body)
+            unpack_bounded(body, _MAX_LISTS, _MAX_LISTS) if len(body) > _SMALL_BYTES else unpack(body)
         )
         what = envelope["what"]
-        said = RawRenewal(
+        renewal = RawRenewal(
             envelope["call"],
             what["node_id"],
             what["epoch"],
@@ -128,26 +128,26 @@ def read_renewal(body: bytes) -> RawRenewal | None:
             what.get("publishers", ()),
             what.get("subscribers", ()),
             what.get("cpu_ratio"),
-            _clock_in(what.get("clock")),
+            _parse_clock(what.get("clock")),
         )
     except (ValueError, LookupError, TypeError, AttributeError):
         return None
-    numbers = type(said.call) is type(said.epoch) is type(said.revision) is int
-    is_usual = numbers and said.call >= 0 and type(said.node_id) is str
-    is_usual = is_usual and type(said.cpu_ratio) in {float, type(None)}
-    is_usual = is_usual and {type(said.publishers), type(said.subscribers)} <= {list, tuple}
-    return said if is_usual else None
+    numbers = type(renewal.call) is type(renewal.epoch) is type(renewal.revision) is int
+    is_usual = numbers and renewal.call >= 0 and type(renewal.node_id) is str
+    is_usual = is_usual and type(renewal.cpu_ratio) in {float, type(None)}
+    is_usual = is_usual and {type(renewal.publishers), type(renewal.subscribers)} <= {list, tuple}
+    return renewal if is_usual else None
 
 
-def _clock_in(told: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - untrusted input
+def _parse_clock(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - untrusted input
     # Raises `ValueError` for an unusual value.
-    if told is None:
+    if value is None:
         return None
-    if told == []:
+    if value == []:
         return ()
-    if type(told) not in {list, tuple} or not all(type(each) is int for each in told):
-        raise ValueError(told)
-    return tuple(told)
+    if type(value) not in {list, tuple} or not all(type(each) is int for each in value):
+        raise ValueError(value)
+    return tuple(value)
 
 
 def renewed_body(

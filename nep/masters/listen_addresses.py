@@ -80,7 +80,7 @@ class ListenAddresses:
         chosen = check_hosts(hosts, here)
         new: list[str] = []
         try:
-            for host in self._wanted(chosen, here) - self._bound:
+            for host in self._available_hosts(chosen, here) - self._bound:
                 self._bind(host)
                 new.append(host)
         except NepError:
@@ -88,7 +88,7 @@ class ListenAddresses:
                 self._unbind(host)
             raise
         self.hosts = chosen
-        for host in self._bound - self._wanted(chosen, here):
+        for host in self._bound - self._available_hosts(chosen, here):
             self._unbind(host)
 
     def follow(self) -> tuple[Alert, ...]:
@@ -96,21 +96,23 @@ class ListenAddresses:
         if not self.hosts:
             return ()
         here = self._here()
-        wanted = self._wanted(self.hosts, here)
-        for host in self._bound - wanted:
+        available = self._available_hosts(self.hosts, here)
+        for host in self._bound - available:
             self._unbind(host)
-        for host in wanted - self._bound:
+        for host in available - self._bound:
             with contextlib.suppress(AddressInUseError):  # retried at the next call
                 self._bind(host)
-        return tuple(self._lost(host, here) for host in self.hosts if host != ANY and host not in self._bound)
+        return tuple(
+            self._lost_alert(host, here) for host in self.hosts if host != ANY and host not in self._bound
+        )
 
-    def _wanted(self, hosts: tuple[str, ...], here: tuple[OwnAddress, ...]) -> set[str]:
+    def _available_hosts(self, hosts: tuple[str, ...], here: tuple[OwnAddress, ...]) -> set[str]:
         present = {own.host for own in here}
         if ANY in hosts:
             return present
         return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
 
-    def _lost(self, host: str, here: tuple[OwnAddress, ...]) -> Alert:
+    def _lost_alert(self, host: str, here: tuple[OwnAddress, ...]) -> Alert:
         now = ", ".join(own.host for own in here)
         return Alert(
             f"listen:{host}",
@@ -132,5 +134,5 @@ class ListenAddresses:
         try:
             self._router.unbind(endpoint_of(f"{host}:{self._port}"))
         except zmq.ZMQError as error:  # the address is gone, and the binding with it
-            _logger.debug("'%s' could not be unbound: %s", host, error)
+            _logger.debug("failed to unbind '%s': %s", host, error)
         self._bound.discard(host)

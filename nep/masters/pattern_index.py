@@ -47,14 +47,14 @@ class PatternIndex(Generic[T]):
 
     def remove(self, pattern: str, subscriber: int) -> None:
         """Remove a subscriber. Idempotent."""
-        there = self._subscribers.get(pattern)
-        if there is None:
+        subscribers = self._subscribers.get(pattern)
+        if subscribers is None:
             return
-        there.pop(subscriber, None)
-        if not there:
+        subscribers.pop(subscriber, None)
+        if not subscribers:
             del self._subscribers[pattern]
             for topic in self._topics.pop(pattern):
-                self._take_out(topic, pattern)
+                self._discard(topic, pattern)
 
     def topic_came(self, topic: str) -> None:
         """Add a newly published topic."""
@@ -88,7 +88,7 @@ class PatternIndex(Generic[T]):
             for subscriber, owner in self._subscribers[pattern].items()
         ]
 
-    def _take_out(self, topic: str, pattern: str) -> None:
+    def _discard(self, topic: str, pattern: str) -> None:
         found = self._patterns.get(topic)
         if found is not None:
             found.discard(pattern)

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-_FILES = 16
-_AGAIN_S = 0.5
+_DESCRIPTORS_NEEDED = 16
+_RETRY_S = 0.5
 """Time after which an unanswered request is sent again."""
 
-_ASKED_AT_MOST_S = 4.0
+_MAX_REQUEST_S = 4.0
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 """`creationflags` for subprocesses: Windows would open a window for every console program."""
@@ -66,7 +66,7 @@ def is_running(address: str | None = None, timeout_s: float = 0.5) -> bool:
     """
     chosen = master_address(address)
     try:
-        return isinstance(_ask(Ping(), chosen, timeout_s), Done)
+        return isinstance(_request(Ping(), chosen, timeout_s), Done)
     except (MasterUnreachable, RequestRefusedError):
         return False
 
@@ -77,7 +77,7 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
     Raises `MasterUnreachable` without a reply in time, and `RequestRefusedError`.
     """
     chosen = master_address(address)
-    reply = _ask(Look(), chosen, timeout_s)
+    reply = _request(Look(), chosen, timeout_s)
     if not isinstance(reply, Seen):
         raise RequestRefusedError(_("the master at '{chosen}' shows no graph").format(chosen=chosen))
     return reply.view
@@ -101,11 +101,11 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
         RequestRefusedError: The master rejected the request.
         MasterUnreachable: No master replied within `timeout_s` seconds.
     """
-    _ask(Listen(tuple(hosts)), master_address(address), timeout_s)
+    _request(Listen(tuple(hosts)), master_address(address), timeout_s)
 
 
-def _ask(request: Request, address: str, timeout_s: float) -> Reply:
-    check_room(_FILES, "a question to the master")
+def _request(request: Request, address: str, timeout_s: float) -> Reply:
+    check_room(_DESCRIPTORS_NEEDED, "a question to the master")
     started = time.monotonic()
     name = MasterName(address, lambda _known: None)
     name.look(started)
@@ -119,7 +119,7 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
         endpoint, body = endpoint_of(name.known), encode_request(request, 1)
         socket.connect(endpoint)
         _send(socket, endpoint, body)
-        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _AGAIN_S
+        deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_S
         while (left := deadline - time.monotonic()) > 0:
             if socket.poll(int(min(left, 0.1) * 1000) + 1):
                 reply = _read(socket.recv())
@@ -127,7 +127,7 @@ def _ask(request: Request, address: str, timeout_s: float) -> Reply:
                     return reply
             # the request may have been sent to a master that was just stopping
             elif time.monotonic() >= again_at:
-                again_at += _AGAIN_S
+                again_at += _RETRY_S
                 _send(socket, endpoint, body)
         raise MasterUnreachable(address, timeout_s)
     finally:
@@ -196,7 +196,7 @@ def start_process(
     while (left := began + timeout_s - time.monotonic()) > 0 and process.poll() is None:
         if is_running(chosen, min(asked_s, left)):
             return process
-        asked_s = min(2 * asked_s, _ASKED_AT_MOST_S)  # a busy computer may need longer for every reply
+        asked_s = min(2 * asked_s, _MAX_REQUEST_S)  # a busy computer may need longer for every reply
     if process.poll() is None:
         process.kill()
     process.wait(5.0)

@@ -7,8 +7,8 @@ from collections import deque
 __all__ = ["Meter"]
 
 _WINDOW_S = 10.0
-_ENOUGH = 10
-_SHORTEST_S = 0.5
+_MIN_MESSAGES = 10
+_MIN_SPAN_S = 0.5
 
 
 class Meter:
@@ -38,9 +38,9 @@ class Meter:
         found: tuple[float, float] | None = None
         for start, count, size_bytes in reversed(self._samples):
             span = end - start
-            if span < _SHORTEST_S:
+            if span < _MIN_SPAN_S:
                 continue
             found = (end_count - count) / span, (end_bytes - size_bytes) / span
-            if end_count - count >= _ENOUGH:
+            if end_count - count >= _MIN_MESSAGES:
                 break
         return found

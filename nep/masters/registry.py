@@ -62,10 +62,10 @@ _ENDPOINT = re.compile(
 )
 _NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
-_HUNG_MAX = 100
+_MAX_HUNG = 100
 """Maximum number of publishers' nodes recorded that a node did not answer."""
-_CORES_MAX = 100_000.0
-_PROBLEM_MAX = 500
+_MAX_CORES = 100_000.0
+_MAX_PROBLEM_LENGTH = 500
 """Maximum length of a problem reported by a node."""
 FADES_S = 12.0
 """Time after its last message in which a publisher's rate may still fall."""
@@ -196,7 +196,7 @@ class Registry:
         found = self._subscribing.get(topic)
         return [(member, member.subscribers[known]) for known, member in found.items()] if found else []
 
-    def hearing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
+    def receivers_of(self, topic: str) -> list[tuple[RegisteredNode, RegisteredSubscriber]]:
         """Return the subscribers that receive a topic: its own and those whose pattern matches."""
         found = [each for each in self.subscribers_of(topic) if not each[1].record.pattern]
         return found + [
@@ -254,7 +254,7 @@ class Registry:
 
     # ---- changing
 
-    def meet(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
+    def add_node(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
         """Return the member of a node, created if needed, and renew its lease."""
         member = self.members.get(node.id)
         if member is None:
@@ -291,7 +291,7 @@ class Registry:
         self.publisher_owners[record.id] = member
         self._publishing.setdefault(record.topic, {})[record.id] = member
         self.patterns.topic_came(record.topic)
-        self._changed(record.topic)
+        self._bump_revision(record.topic)
         return True
 
     def add_subscriber(self, member: RegisteredNode, record: SubscriberRecord) -> None:
@@ -314,11 +314,11 @@ class Registry:
         self.publisher_owners.pop(publisher, None)
         if gone.record.endpoints:
             self.departed.add(self._names_of(gone.record.topic), publisher, gone)
-        _take_out(self._publishing, gone.record.topic, publisher)
+        _discard(self._publishing, gone.record.topic, publisher)
         if gone.record.topic not in self._publishing:
             self.patterns.topic_went(gone.record.topic)
-        self._changed(gone.record.topic)
-        self._forget_unused(gone.record.topic)
+        self._bump_revision(gone.record.topic)
+        self._discard_unused(gone.record.topic)
         return gone.record
 
     def _names_of(self, topic: str) -> set[str]:
@@ -332,14 +332,14 @@ class Registry:
         gone = member.subscribers.pop(subscriber, None) if member else None
         if gone is not None:
             self.subscriber_owners.pop(subscriber, None)
-            _take_out(self._subscribing, gone.record.topic, subscriber)
+            _discard(self._subscribing, gone.record.topic, subscriber)
             if gone.record.pattern:
                 self.patterns.remove(gone.record.topic, subscriber)
             self.touched.add(gone.record.topic)
             self.revision += 1
-            self._forget_unused(gone.record.topic)
+            self._discard_unused(gone.record.topic)
 
-    def _forget_unused(self, topic: str) -> None:
+    def _discard_unused(self, topic: str) -> None:
         # Discards data of unused topics; a new user gets the full state anyway.
         if topic not in self._publishing and topic not in self._subscribing:
             self.touched.discard(topic)
@@ -382,16 +382,16 @@ class Registry:
                     return False
                 if (stamp_ns is not None and type(stamp_ns) is not int) or type(problem) is not str:
                     return False
-                self.counted(publisher, count, size_bytes, now)
-                self.reached(publisher, last_seq, stamp_ns)
+                self.update_counts(publisher, count, size_bytes, now)
+                self.update_last_message(publisher, last_seq, stamp_ns)
                 publisher.errors = as_count(errors)
                 if problem != publisher.problem:
-                    self.troubled(publisher, problem)
+                    self.update_problem(publisher, problem)
             for seen in subscriber_counts:
                 received, lost, problem = seen["received"], seen["lost"], seen.get("problem", "")
                 if {type(received), type(lost)} - {int, type(None)} or type(problem) is not str:
                     return False
-                self.seen(subscribers[seen["id"]], received, lost, problem)
+                self.update_subscriber(subscribers[seen["id"]], received, lost, problem)
             member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
             if member.hung:
                 member.hung.clear()
@@ -399,7 +399,7 @@ class Registry:
             return False
         return True
 
-    def counted(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
+    def update_counts(self, publisher: RegisteredPublisher, count: int, size_bytes: int, now: float) -> None:
         """Store a publisher's counters."""
         count, size_bytes = as_count(count), as_count(size_bytes)
         if count != publisher.count:
@@ -410,24 +410,26 @@ class Registry:
             self.touched.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 
-    def reached(self, publisher: RegisteredPublisher, last_seq: int, last_stamp_ns: int | None) -> None:
+    def update_last_message(
+        self, publisher: RegisteredPublisher, last_seq: int, last_stamp_ns: int | None
+    ) -> None:
         """Store sequence number and time stamp of a publisher's newest message."""
         publisher.last_seq = as_count(last_seq)
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
 
-    def troubled(self, publisher: RegisteredPublisher, problem: str) -> None:
+    def update_problem(self, publisher: RegisteredPublisher, problem: str) -> None:
         """Store a publisher's problem; "" when it is solved."""
-        publisher.problem = escaped(shortened(problem, _PROBLEM_MAX)) if problem else ""
+        publisher.problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH)) if problem else ""
         self.touched.add(publisher.record.topic)
 
-    def seen(
+    def update_subscriber(
         self, subscriber: RegisteredSubscriber, received: int | None, lost: int | None, problem: str
     ) -> None:
         """Store a subscriber's statistics."""
         received = None if received is None else as_count(received)
         lost = None if lost is None else as_count(lost)
         if problem:
-            problem = escaped(shortened(problem, _PROBLEM_MAX))
+            problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH))
         if received != subscriber.received or lost != subscriber.lost or problem != subscriber.problem:
             self.touched.add(subscriber.record.topic)
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
@@ -440,7 +442,7 @@ class Registry:
             return
         for subscriber in subscribers:
             member = self._subscribing.get(known.record.topic, {}).get(subscriber)
-            if member is not None and len(member.hung) < _HUNG_MAX:
+            if member is not None and len(member.hung) < _MAX_HUNG:
                 member.hung.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
@@ -454,7 +456,7 @@ class Registry:
         """Alerts of all attachments."""
         return tuple(alert for alerts in self._reported.values() for alert in alerts)
 
-    def _changed(self, topic: str) -> None:
+    def _bump_revision(self, topic: str) -> None:
         self.touched.add(topic)
         self.revision += 1
         self.publishers_revision = self._topic_revisions[topic] = self.revision
@@ -462,10 +464,10 @@ class Registry:
 
 def _as_ratio(value: float | None) -> float | None:
     # None for an implausible CPU usage.
-    return value if value is not None and 0.0 <= value < _CORES_MAX else None
+    return value if value is not None and 0.0 <= value < _MAX_CORES else None
 
 
-def _take_out(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int) -> None:
+def _discard(table: dict[str, dict[int, RegisteredNode]], topic: str, known: int) -> None:
     entries = table.get(topic, {})
     entries.pop(known, None)
     if not entries:
@@ -495,7 +497,7 @@ def check_request(request: Request) -> None:
     if isinstance(request, Join) and request.managed:
         raise WireError(_("only what is attached to the master manages nodes"), code="managed")
     for record in records_of(request):
-        _check_foreign(record)
+        _check_registration(record)
 
 
 def records_of(
@@ -537,7 +539,7 @@ def _check_node(node: NodeRecord) -> None:
         raise WireError(reason, code="since")
 
 
-def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
+def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
     check_record(record)
     if not 1 <= record.id <= COUNT_MAX:
         raise WireError(
@@ -556,10 +558,10 @@ def _check_foreign(record: PublisherRecord | SubscriberRecord) -> None:
             )
         for endpoint in record.endpoints:
             if not is_tcp_endpoint(endpoint) and not is_nanomsg_endpoint(endpoint):
-                said = escaped(shortened(endpoint, 80))
+                shown_endpoint = escaped(shortened(endpoint, 80))
                 raise WireError(
                     _("'{said}' is no endpoint of a publisher; it is written 'tcp://HOST:PORT'").format(
-                        said=said
+                        said=shown_endpoint
                     ),
                     code="endpoint",
                 )

@@ -20,11 +20,11 @@ REQUEST_MAX_BYTES = 4 * 2**20
 UNREAD_MAX_BYTES = 32 * 2**20
 """Limit per connection of unread large bodies (4 kB and more)."""
 _LARGE_BYTES = 4096
-_RECEIVE_AHEAD = 16
+_RECEIVE_QUEUE = 16
 """Receive queue per connection; more requests wait at the sender."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
-_FILES = 16
-_RETURN_S = 0.5
+_DESCRIPTORS_NEEDED = 16
+_RECONNECT_S = 0.5
 """Time in which a node may reconnect before it is probed."""
 _SRCFD = int(zmq.SRCFD)
 _EVENT = struct.Struct("=HI")
@@ -38,7 +38,7 @@ class MasterRouter:
     """
 
     def __init__(self, address: str) -> None:
-        check_room(_FILES, "a master")
+        check_room(_DESCRIPTORS_NEEDED, "a master")
         self._monitor: zmq.Socket[bytes] | None = None
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.socket = self._context.socket(zmq.ROUTER)
@@ -54,7 +54,7 @@ class MasterRouter:
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
-        self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_AHEAD)
+        self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
         self.socket.copy_threshold = _LARGE_BYTES
         self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
         try:
@@ -63,12 +63,12 @@ class MasterRouter:
             self.close()
             raise AddressInUseError(address) from error
         self.address = self.socket.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
-        self._monitor = self._monitored()
+        self._monitor = self._open_monitor()
         self._senders: dict[int, bytes] = {}
         """Last sender by the number of its connection."""
         self._ended: dict[bytes, float] = {}
         """Time at which each sender's connection ended."""
-        self._newest: zmq.Frame | None = None
+        self._last_frame: zmq.Frame | None = None
         self._unread: dict[bytes, list[tuple[zmq.MessageTracker, int]]] = {}
         """Large bodies in flight by connection."""
 
@@ -78,19 +78,19 @@ class MasterRouter:
         frames = [recv(_DONTWAIT, False)]
         while frames[-1].more:
             frames.append(recv(_DONTWAIT, False))
-        self._newest = frames[0]
+        self._last_frame = frames[0]
         parts = [frame.bytes for frame in frames]
-        self._heard(frames[0], parts[0])
+        self._note_connection(frames[0], parts[0])
         return parts
 
     def peer(self) -> str:
         """Return the address of the last request's sender, or "" if it is unknown."""
         try:
-            return "" if self._newest is None else str(self._newest.get("Peer-Address"))
+            return "" if self._last_frame is None else str(self._last_frame.get("Peer-Address"))
         except zmq.ZMQError:
             return ""
 
-    def _heard(self, frame: zmq.Frame, sender: bytes) -> None:
+    def _note_connection(self, frame: zmq.Frame, sender: bytes) -> None:
         try:
             connection = frame.get(_SRCFD)
         except zmq.ZMQError:  # the connection has already ended
@@ -114,7 +114,7 @@ class MasterRouter:
             sender = self._senders.pop(_EVENT.unpack(event)[1], None)
             if sender is not None:
                 self._ended.setdefault(sender, now)
-        ended = [sender for sender, at in self._ended.items() if now - at >= _RETURN_S]
+        ended = [sender for sender, at in self._ended.items() if now - at >= _RECONNECT_S]
         for sender in ended:
             del self._ended[sender]
         return ended
@@ -141,7 +141,7 @@ class MasterRouter:
             return error.errno != zmq.EHOSTUNREACH
         return True
 
-    def _monitored(self) -> zmq.Socket[bytes]:
+    def _open_monitor(self) -> zmq.Socket[bytes]:
         # Monitor socket for disconnections.
         monitor = self._context.socket(zmq.PAIR)
         monitor.setsockopt(zmq.RCVHWM, 0)  # unlimited: libzmq's I/O thread would block on a full queue

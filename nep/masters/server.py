@@ -44,12 +44,12 @@ __all__ = ["MasterServer", "Submission"]
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
-_AWAY_S = 1.0
+_SUSPENDED_S = 1.0
 """Pause (suspended computer, large request) after which no node is judged in the next tick."""
-_REST_MS = 10
+_MAX_COLLECT_MS = 10
 _NODES_PER_MS = 50
-"""Renewals are collected for 1 ms per this number of nodes, up to `_REST_MS`."""
-_FOLLOW_S = 2.0
+"""Renewals are collected for 1 ms per this number of nodes, up to `_MAX_COLLECT_MS`."""
+_ADDRESS_CHECK_S = 2.0
 """Interval of checking this computer's addresses while other computers are served."""
 
 
@@ -88,13 +88,13 @@ class MasterServer:
         self._pending: dict[int, Submission] = {}
         self._calls = 0
         self._encoder = AnswerEncoder()
-        self._bad = BadRequests()
+        self._bad_requests = BadRequests()
         self._renewals: list[tuple[bytes, bytes, int]] = []
         """Unanswered renewals: sender, body, and time of receipt (ns since 1970)."""
-        self._tell_at = 0.0
+        self._notify_at = 0.0
         self._is_open = False
         self._closing = self._is_forked = False
-        self._told_revision = graph.revision
+        self._notified_revision = graph.revision
         self.ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="nep-master", daemon=True)
         self._listening = ListenAddresses(self._port.socket, int(self.address.rpartition(":")[2]))
@@ -151,7 +151,7 @@ class MasterServer:
             while not self._closing:
                 if self._is_open and len(polled) == 1:
                     polled.append((self._port.socket, int(zmq.POLLIN)))
-                zmq.zmq_poll(polled, self._until(tick_at))
+                zmq.zmq_poll(polled, self._poll_timeout_ms(tick_at))
                 self._waker.clear()
                 now = time.monotonic()
                 due = self._graph.learning_end
@@ -159,9 +159,9 @@ class MasterServer:
                 if is_due:
                     tick_at = now + _TICK_S
                 try:
-                    self._turn(waker, is_due=is_due)
+                    self._run_turn(waker, is_due=is_due)
                 except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
-                    self._failed(error, "something in its turn")
+                    self._log_failure(error, "its periodic work")
         finally:
             if not self._is_forked:
                 self.ended.set()
@@ -169,52 +169,52 @@ class MasterServer:
                 for submission in (*self._submitted, *self._pending.values()):
                     submission.done.set()
 
-    def _turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
+    def _run_turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
         # Requests first, then periodic work.
         self._serve_submissions()
         if self._is_open:
             self._serve_router()
-            if self._renewals and self._rest_from_renewals(waker):
+            if self._renewals and self._wait_for_more_renewals(waker):
                 self._serve_router()
             self._answer_renewals()
         now = time.monotonic()
         if is_due:
             self._tick(now)
-        self._tell_listeners(now)
+        self._notify_listeners(now)
 
-    def _failed(self, error: Exception, what: str) -> None:
+    def _log_failure(self, error: Exception, what: str) -> None:
         # Logged at increasing intervals.
         self._failures += 1
         if is_logged(self._failures):
-            sentence = "the master could not carry out %s (%d times so far)"
+            sentence = "the master failed to execute %s (%d so far)"
             _logger.error(sentence, what, self._failures, exc_info=error)
 
-    def _rest_from_renewals(self, waker: tuple[int, int]) -> bool:
+    def _wait_for_more_renewals(self, waker: tuple[int, int]) -> bool:
         # With hundreds of nodes a wake-up costs more than a reply, so renewals are collected for some ms.
-        rest_ms = min(_REST_MS, len(self._graph.members) // _NODES_PER_MS)
-        if rest_ms:
-            zmq.zmq_poll([waker], rest_ms)
-        return bool(rest_ms)
+        collect_ms = min(_MAX_COLLECT_MS, len(self._graph.members) // _NODES_PER_MS)
+        if collect_ms:
+            zmq.zmq_poll([waker], collect_ms)
+        return bool(collect_ms)
 
-    def _until(self, tick_at: float) -> int:
+    def _poll_timeout_ms(self, tick_at: float) -> int:
         due = self._graph.learning_end
         at = tick_at if due is None else min(tick_at, due)
-        if self._listeners and self._graph.revision != self._told_revision:
-            at = min(at, self._tell_at)
+        if self._listeners and self._graph.revision != self._notified_revision:
+            at = min(at, self._notify_at)
         return max(0, int((at - time.monotonic()) * 1000) + 1)
 
     def _tick(self, now: float) -> None:
-        was_away, self._ticked_at = now - self._ticked_at > _AWAY_S, now
+        was_away, self._ticked_at = now - self._ticked_at > _SUSPENDED_S, now
         if not was_away:  # otherwise this thread was late itself: renewals may still be queued
             self._send(self._graph.tick(now))
             self._send(self._graph.silent(now))
         ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
         self._send(self._graph.probes([each.node.id for each in ended if each is not None]))
-        self._graph.apply(ReportAlerts("requests", self._bad.alerts(now)), 0, now, "")
+        self._graph.apply(ReportAlerts("requests", self._bad_requests.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
         if self._listening.hosts and now >= self._follow_at:
-            self._follow_at = now + _FOLLOW_S
+            self._follow_at = now + _ADDRESS_CHECK_S
             self._report_lost_addresses()
 
     def _report_lost_addresses(self) -> None:
@@ -234,7 +234,7 @@ class MasterServer:
 
     def _serve_router(self) -> None:
         enough_at = time.monotonic() + _TICK_S
-        for _turn in range(1000):  # then other work
+        for _round in range(1000):  # then other work
             if time.monotonic() > enough_at:
                 return
             try:
@@ -242,7 +242,7 @@ class MasterServer:
             except zmq.Again:
                 return
             except zmq.ZMQError:
-                _logger.exception("the master could not read a request")
+                _logger.exception("the master failed to receive a request")
                 return
             if len(body) == 1 and is_renewal(body[0]):
                 self._renewals.append((sender, body[0], time.time_ns()))
@@ -258,31 +258,31 @@ class MasterServer:
             if answer is None:
                 self._serve(sender, [body], "")
             elif not self._port.send(sender, answer):
-                self._send(self._graph.drop(self._speaking_at(_name_of(sender))))
+                self._send(self._graph.drop(self._node_ids_at(_name_of(sender))))
 
     def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # A failing renewal takes the general path, which replies.
         try:
             return self._renew_quickly(sender, body, came_ns)
         except Exception as error:  # noqa: BLE001 - logged; other renewals go on
-            self._failed(error, "a renewal")
+            self._log_failure(error, "a renewal")
             return None
 
     def _renew_quickly(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # None if it is not a usual renewal.
-        said = read_renewal(body)
-        if said is None:
+        renewal = read_renewal(body)
+        if renewal is None:
             return None
         graph = self._graph
         now = time.monotonic()
-        last_seqs = graph.renew_quickly(said, now, _name_of(sender))
+        last_seqs = graph.renew_quickly(renewal, now, _name_of(sender))
         if last_seqs is None:
             return None
-        member = graph.members[said.node_id]
+        member = graph.members[renewal.node_id]
         clocks = graph.clocks.differences(member, now)
-        times = () if said.clock is None else graph.clocks.times(member, came_ns)
+        times = () if renewal.clock is None else graph.clocks.times(member, came_ns)
         return renewed_body(
-            said.call,
+            renewal.call,
             graph.epoch,
             graph.revision,
             last_seqs,
@@ -302,14 +302,14 @@ class MasterServer:
         if reason:
             member = self._graph.node_at(name)
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
-            self._bad.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
+            self._bad_requests.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
 
     def _apply(self, asked: ReceivedRequest, sender: str) -> str:
         # An empty sender is this process. Returns the reason of a rejection, or "".
         request, outgoing = asked.request, tuple[Outgoing, ...]()
         try:
             if isinstance(request, WireError):
-                outgoing = (Outgoing(sender, self._refused(request), asked.call),)
+                outgoing = (Outgoing(sender, self._refusal(request), asked.call),)
             elif isinstance(request, Listen):
                 outgoing = (Outgoing(sender, self._listen(request), asked.call),)
             else:
@@ -318,16 +318,16 @@ class MasterServer:
                     came_ns = time.time_ns()
                     outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
                     if isinstance(request, Renew) and request.clock is not None:
-                        outgoing = self._timed(outgoing, came_ns)
+                        outgoing = self._with_times(outgoing, came_ns)
                     self._send(outgoing)
                 return _reason_in(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
-            self._failed(error, "a request")
-            outgoing = (Outgoing(sender, self._refused(), asked.call),)
+            self._log_failure(error, "a request")
+            outgoing = (Outgoing(sender, self._refusal(), asked.call),)
         self._send(outgoing)
         return request.reason if isinstance(request, WireError) else ""
 
-    def _timed(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
+    def _with_times(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
         # Adds receipt and reply time to replies of a renewal.
         return tuple(
             each._replace(answer=replace(each.answer, times=self._graph.clocks.times(member, came_ns)))
@@ -349,13 +349,13 @@ class MasterServer:
         dead: set[str] = set()
         for each in outgoing:
             if each.call is not None and each.call < 0:
-                self._reply_inside(each)
+                self._reply_to_submission(each)
             elif not self._deliver(each, frozenset(dead)):
-                dead.update([each.to] if each.call is None else self._speaking_at(each.to))
+                dead.update([each.to] if each.call is None else self._node_ids_at(each.to))
         if dead:
             self._send(self._graph.drop(dead))
 
-    def _reply_inside(self, each: Outgoing) -> None:
+    def _reply_to_submission(self, each: Outgoing) -> None:
         submission = self._pending.pop(each.call or 0, None)
         if submission is not None:
             submission.reply = with_hosts(each.answer, self._listening.hosts)  # type: ignore[assignment]
@@ -373,33 +373,33 @@ class MasterServer:
         try:
             body = self._encoder.encode(answer, each.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
-            self._failed(error, "an answer")
+            self._log_failure(error, "an answer")
             if each.call is None:
                 return True
-            body = self._encoder.encode(self._refused(), each.call)
+            body = self._encoder.encode(self._refusal(), each.call)
         return self._port.send(route.encode("utf-8", "surrogateescape"), body)
 
-    def _speaking_at(self, route: str) -> tuple[str, ...]:
+    def _node_ids_at(self, route: str) -> tuple[str, ...]:
         member = self._graph.node_at(route)
         return () if member is None else (member.node.id,)
 
-    def _refused(self, error: WireError | None = None) -> Refused:
+    def _refusal(self, error: WireError | None = None) -> Refused:
         error = error or WireError(
             _("the master could not carry this out; its log says why"), code="internal"
         )
         return Refused(self._graph.epoch, self._graph.revision, error.reason, error.code)
 
-    def _tell_listeners(self, now: float) -> None:
+    def _notify_listeners(self, now: float) -> None:
         # Rate-limited, so that notifying takes at most a quarter of the time when many nodes join.
-        if self._listeners and self._graph.revision != self._told_revision and now >= self._tell_at:
-            self._told_revision = self._graph.revision
+        if self._listeners and self._graph.revision != self._notified_revision and now >= self._notify_at:
+            self._notified_revision = self._graph.revision
             view = replace(self._graph.view(), listens=self._listening.hosts)
             for changed in self._listeners:
                 try:
                     changed(view)
                 except Exception:  # an attachment must not stop the master
-                    _logger.exception("something attached to the master failed")
-            self._tell_at = 4.0 * time.monotonic() - 3.0 * now  # pause for three times the duration
+                    _logger.exception("an attachment of the master failed")
+            self._notify_at = 4.0 * time.monotonic() - 3.0 * now  # pause for three times the duration
 
     def _release(self) -> None:
         self._port.close()

@@ -25,7 +25,7 @@ from nep.protocol.service_wire import SURVEY, service_of
 __all__ = ["GraphViewer"]
 
 
-_NAMES = 5
+_MAX_NAMES = 5
 """Maximum number of program names in a message."""
 
 
@@ -90,7 +90,7 @@ class GraphViewer:
             subscribing = [each for each in subscribing if not each[1].record.pattern]
             heard = tuple(_subscriber_info(*each) for each in wide)
             self._patterns[name] = PatternInfo(name, wide[0][1].record.msg_type, heard)
-        return _look_at(name, publishing, subscribing) if publishing or subscribing else None
+        return _topic_info(name, publishing, subscribing) if publishing or subscribing else None
 
     def _all_alerts(self) -> Iterator[Alert]:
         yield from self._registry.reported_alerts
@@ -117,7 +117,7 @@ def _node_info(member: RegisteredNode) -> NodeInfo:
     return make_frozen(NodeInfo, every_field)
 
 
-def _look_at(
+def _topic_info(
     name: str,
     publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
     subscribing: list[tuple[RegisteredNode, RegisteredSubscriber]],
@@ -127,7 +127,7 @@ def _look_at(
     rate = bandwidth = None
     stamp_ns: int | None = None
     is_alone = len(publishing) < 2
-    counted = publishing if is_alone else _counted(publishing)
+    counted = publishing if is_alone else _rate_publishers(publishing)
     publishers, subscribers = [], []
     for entry in publishing:
         member, publisher = entry
@@ -160,7 +160,7 @@ def _look_at(
     return make_frozen(TopicInfo, every_field)
 
 
-def _counted(
+def _rate_publishers(
     publishing: list[tuple[RegisteredNode, RegisteredPublisher]],
 ) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
     # Gateway publishers repeat messages of original programs, and would count them twice.
@@ -290,14 +290,14 @@ def _topic_alerts(
         if member.node.generation != "gateway":
             types.setdefault(publisher.record.msg_type, []).append(member.node.name)
     if len(types) > 1:
-        said = [
+        parts = [
             _("{nodes} as “{kind}”").format(nodes=_names(names), kind=kind)
             for kind, names in sorted(types.items())
         ]
         yield Alert(
             f"type:{topic}",
             _("The topic “{topic}” has {count} types: it is published by {nodes}").format(
-                topic=topic, count=len(types), nodes=listed(said)
+                topic=topic, count=len(types), nodes=listed(parts)
             ),
             _("Use the same type in all programs, or give one of the topics another name."),
         )
@@ -331,8 +331,8 @@ def _names_of(registry: Registry, node_ids: Iterable[str]) -> set[str]:
 
 def _names(nodes: Iterable[str]) -> str:
     # Shortened list of names.
-    said = sorted(set(nodes))
-    names = ", ".join(f"“{name}”" for name in said[:_NAMES])
-    if len(said) <= _NAMES:
+    unique = sorted(set(nodes))
+    names = ", ".join(f"“{name}”" for name in unique[:_MAX_NAMES])
+    if len(unique) <= _MAX_NAMES:
         return names
-    return _("{names} and {count} more").format(names=names, count=len(said) - _NAMES)
+    return _("{names} and {count} more").format(names=names, count=len(unique) - _MAX_NAMES)

@@ -21,13 +21,13 @@ OFFSET_MAX_NS = 2**62
 """Maximum plausible offset of a clock: 146 years."""
 UNCERTAINTY_MAX_NS = 10_000_000_000
 """Maximum useful uncertainty of an offset."""
-_DRIFT_PARTS = 20_000
+_DRIFT_DIVISOR = 20_000
 """Reciprocal of the maximum drift between two free-running clocks: 50 µs per second."""
 
 
 def drift_ns(elapsed_ns: float) -> int:
     """Return the maximum drift of two clocks within a time."""
-    return int(max(0.0, elapsed_ns)) // _DRIFT_PARTS
+    return int(max(0.0, elapsed_ns)) // _DRIFT_DIVISOR
 
 
 def is_clock(offset_ns: int, uncertainty_ns: int) -> bool:

@@ -59,10 +59,10 @@ _BYTES = (bytes, bytearray, memoryview)
 _NUMPY = orjson.OPT_SERIALIZE_NUMPY
 _modules = sys.modules
 
-AGAIN_S = 10.0
+NAN_WARNING_INTERVAL_S = 10.0
 """Minimum interval between two warnings of a topic about NaN."""
 _logger = logging.getLogger("nep")
-_DEEPEST = 100
+_MAX_DEPTH = 100
 NULL = b"null"
 """Searched from the end: `rfind` takes half the time of `in`, which is slow with many commas and digits."""
 _PACKED_NAN = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
@@ -90,7 +90,7 @@ class Codec:
     check: Callable[[object], object]
 
 
-def _plain(value: object) -> object:
+def _plain_value(value: object) -> object:
     # Called for types unknown to orjson and msgpack; numpy values have `tolist`.
     to_list = getattr(value, "tolist", None)
     if callable(to_list):
@@ -110,11 +110,11 @@ def numpy_option() -> int:
 def _encode_json(payload: object) -> Encoded:
     option = numpy_option()
     try:
-        return encoded((_checked(orjson.dumps(payload, _plain, option), payload), None))
+        return encoded((_checked_depth(orjson.dumps(payload, _plain_value, option), payload), None))
     except TypeError:
         pass  # number keys need the slower option; other errors are raised again below
     try:
-        data = orjson.dumps(payload, _plain, option | orjson.OPT_NON_STR_KEYS)
+        data = orjson.dumps(payload, _plain_value, option | orjson.OPT_NON_STR_KEYS)
     except (TypeError, RecursionError) as error:
         # orjson's own limit is 254 levels
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
@@ -127,10 +127,10 @@ def _encode_json(payload: object) -> Encoded:
 
 def _ordinary_json(payload: object) -> bytes:
     # `numpy_option` inlined: the call would cost a tenth of the time of a small message
-    return _checked(orjson.dumps(payload, _plain, _NUMPY if "numpy" in _modules else 0), payload)
+    return _checked_depth(orjson.dumps(payload, _plain_value, _NUMPY if "numpy" in _modules else 0), payload)
 
 
-def _checked(data: bytes, payload: object) -> bytes:
+def _checked_depth(data: bytes, payload: object) -> bytes:
     if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
         raise EncodeError("json", type(payload).__name__, too_deep())
     return data
@@ -149,7 +149,7 @@ def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> 
             raise DecodeError("json", len(data), str(first)) from first
 
 
-def _anything(payload: object) -> None:
+def _accept_any(payload: object) -> None:
     # errors are detected by encoding only
     ...
 
@@ -199,7 +199,7 @@ def _decode_bytes(data: bytes | memoryview, _extension: Mapping[str, object]) ->
     return data if isinstance(data, bytes) else bytes(data)
 
 
-def _packable(value: object) -> object:
+def _packable_value(value: object) -> object:
     # Converts as JSON does, except for times.
     if isinstance(value, datetime):  # without a time zone, or of a subclass
         return msgpack.Timestamp.from_datetime(value.astimezone(timezone.utc))
@@ -213,12 +213,12 @@ def _packable(value: object) -> object:
         return {
             each.name: getattr(value, each.name) for each in fields(value) if not each.name.startswith("_")
         }
-    return _plain(value)
+    return _plain_value(value)
 
 
 def _encode_msgpack(payload: object) -> Encoded:
     try:
-        data = pack(payload, _packable)
+        data = pack(payload, _packable_value)
     except ValueError as error:
         is_deep = "recursion limit" in str(error)
         raise EncodeError("msgpack", type(payload).__name__, too_deep() if is_deep else str(error)) from error
@@ -242,11 +242,11 @@ def _decode_image(data: bytes | memoryview, extension: Mapping[str, object]) -> 
     return image_codec.decode(memoryview(data), extension)
 
 
-def _none() -> object:
+def _no_payload() -> object:
     return None
 
 
-JSON = Codec("json", 1, _encode_json, _decode_json, dict, _anything)
+JSON = Codec("json", 1, _encode_json, _decode_json, dict, _accept_any)
 
 
 STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string)
@@ -255,10 +255,10 @@ STRING = Codec("string", 2, _encode_string, _decode_string, str, _check_string)
 BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes)
 
 
-MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _anything)
+MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any)
 
 
-IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _none, image_codec.check)
+IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _no_payload, image_codec.check)
 
 
 CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
@@ -324,35 +324,35 @@ class JsonEncoder:
         self.count = 0
         self._encode = encode
         is_typed = encode is not JSON.encode
-        self._step = (
+        self._hint = (
             "readers of its type get NaN" if is_typed else "publish None there, or use the type 'msgpack'"
         )
         self._topic = topic
         self._clock = clock
-        self._told_at = -math.inf
+        self._warned_at = -math.inf
 
     def encode(self, payload: object) -> Encoded:
         """Encode a payload as JSON. Raises `EncodeError`."""
-        made = self._encode(payload)
-        data = made.data
+        encoded_payload = self._encode(payload)
+        data = encoded_payload.data
         if type(data) is bytes and data.rfind(NULL) >= 0:
             self.look(payload)
-        return made
+        return encoded_payload
 
     def look(self, payload: object) -> None:
         """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log them."""
         if _may_have_nan(payload) and (where := nan_in(payload)) is not None:
             self.count += 1
             now = self._clock()
-            if now - self._told_at >= AGAIN_S:
-                self._told_at = now
+            if now - self._warned_at >= NAN_WARNING_INTERVAL_S:
+                self._warned_at = now
                 _logger.warning(
                     "'%s' sends NaN or infinity as null, because JSON has neither: at %s, message %d of "
                     "this kind; %s",
                     self._topic,
                     where or "its only value",
                     self.count,
-                    self._step,
+                    self._hint,
                 )
 
 
@@ -364,7 +364,7 @@ def _may_have_nan(payload: object) -> bool:
         return True
 
 
-def nan_in(value: object, path: str = "", depth: int = _DEEPEST) -> str | None:
+def nan_in(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None:
     """Return the path of the first NaN or infinity, such as "pose.x" or "joints[3]", or None."""
     if isinstance(value, float):
         return None if math.isfinite(value) else path

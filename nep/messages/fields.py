@@ -16,7 +16,7 @@ MISSING = object()
 """Returned by `pick` for a missing field."""
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
-_DEEPEST = 40
+_MAX_DEPTH = 40
 _PLAIN = re.compile(r"[^.\[\]\"\s]+")
 
 
@@ -66,10 +66,10 @@ def pick(payload: object, path: Path) -> object:
 
 def path_text(path: Path) -> str:
     """Format a path; the inverse of `parse_path`."""
-    return "".join(_written(step) for step in path).removeprefix(".") or "."
+    return "".join(_format_step(step) for step in path).removeprefix(".") or "."
 
 
-def _written(step: str | int) -> str:
+def _format_step(step: str | int) -> str:
     if isinstance(step, int):
         return f"[{step}]"
     return f".{step}" if _PLAIN.fullmatch(step) else '["' + re.sub(r'(["\\])', r"\\\1", step) + '"]'
@@ -77,19 +77,19 @@ def _written(step: str | int) -> str:
 
 def leaves(payload: object, most: int = 200) -> Iterator[str]:
     """Iterate over the paths of at most `most` scalar values; values below the depth limit count as one."""
-    left = [most]
-    yield from _leaves(payload, "", left, _DEEPEST)
+    remaining = [most]
+    yield from _leaves(payload, "", remaining, _MAX_DEPTH)
 
 
-def _leaves(value: object, so_far: str, left: list[int], depth: int) -> Iterator[str]:
-    if left[0] <= 0:
+def _leaves(value: object, so_far: str, remaining: list[int], depth: int) -> Iterator[str]:
+    if remaining[0] <= 0:
         return
     if depth and isinstance(value, Mapping) and value:
         for key, each in value.items():
-            yield from _leaves(each, so_far + _written(str(key)), left, depth - 1)
+            yield from _leaves(each, so_far + _format_step(str(key)), remaining, depth - 1)
     elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
         for number, each in enumerate(value[:10]):
-            yield from _leaves(each, f"{so_far}[{number}]", left, depth - 1)
+            yield from _leaves(each, f"{so_far}[{number}]", remaining, depth - 1)
     else:
-        left[0] -= 1
+        remaining[0] -= 1
         yield so_far.removeprefix(".") or "."

@@ -24,7 +24,7 @@ class History(Generic[T]):
     def __init__(self, most: int, max_bytes: int = HISTORY_BYTES) -> None:
         self._most = most
         self._max_bytes = max_bytes
-        self._kept: deque[tuple[T, int]] = deque()
+        self._messages: deque[tuple[T, int]] = deque()
         self.size_bytes = 0
         """Total size of the payloads."""
 
@@ -32,13 +32,15 @@ class History(Generic[T]):
         """Append a message; evict the oldest beyond the limits."""
         if not self._most:
             return
-        self._kept.append((message, size_bytes))
+        self._messages.append((message, size_bytes))
         self.size_bytes += size_bytes
-        while len(self._kept) > self._most or (self.size_bytes > self._max_bytes and len(self._kept) > 1):
-            self.size_bytes -= self._kept.popleft()[1]
+        while len(self._messages) > self._most or (
+            self.size_bytes > self._max_bytes and len(self._messages) > 1
+        ):
+            self.size_bytes -= self._messages.popleft()[1]
 
     def __iter__(self) -> Iterator[T]:
-        return (message for message, _size_bytes in tuple(self._kept))
+        return (message for message, _size_bytes in tuple(self._messages))
 
     def __len__(self) -> int:
-        return len(self._kept)
+        return len(self._messages)

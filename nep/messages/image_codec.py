@@ -44,18 +44,18 @@ __all__ = [
 ]
 
 JPEG_QUALITY = 90
-WIDEST = 65_535
+MAX_WIDTH = 65_535
 """Maximum width in pixels."""
 _NEEDS = lazy("install the picture codec with: pip install 'nep-studio[image]'")
-_QUICK_PNG = [16, 1]  # IMWRITE_PNG_COMPRESSION: the fastest that compresses
-_NAMED = {
+_FAST_PNG_OPTIONS = [16, 1]  # IMWRITE_PNG_COMPRESSION: the fastest that compresses
+_NAMED_LAYOUTS = {
     "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
     "mono16": ("<u2", 1), "bgr16": ("<u2", 3), "bgra16": ("<u2", 4), "rgb16": ("<u2", 3),
     "rgba16": ("<u2", 4),
 }  # fmt: skip
 _NUMBERS = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
 _LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
-_ENCODING = {value: key for key, value in _NAMED.items() if not key.startswith("rgb")}
+_ENCODING = {value: key for key, value in _NAMED_LAYOUTS.items() if not key.startswith("rgb")}
 _TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 
@@ -81,23 +81,23 @@ class ImageFormat:
         one_of("kind", self.kind, ("auto", "jpeg", "png", "raw"))
         within("quality", self.quality, 1, 100)
         if self.width is not None:
-            within("width", self.width, 1, WIDEST)
+            within("width", self.width, 1, MAX_WIDTH)
 
     def encode(self, payload: object) -> Encoded:
         """Encode an image. Raises `EncodeError`."""
         if isinstance(payload, bytes | bytearray | memoryview):
             return encode(payload)
         try:
-            frame = self._sized(_checked(payload))
+            frame = self._scaled(_contiguous(payload))
             if self.kind == "jpeg":
                 return _as_jpeg(frame, self.quality)
             if self.kind == "png":
                 return _as_png(frame)
         except ImportError as error:
             raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
-        return _raw(frame) if self.kind == "raw" else _kept(frame, self.quality)
+        return _raw(frame) if self.kind == "raw" else _encode_default(frame, self.quality)
 
-    def _sized(self, frame: NDArray[Any]) -> NDArray[Any]:
+    def _scaled(self, frame: NDArray[Any]) -> NDArray[Any]:
         height, width = frame.shape[:2]
         if self.width is None or width <= self.width:
             return frame
@@ -146,7 +146,7 @@ def encode(payload: object) -> Encoded:
         except DecodeError as error:
             raise EncodeError("image", kind, error.reason) from error
     try:
-        return _kept(_checked(payload), JPEG_QUALITY)
+        return _encode_default(_contiguous(payload), JPEG_QUALITY)
     except ImportError as error:
         raise EncodeError("image", kind, _(_NEEDS)) from error
 
@@ -155,7 +155,7 @@ def _channels(frame: NDArray[Any]) -> int:
     return 1 if frame.ndim == 2 else int(frame.shape[2])
 
 
-def _kept(frame: NDArray[Any], quality: int) -> Encoded:
+def _encode_default(frame: NDArray[Any], quality: int) -> Encoded:
     # See the module docstring.
     if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
         return _as_jpeg(frame, quality)
@@ -177,7 +177,7 @@ def _as_png(frame: NDArray[Any]) -> Encoded:
     if not _has_png(frame):
         reason = _("a PNG has 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'")
         raise EncodeError("image", type(frame).__name__, reason)
-    return _as_file(frame, "png", _QUICK_PNG)
+    return _as_file(frame, "png", _FAST_PNG_OPTIONS)
 
 
 def raw_image(payload: object) -> Encoded:
@@ -193,7 +193,7 @@ def raw_image(payload: object) -> Encoded:
         EncodeError: The value is not an image, or numpy is not installed.
     """
     try:
-        return _raw(_checked(payload))
+        return _raw(_contiguous(payload))
     except ImportError as error:
         raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
 
@@ -235,12 +235,12 @@ def check(payload: object) -> None:
     if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
-        _picture(payload)
+        _validated(payload)
     except ImportError as error:
         raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
 
 
-def _picture(payload: object) -> NDArray[Any]:
+def _validated(payload: object) -> NDArray[Any]:
     np = _numpy()
     kind = type(payload).__name__
     if not isinstance(payload, np.ndarray):
@@ -266,10 +266,10 @@ def _picture(payload: object) -> NDArray[Any]:
     return frame
 
 
-def _checked(payload: object) -> NDArray[Any]:
+def _contiguous(payload: object) -> NDArray[Any]:
     # One channel becomes two dimensions. Raises `EncodeError`.
     np = _numpy()
-    frame = _picture(payload)
+    frame = _validated(payload)
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[:, :, 0]
     whole: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))
@@ -313,10 +313,10 @@ def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
         raise DecodeError("image", len(file.data), _("they are a picture larger than can be read")) from error
     if picture is None:
         raise DecodeError("image", len(file.data), _("they are no picture that OpenCV reads"))
-    return _turned(picture, file.orientation)
+    return _apply_orientation(picture, file.orientation)
 
 
-def _turned(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
+def _apply_orientation(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
     # Rotate and flip by the EXIF orientation.
     if orientation == 1:
         return picture
@@ -332,7 +332,7 @@ def raw_layout(encoding: object) -> RawLayout | None:
     """Return the layout of an encoding, or None if it is not raw."""
     if not isinstance(encoding, str):
         return None
-    named = _NAMED.get(encoding)
+    named = _NAMED_LAYOUTS.get(encoding)
     if named is not None:
         return RawLayout(*named, is_red_first=encoding.startswith("rgb"))
     found = _LAYOUT.fullmatch(encoding)

@@ -20,7 +20,7 @@ MOST_PIXELS = 120_000_000
 """Maximum number of pixels, beyond any camera of a robot."""
 MOST_BYTES = 750_000_000
 """Maximum memory for the pixels and the decoder's buffers."""
-_COPIES = 2
+_DECODER_COPIES = 2
 """Copies of the pixels that OpenCV holds while decoding (measured with 4.14, JPEG and PNG)."""
 MOST_SCANS = 100
 """Maximum number of scans of a progressive JPEG; encoders write about ten."""
@@ -31,24 +31,24 @@ MOST_PIECES = 100_000
 
 _JPEG = b"\xff\xd8\xff"
 _PNG = b"\x89PNG\r\n\x1a\n"
-_OTHERS = {
+_UNSUPPORTED_FORMATS = {
     b"GIF8": "GIF", b"BM": "BMP", b"RIFF": "WebP", b"II*\0": "TIFF", b"MM\0*": "TIFF", b"<svg": "SVG",
     b"<?xml": "SVG", b"\0\0\0\x0cjP": "JPEG 2000", b"\xff\x4f\xff\x51": "JPEG 2000",
     b"\x76\x2f\x31\x01": "OpenEXR", b"#?RAD": "HDR", b"P4": "PNM", b"P5": "PNM", b"P6": "PNM",
     b"P7": "PNM", b"PF": "PNM",
 }  # fmt: skip
-_FILL = re.compile(rb"\xff*")
-_ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
+_FILL_BYTES = re.compile(rb"\xff*")
+_MARKERS_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD8)})
 """JPEG markers without a length: TEM and RST."""
-_FRAMES = {0xC0: False, 0xC1: False, 0xC2: True}
+_FRAME_MARKERS = {0xC0: False, 0xC1: False, 0xC2: True}
 """Supported JPEG frame headers, and whether they are progressive. Cameras and browsers use no others."""
-_TABLES = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
+_TABLE_MARKERS = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 _SCAN, _APP1 = 0xDA, 0xE1
 _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
 """Channels of a decoded PNG by its colour type."""
 _DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
-_NEEDED = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
-_TURNED = 5
+_REQUIRED_CHUNKS = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
+_FIRST_ROTATED = 5
 """First EXIF orientation in which rows and columns are swapped."""
 
 
@@ -91,7 +91,7 @@ def examine(data: bytes | memoryview) -> ImageFile:
     size = len(file)
     if not size:
         raise DecodeError("image", 0, _("there is nothing in it"))
-    for start, name in _OTHERS.items():
+    for start, name in _UNSUPPORTED_FORMATS.items():
         if head.startswith(start):
             raise DecodeError(
                 "image", size, _("it is {name}, and only JPEG and PNG are read").format(name=name)
@@ -159,12 +159,12 @@ class _Jpeg(_Reader):
         frame, orientation, at = None, 1, 2
         for _piece in range(MOST_PIECES):
             marker, at = self._marker(at)
-            if marker in _ALONE:
+            if marker in _MARKERS_WITHOUT_LENGTH:
                 continue
             length = self.number(at, 2)
             if length < 2 or at + length > self.size:
                 raise self.broken(_("it ends too early"))
-            if marker in _FRAMES:
+            if marker in _FRAME_MARKERS:
                 if frame is not None:
                     raise self.broken(_("it has two heads"))
                 frame = self._frame(marker, at, length)
@@ -174,7 +174,7 @@ class _Jpeg(_Reader):
                 return self._checked(frame, orientation, at)
             elif marker == _APP1:
                 orientation = _orientation(self.data[at + 2 : at + length]) or orientation
-            elif marker not in _TABLES:
+            elif marker not in _TABLE_MARKERS:
                 raise self.broken(_("what 'ff{marker}' is nobody knows").format(marker=number(marker, "02x")))
             at += length
         raise self.broken(_("it has too many segments"))
@@ -183,7 +183,7 @@ class _Jpeg(_Reader):
         if self.number(at, 1) != 0xFF:
             reason = _("it ends too early") if at >= self.size else _("its segments do not follow each other")
             raise self.broken(reason)
-        found = _FILL.match(self.data, at)
+        found = _FILL_BYTES.match(self.data, at)
         at = found.end() if found is not None else at
         if at >= self.size:
             raise self.broken(_("it ends too early"))
@@ -204,11 +204,11 @@ class _Jpeg(_Reader):
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
             raise self.broken(_("its colours have no size"))
-        return _Frame(width, height, components, _FRAMES[marker], factors)
+        return _Frame(width, height, components, _FRAME_MARKERS[marker], factors)
 
     def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
         channels = 1 if frame.components == 1 else 3
-        pixel_bytes = float(_COPIES * channels)
+        pixel_bytes = float(_DECODER_COPIES * channels)
         is_refined = frame.is_refined or self.number(at + 2, 1) != frame.components
         if is_refined:  # the decoder holds all coefficients until the last scan
             pixel_bytes += frame.coefficient_bytes
@@ -222,7 +222,7 @@ class _Jpeg(_Reader):
                 )
                 raise DecodeError("image", self.size, reason)
         width, height = frame.width, frame.height
-        if orientation >= _TURNED:
+        if orientation >= _FIRST_ROTATED:
             width, height = height, width
         return ImageFile("jpeg", width, height, channels, 8, orientation, self.data)
 
@@ -263,8 +263,8 @@ class _Png(_Reader):
         needed, kinds, orientation = self._chunks()
         channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
         bits = 16 if depth == 16 else 8
-        check_size(width, height, _COPIES * channels * bits // 8, self.size)
-        if orientation >= _TURNED:
+        check_size(width, height, _DECODER_COPIES * channels * bits // 8, self.size)
+        if orientation >= _FIRST_ROTATED:
             width, height = height, width
         data = self.data
         if len(needed) > 1 or needed[0] != (8, self.size):
@@ -282,7 +282,7 @@ class _Png(_Reader):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
             if kind == b"IHDR" and kind in kinds:
                 raise self.broken(_("it has two heads"))
-            if kind in _NEEDED:
+            if kind in _REQUIRED_CHUNKS:
                 if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
                     raise self.broken(_("it ends too early"))
                 kinds.add(kind)
@@ -292,7 +292,8 @@ class _Png(_Reader):
                     needed.append((at, end))
             elif kind == b"eXIf":
                 orientation = (
-                    _orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _HEAD])) or orientation
+                    _orientation(b"Exif\0\0" + bytes(self.data[at + 8 : at + 8 + _MAX_EXIF_BYTES]))
+                    or orientation
                 )
             at = end
             if kind == b"IEND" or at + 8 > self.size:
@@ -300,13 +301,13 @@ class _Png(_Reader):
         raise self.broken(_("it has too many chunks"))
 
 
-_HEAD = 4096
+_MAX_EXIF_BYTES = 4096
 """Number of bytes of EXIF data searched for the orientation."""
 
 
 def _orientation(exif: bytes | memoryview) -> int | None:
     # None without an orientation.
-    data = bytes(exif[:_HEAD])
+    data = bytes(exif[:_MAX_EXIF_BYTES])
     if data[:6] != b"Exif\0\0" or data[6:10] not in (b"II*\0", b"MM\0*"):
         return None
     order: Literal["big", "little"] = "little" if data[6:7] == b"I" else "big"
@@ -315,6 +316,6 @@ def _orientation(exif: bytes | memoryview) -> int | None:
     count = int.from_bytes(tiff[at : at + 2], order)
     for start in range(at + 2, min(at + 2 + 12 * count, len(tiff) - 11), 12):
         if int.from_bytes(tiff[start : start + 2], order) == 0x0112:
-            told = int.from_bytes(tiff[start + 8 : start + 10], order)
-            return told if 1 <= told <= 8 else None
+            orientation = int.from_bytes(tiff[start + 8 : start + 10], order)
+            return orientation if 1 <= orientation <= 8 else None
     return None

@@ -11,8 +11,8 @@ from nep.i18n import _
 
 __all__ = ["pack", "pack_saturated", "saturated", "unpack", "unpack_bounded", "unpack_first"]
 
-_Made = TypeVar("_Made")
-_LEAST, _MOST = -(2**63), 2**64 - 1
+_Value = TypeVar("_Value")
+_MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
 
 
 def pack(value: object, default: Callable[[object], object] | None = None) -> bytes:
@@ -34,7 +34,7 @@ def saturated(value: object) -> int:
     """Return the nearest int that msgpack can encode. Raises `TypeError` for other types."""
     if not isinstance(value, int):
         raise TypeError(_("a '{kind}' has no form in msgpack").format(kind=type(value).__name__))
-    return max(_LEAST, min(_MOST, value))
+    return max(_MIN_INT, min(_MAX_INT, value))
 
 
 def pack_saturated(value: object) -> bytes:
@@ -90,7 +90,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
     """
     left = most_lists
 
-    def count(value: _Made) -> _Made:
+    def count(value: _Value) -> _Value:
         nonlocal left
         left -= 1
         if left < 0:

@@ -14,7 +14,7 @@ Keep = Literal["all", "latest"]
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
-_BRISK_S = 10e-6
+_FAST_READ_S = 10e-6
 """Time between two reads below which a reader is fast, and its batch size is doubled."""
 AHEAD_MOST = 64
 
@@ -90,16 +90,16 @@ class ReadAhead:
         self._most = max(1, min(AHEAD_MOST, max_messages))
         self.now = 1
         """Current number of messages per read."""
-        self.span_s = _BRISK_S
+        self.span_s = _FAST_READ_S
         """Time between two reads below which the reader counts as fast."""
 
     def more(self) -> int:
         """Increase and return the number of messages, for a fast reader."""
         self.now = min(2 * self.now, self._most)
-        self.span_s = self.now * _BRISK_S
+        self.span_s = self.now * _FAST_READ_S
         return self.now
 
     def begin(self) -> None:
         """Reset to one message: the reader is slow, or fewer messages were available."""
         self.now = 1
-        self.span_s = _BRISK_S
+        self.span_s = _FAST_READ_S

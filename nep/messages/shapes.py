@@ -30,9 +30,9 @@ __all__ = [
     "wrong",
 ]
 
-_LEAST, _MOST = -(1 << 63), (1 << 64) - 1
+_MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
 """Range of ints in JSON."""
-_LONGEST = 100
+_MAX_TEXT_LENGTH = 100
 """Maximum length of a key or value in a message."""
 
 
@@ -46,7 +46,7 @@ class Misfit(Exception):  # noqa: N818 - internal
 
     def inside(self, name: object) -> Misfit:
         """Add the field `name` of the enclosing value to the path, and return self."""
-        self.steps.append(f".{escaped(shortened(str(name), _LONGEST))}")
+        self.steps.append(f".{escaped(shortened(str(name), _MAX_TEXT_LENGTH))}")
         return self
 
     @property
@@ -68,7 +68,7 @@ class ValueShape:
     JSON value, `write` converts to one; both raise `Misfit`.
     """
 
-    __slots__ = ("_say", "as_it_is", "forms", "name", "read", "write")
+    __slots__ = ("_describe", "as_it_is", "forms", "name", "read", "write")
 
     read: Callable[[Any], Any]
     write: Callable[[Any], Any]
@@ -85,12 +85,12 @@ class ValueShape:
         """Python types of the values in JSON; empty for any."""
         self.as_it_is = as_it_is
         """Type whose instances are read unchanged, or None."""
-        self._say = say
+        self._describe = say
 
     @property
     def says(self) -> str:
         """Description of the expected value, such as "a 'float'", in the current language."""
-        return _("a '{name}'").format(name=self.name) if self._say is None else self._say()
+        return _("a '{name}'").format(name=self.name) if self._describe is None else self._describe()
 
 
 def wrong(value: object, says: str) -> Misfit:
@@ -105,7 +105,7 @@ def missing(shape: ValueShape) -> Misfit:
 
 def shown(value: object) -> str:
     """Return the shortened `repr` of a value for a message."""
-    return escaped(shortened(repr(value), _LONGEST))
+    return escaped(shortened(repr(value), _MAX_TEXT_LENGTH))
 
 
 # ---- scalars
@@ -154,7 +154,7 @@ def _int() -> ValueShape:
         plain = value if isinstance(value, int) else _of_numpy(value)
         if not isinstance(plain, int) or isinstance(plain, bool):
             raise wrong(value, shape.says)
-        if not _LEAST <= plain <= _MOST:
+        if not _MIN_INT <= plain <= _MAX_INT:
             raise Misfit(_("is beyond 64 bits; give {wanted}").format(wanted=shape.says))
         return int(plain)
 
@@ -212,7 +212,7 @@ def _none() -> ValueShape:
     return shape
 
 
-def _anything() -> ValueShape:
+def _any_shape() -> ValueShape:
     shape = ValueShape("Any")
 
     def both(value: object) -> object:
@@ -222,7 +222,7 @@ def _anything() -> ValueShape:
     return shape
 
 
-def _moment(kind: type[datetime | date | time]) -> ValueShape:
+def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
     shape = ValueShape(kind.__name__, forms={str})
 
     def is_one(value: object) -> bool:
@@ -257,7 +257,7 @@ _EXAMPLES: Mapping[type, str] = {
     date: "'2026-01-31'",
     time: "'12:00:00'",
 }
-ANYTHING = _anything()
+ANYTHING = _any_shape()
 SCALARS: Mapping[Any, ValueShape] = {
     float: _float(),
     int: _int(),
@@ -267,7 +267,7 @@ SCALARS: Mapping[Any, ValueShape] = {
     type(None): _none(),
     Any: ANYTHING,
     object: ANYTHING,
-    **{each: _moment(each) for each in (datetime, date, time)},
+    **{each: _datetime_shape(each) for each in (datetime, date, time)},
 }
 
 
@@ -366,15 +366,15 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
 # ---- containers
 
 
-def _each(way: Callable[[Any], Any], values: Iterable[Any], first: int = 0) -> list[Any]:
-    made: list[Any] = []
+def _convert_items(way: Callable[[Any], Any], values: Iterable[Any], first: int = 0) -> list[Any]:
+    converted: list[Any] = []
     try:
         for each in values:
-            made.append(way(each))  # noqa: PERF401 - the length gives the index for the error
+            converted.append(way(each))  # noqa: PERF401 - the length gives the index for the error
     except Misfit as misfit:
-        misfit.steps.append(f"[{first + len(made)}]")
+        misfit.steps.append(f"[{first + len(converted)}]")
         raise
-    return made
+    return converted
 
 
 def _items(value: object, says: str) -> list[Any] | tuple[Any, ...]:
@@ -392,14 +392,14 @@ def list_shape(item: ValueShape, kind: type) -> ValueShape:
     def read(value: object) -> object:
         values = _items(value, shape.says)
         # fast path for thousands of numbers; the list is copied because it may be shared
-        made = values if exact and set(map(type, values)) <= exact else _each(item.read, values)
-        return kind(made)
+        converted = values if exact and set(map(type, values)) <= exact else _convert_items(item.read, values)
+        return kind(converted)
 
     def write(value: object) -> object:
         values = _items(value, shape.says)
         if item.as_it_is is float and set(map(type, values)) <= exact:
             return list(values)
-        return _each(item.write, values)
+        return _convert_items(item.write, values)
 
     shape.read, shape.write = read, write
     return shape
@@ -413,10 +413,10 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
         values = _items(value, shape.says)
         if len(values) != len(ways):
             raise Misfit(_("has {count} values; give {wanted}").format(count=len(values), wanted=shape.says))
-        made: list[Any] = []
+        converted: list[Any] = []
         for way, part in zip(ways, values, strict=True):
-            made += _each(way, (part,), len(made))
-        return made
+            converted += _convert_items(way, (part,), len(converted))
+        return converted
 
     shape.read = lambda value: tuple(each(value, [item.read for item in items]))
     shape.write = lambda value: each(value, [item.write for item in items])
@@ -431,13 +431,13 @@ def map_shape(item: ValueShape) -> ValueShape:
     def each(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:
         if not isinstance(value, Mapping):
             raise wrong(value, shape.says)
-        made: dict[str, Any] = {}
+        converted: dict[str, Any] = {}
         for key, part in value.items():
             try:
-                made[word.write(key)] = way(part)
+                converted[word.write(key)] = way(part)
             except Misfit as misfit:
                 raise misfit.inside(key) from misfit.__cause__
-        return made
+        return converted
 
     shape.read = lambda value: each(value, item.read)
     shape.write = lambda value: each(value, item.write)

@@ -53,9 +53,9 @@ __all__ = ["OTHER_NAME", "MessageType", "TypedReader", "message_type", "typed_co
 OTHER_NAME = "nep.other_name"
 """Key of a field's metadata: an alternative name accepted in received messages."""
 
-_LONGEST = 100
+_MAX_NAME_LENGTH = 100
 """Maximum length of a name in a message."""
-_MARKS = frozenset({"Required", "NotRequired", "ReadOnly"})
+_QUALIFIERS = frozenset({"Required", "NotRequired", "ReadOnly"})
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def message_type(declared: type) -> MessageType:
             _(
                 "msg_type is the class '{name}', which is neither a dataclass nor a TypedDict; put "
                 "'@dataclass' before it"
-            ).format(name=_named(declared))
+            ).format(name=_name_of(declared))
         )
     name = text("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
     if codec_for(name) is not JSON:
@@ -153,17 +153,17 @@ class TypedReader:
         source, kinds = message.kind, self._kinds
         if kinds is None or kinds[0] is not source:
             kinds = self._kinds = (source, source._replace(decode=self._decoder(source.decode)))
-        made = new_message(Message)
-        made.kind = kinds[1]
-        made.raw = message.raw
-        made.stamp_ns = message.stamp_ns
-        made.seq = message.seq
-        made.publisher = message.publisher
-        made.extension = message.extension
-        made.decoded = UNDECODED
+        copy = new_message(Message)
+        copy.kind = kinds[1]
+        copy.raw = message.raw
+        copy.stamp_ns = message.stamp_ns
+        copy.seq = message.seq
+        copy.publisher = message.publisher
+        copy.extension = message.extension
+        copy.decoded = UNDECODED
         if hasattr(message, "seen_ns"):
-            made.seen_ns = message.seen_ns
-        return made
+            copy.seen_ns = message.seen_ns
+        return copy
 
     def _decoder(
         self, decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
@@ -188,7 +188,7 @@ class TypedReader:
 
 def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
     # `where` names the field for errors. Raises `ValueError`.
-    hint = _bare(hint)
+    hint = _unwrapped(hint)
     try:
         hash(hint)
     except TypeError:
@@ -199,9 +199,9 @@ def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape
         return _shape_of_class(hint, where, known)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Literal:
-        return _formed(literal_shape(arguments), hint, where)
+        return _require_shape(literal_shape(arguments), hint, where)
     if origin in {typing.Union, types.UnionType}:
-        return _told_apart(union_shape([_shape(each, where, known) for each in arguments]), hint, where)
+        return _require_distinct(union_shape([_shape(each, where, known) for each in arguments]), hint, where)
     if origin in {list, Sequence, Iterable}:
         return list_shape(_shape(arguments[0], where, known), list)
     if origin is tuple:
@@ -221,7 +221,7 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
         (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known)
         return shape
     if issubclass(hint, Enum):
-        return _formed(enum_shape(hint), hint, where)
+        return _require_shape(enum_shape(hint), hint, where)
     if hint in {list, tuple}:
         return list_shape(ANYTHING, hint)
     if hint is dict:
@@ -229,11 +229,11 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
     raise _no_form(hint, where)
 
 
-def _bare(hint: Any) -> Any:  # noqa: ANN401 - any annotation
+def _unwrapped(hint: Any) -> Any:  # noqa: ANN401 - any annotation
     # Strips wrappers without effect on values: `Annotated`, `NewType`, `NotRequired`, type aliases.
     while True:
         origin = typing.get_origin(hint)
-        if origin is typing.Annotated or _mark_of(hint):
+        if origin is typing.Annotated or _qualifier_of(hint):
             hint = typing.get_args(hint)[0]
         elif hasattr(hint, "__supertype__"):
             hint = hint.__supertype__
@@ -243,10 +243,10 @@ def _bare(hint: Any) -> Any:  # noqa: ANN401 - any annotation
             return hint
 
 
-def _mark_of(hint: Any) -> str:  # noqa: ANN401 - any annotation
+def _qualifier_of(hint: Any) -> str:  # noqa: ANN401 - any annotation
     # `Required` and the like, also of typing_extensions.
     name = getattr(typing.get_origin(hint), "_name", None)
-    return name if name in _MARKS else ""
+    return name if name in _QUALIFIERS else ""
 
 
 def _is_typed_dict(hint: object) -> bool:
@@ -257,18 +257,18 @@ def _is_typed_dict(hint: object) -> bool:
     return issubclass(hint, dict) and hasattr(hint, "__required_keys__")
 
 
-def _formed(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+def _require_shape(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
     if shape is None:
         raise _no_form(hint, where)
     return shape
 
 
-def _told_apart(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
+def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
     if shape is None:
         raise ValueError(
             _(
                 "{where} is a '{type}', of which two are the same in JSON; use one of them, or two fields"
-            ).format(where=where, type=_named(hint))
+            ).format(where=where, type=_name_of(hint))
         )
     return shape
 
@@ -277,13 +277,13 @@ def _no_form(hint: object, where: str) -> ValueError:
     return ValueError(
         _(
             "{where} is a '{type}', which typed messages cannot carry; docs/types.md lists what they can"
-        ).format(where=where, type=_named(hint))
+        ).format(where=where, type=_name_of(hint))
     )
 
 
-def _named(hint: object) -> str:
+def _name_of(hint: object) -> str:
     name = hint.__name__ if isinstance(hint, type) and typing.get_origin(hint) is None else str(hint)
-    return shortened(name, _LONGEST)
+    return shortened(name, _MAX_NAME_LENGTH)
 
 
 def _hints(declared: type) -> dict[str, Any]:
@@ -313,19 +313,19 @@ def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) ->
     # Raises `Misfit` for a missing required field.
     if not isinstance(value, Mapping):
         raise wrong(value, _("a map of the fields of '{name}'").format(name=whole.name))
-    made: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     name = ""
     try:
         for name, other_name, shape, is_required in entries:
             if name in value:
-                made[name] = shape.read(value[name])
+                values[name] = shape.read(value[name])
             elif other_name in value:
-                made[name] = shape.read(value[other_name])
+                values[name] = shape.read(value[other_name])
             elif is_required:
                 raise missing(shape)
     except Misfit as misfit:
         raise misfit.inside(name) from misfit.__cause__
-    return made
+    return values
 
 
 def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
@@ -336,28 +336,28 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
         where = f"{declared.__name__}.{each.name}"
         is_required = each.init and each.default is MISSING and each.default_factory is MISSING
         if not each.name.startswith("_"):
-            its = _shape(hints[each.name], where, known)
-            written.append((each.name, its))
+            field_shape = _shape(hints[each.name], where, known)
+            written.append((each.name, field_shape))
             if each.init:
                 other_name = each.metadata.get(OTHER_NAME, each.name)
-                entries.append(_Entry(each.name, other_name, its, is_required))
+                entries.append(_Entry(each.name, other_name, field_shape, is_required))
         elif is_required:
             raise ValueError(_("{where} is not sent; give it a default").format(where=where))
     _check_constructor(declared, {each.name for each in entries})
 
     def read(value: object) -> object:
-        return _made(declared, _read_fields(value, entries, shape))
+        return _construct(declared, _read_fields(value, entries, shape))
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, declared):
             raise wrong(value, shape.says)
-        made: dict[str, Any] = {}
-        for name, its in written:
+        values: dict[str, Any] = {}
+        for name, field_shape in written:
             try:
-                made[name] = its.write(getattr(value, name))
+                values[name] = field_shape.write(getattr(value, name))
             except Misfit as misfit:
                 raise misfit.inside(name) from misfit.__cause__
-        return made
+        return values
 
     shape.read, shape.write = read, write
 
@@ -374,13 +374,13 @@ def _check_constructor(declared: type, given: Collection[str]) -> None:
             )
 
 
-def _made(declared: type, given: Mapping[str, object]) -> object:
+def _construct(declared: type, given: Mapping[str, object]) -> object:
     try:
         return declared(**given)
     except Exception as error:
         raise Misfit(  # `__post_init__` may raise anything
             _("is refused by '{name}': {error}").format(
-                name=declared.__name__, error=escaped(shortened(str(error), 2 * _LONGEST))
+                name=declared.__name__, error=escaped(shortened(str(error), 2 * _MAX_NAME_LENGTH))
             )
         ) from error
 
@@ -390,7 +390,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
     entries: list[_Entry] = []
     for name, hint in hints.items():
-        mark = _mark_of(hint)  # __required_keys__ is wrong with string annotations
+        mark = _qualifier_of(hint)  # __required_keys__ is wrong with string annotations
         is_required = mark == "Required" or (name in required and mark != "NotRequired")
         shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known)
         entries.append(_Entry(name, name, shape_of_it, is_required))
@@ -399,7 +399,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):
             raise wrong(value, shape.says)
-        made: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         name: object = ""
         try:
             for name, part in value.items():
@@ -409,13 +409,13 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
                             name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
                         )
                     )
-                made[str(name)] = shapes[str(name)][0].write(part)
-            for name, (its, is_required) in shapes.items():
-                if is_required and name not in made:
-                    raise missing(its)
+                values[str(name)] = shapes[str(name)][0].write(part)
+            for name, (field_shape, is_required) in shapes.items():
+                if is_required and name not in values:
+                    raise missing(field_shape)
         except Misfit as misfit:
             raise misfit.inside(name) from misfit.__cause__
-        return made
+        return values
 
     shape.read = lambda value: _read_fields(value, entries, shape)
     shape.write = write

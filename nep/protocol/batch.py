@@ -94,11 +94,11 @@ def entries(body: bytes) -> list[BatchEntry]:
     if table.size + sum(sizes) != len(body):
         reason = _("the sizes in a batch don't match its messages")
         raise WireError(reason, len(body), code="batch-sizes")
-    made, at = [], table.size
+    found, at = [], table.size
     for number, (size, stamp_ns) in enumerate(zip(sizes, stamps, strict=True)):
-        made.append(BatchEntry(number, stamp_ns, at, at + size))
+        found.append(BatchEntry(number, stamp_ns, at, at + size))
         at += size
-    return made
+    return found
 
 
 def check_batch(header: Header, body: bytes) -> None:

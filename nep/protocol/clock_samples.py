@@ -11,10 +11,10 @@ from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
 
 __all__ = ["ClockSamples", "Moment"]
 
-_KEPT = 8
+_MAX_SAMPLES = 8
 """Number of renewals kept; the one with the shortest round trip is used."""
 _STEP_NS = 50_000
-_SLEW_PARTS = 2_000
+_SLEW_DIVISOR = 2_000
 """Reciprocal of the fastest slew of a clock; a larger change (plus `_STEP_NS`) is a step."""
 
 
@@ -59,8 +59,8 @@ class ClockSamples:
         if resolution_s is None:
             resolution_s = time.get_clock_info("time").resolution
         self._resolution_ns = int(resolution_s * 1e9)
-        self._samples: deque[_Sample] = deque(maxlen=_KEPT)
-        self._seen: Moment | None = None
+        self._samples: deque[_Sample] = deque(maxlen=_MAX_SAMPLES)
+        self._last_moment: Moment | None = None
         self.steps = 0
         """Number of detected clock steps."""
 
@@ -73,9 +73,9 @@ class ClockSamples:
         wall_ns = self._wall()
         after = self._steady()
         moment = Moment(wall_ns, (before + after) // 2, (after - before) // 2 + 1)
-        if self._seen is not None and not self._fits(self._seen, moment):
-            self._stepped()
-        self._seen = moment
+        if self._last_moment is not None and not self._is_consistent(self._last_moment, moment):
+            self._on_step()
+        self._last_moment = moment
         return moment
 
     def add(self, sent: Moment, received_ns: int, answered_ns: int, now: Moment | None = None) -> bool:
@@ -91,7 +91,7 @@ class ClockSamples:
         taken_ns = now.steady_ns - sent.steady_ns
         away_ns = taken_ns - (answered_ns - received_ns)
         is_possible = answered_ns >= received_ns and away_ns >= -now.slack_ns - sent.slack_ns
-        if not is_possible or not self._fits(sent, now):
+        if not is_possible or not self._is_consistent(sent, now):
             return False
         offset_ns = (received_ns - sent.wall_ns + answered_ns - now.wall_ns) // 2
         uncertainty_ns = max(0, away_ns) // 2 + self._resolution_ns + now.slack_ns + sent.slack_ns
@@ -102,7 +102,7 @@ class ClockSamples:
         if best is not None:
             apart_ns = abs(offset_ns - best.offset_ns)
             if apart_ns > uncertainty_ns + best.uncertainty_at(now.steady_ns):
-                self._stepped()  # contradiction: the master's clock was set
+                self._on_step()  # contradiction: the master's clock was set
         self._samples.append(sample)
         return True
 
@@ -121,12 +121,12 @@ class ClockSamples:
     def _best(self, steady_ns: int) -> _Sample | None:
         return min(self._samples, key=lambda each: each.uncertainty_at(steady_ns), default=None)
 
-    def _fits(self, then: Moment, now: Moment) -> bool:
+    def _is_consistent(self, then: Moment, now: Moment) -> bool:
         # True if both clocks advanced equally.
         by_steady = now.steady_ns - then.steady_ns
         allowed = _STEP_NS + then.slack_ns + now.slack_ns + 2 * self._resolution_ns
-        return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_PARTS
+        return abs(now.wall_ns - then.wall_ns - by_steady) <= allowed + max(0, by_steady) // _SLEW_DIVISOR
 
-    def _stepped(self) -> None:
+    def _on_step(self) -> None:
         self.steps += 1
         self._samples.clear()

@@ -92,14 +92,14 @@ _ANSWERS: Mapping[str, type[Reply | Push]] = {
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
 _ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
 _MISSING = lazy("'{field}' is missing")
-_NOT_THAT = lazy("'{field}' is a '{given}', not '{wanted}'")
-_NO_LIST = lazy("'{field}' is a '{given}', not a list")
-_NO_MAP = lazy("'{field}' is a '{given}', not a map")
+_WRONG_TYPE = lazy("'{field}' is a '{given}', not '{wanted}'")
+_NOT_A_LIST = lazy("'{field}' is a '{given}', not a list")
+_NOT_A_MAP = lazy("'{field}' is a '{given}', not a map")
 _LARGE_BYTES = 50_000
 _SMALL_BYTES = 4096
-_LISTS_MAX, _LONGEST = 50_000, 20_000
+_MAX_LISTS, _MAX_LIST_LENGTH = 50_000, 20_000
 """Limits of lists and maps in a request: a joining node has at most 5,000 records."""
-_VIEW_BEGINS = b"\x83\xa2is\xa4seen\xa2re"
+_VIEW_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
 """First bytes of a graph reply from `AnswerEncoder`."""
 
 
@@ -122,7 +122,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
         if len(body) < _SMALL_BYTES:
             envelope = _envelope(body, unpack)
         else:
-            envelope = _envelope(body, lambda body: unpack_bounded(body, _LISTS_MAX, _LONGEST))
+            envelope = _envelope(body, lambda body: unpack_bounded(body, _MAX_LISTS, _MAX_LIST_LENGTH))
         number = envelope.get("call", 0)
         # negative numbers are reserved for calls inside the master's process
         call = number if type(number) is int and number >= 0 else 0
@@ -139,30 +139,30 @@ class AnswerEncoder:
     """Encoder of replies and pushes. Caches the encoding of a graph's unchanged nodes and topics."""
 
     def __init__(self) -> None:
-        self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable).pack
+        self._pack = msgpack.Packer(use_bin_type=True, unicode_errors="replace", default=_packable_value).pack
         self._parts: dict[str, tuple[NodeInfo | TopicInfo, bytes]] = {}
 
     def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
         """Return the body of a reply to `call`, or of a push."""
         if isinstance(answer, Seen):
-            return self._seen(answer, call)
+            return self._encode_view(answer, call)
         return pack_saturated({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
 
-    def _seen(self, answer: Seen, call: int) -> bytes:
+    def _encode_view(self, answer: Seen, call: int) -> bytes:
         view = answer.view
         header = msgpack.Packer().pack_map_header
-        rest: dict[str, object] = {
+        other_fields: dict[str, object] = {
             "epoch": view.epoch,
             "revision": view.revision,
             "alerts": write(view.alerts),
             "listens": view.listens,
         }
         if view.services:  # unknown to older nodes
-            rest["services"] = write(view.services)
+            other_fields["services"] = write(view.services)
         if view.patterns:
-            rest["patterns"] = write(view.patterns)
-        nodes = [self._part(f"n{key}", key, node) for key, node in view.nodes.items()]
-        topics = [self._part(f"t{key}", key, topic) for key, topic in view.topics.items()]
+            other_fields["patterns"] = write(view.patterns)
+        nodes = [self._encode_entry(f"n{key}", key, node) for key, node in view.nodes.items()]
+        topics = [self._encode_entry(f"t{key}", key, topic) for key, topic in view.topics.items()]
         if len(self._parts) > 2 * (len(nodes) + len(topics)) + 100:
             self._parts.clear()  # many were removed
         return b"".join(
@@ -171,8 +171,8 @@ class AnswerEncoder:
                 *map(pack_saturated, ("is", "seen", "re", call, "what")),
                 header(3),
                 *map(pack_saturated, ("epoch", answer.epoch, "revision", answer.revision, "view")),
-                header(len(rest) + 2),
-                *(pack_saturated(key) + pack_saturated(item) for key, item in rest.items()),
+                header(len(other_fields) + 2),
+                *(pack_saturated(key) + pack_saturated(item) for key, item in other_fields.items()),
                 pack_saturated("nodes"),
                 header(len(nodes)),
                 *nodes,
@@ -182,18 +182,20 @@ class AnswerEncoder:
             )
         )
 
-    def _part(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
-        kept = self._parts.get(name)
+    def _encode_entry(self, name: str, key: str, value: NodeInfo | TopicInfo) -> bytes:
+        cached = self._parts.get(name)
         # unchanged topics are the same object; comparing different ones takes as long as encoding them
-        if kept is not None and (kept[0] is value or (isinstance(value, NodeInfo) and kept[0] == value)):
-            return kept[1]
+        if cached is not None and (
+            cached[0] is value or (isinstance(value, NodeInfo) and cached[0] == value)
+        ):
+            return cached[1]
         # includes default values: omitting them takes longer
         packed: bytes = self._pack(key) + self._pack(vars(value))
         self._parts[name] = (value, packed)
         return packed
 
 
-def _packable(value: object) -> object:
+def _packable_value(value: object) -> object:
     # Called for types unknown to msgpack: dataclasses, and ints beyond its range.
     return saturated(value) if isinstance(value, int) else vars(value)
 
@@ -208,10 +210,10 @@ def call_of_view(body: bytes) -> int | None:
 
     Decoding a graph of thousands of topics takes 0.1 s.
     """
-    if not body.startswith(_VIEW_BEGINS):
+    if not body.startswith(_VIEW_PREFIX):
         return None
     try:
-        number = unpack_first(body[len(_VIEW_BEGINS) : len(_VIEW_BEGINS) + 9])
+        number = unpack_first(body[len(_VIEW_PREFIX) : len(_VIEW_PREFIX) + 9])
     except ValueError:
         return None
     return number if isinstance(number, int) and number > 0 else None
@@ -348,7 +350,7 @@ def _of_plain(hint: type) -> Reader:
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
-            raise _MisfitError(_NOT_THAT, given=type(value).__name__, wanted=hint.__name__)
+            raise _MisfitError(_WRONG_TYPE, given=type(value).__name__, wanted=hint.__name__)
         return value
 
     return parse
@@ -357,7 +359,7 @@ def _of_plain(hint: type) -> Reader:
 def _of_tuple(item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, list | tuple):
-            raise _MisfitError(_NO_LIST, given=type(value).__name__)
+            raise _MisfitError(_NOT_A_LIST, given=type(value).__name__)
         return tuple([item(each) for each in value])
 
     return parse
@@ -366,7 +368,7 @@ def _of_tuple(item: Reader) -> Reader:
 def _of_mapping(key: Reader, item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, Mapping):
-            raise _MisfitError(_NO_MAP, given=type(value).__name__)
+            raise _MisfitError(_NOT_A_MAP, given=type(value).__name__)
         return {key(name): item(each) for name, each in value.items()}
 
     return parse
@@ -379,14 +381,14 @@ def _of_dataclass(kind: type) -> Reader:
         (each.name, hints[each.name] if hints[each.name] in _PLAIN else None, _reader(hints[each.name]), each)
         for each in fields(kind)
     ]
-    quickly = _quickly(kind, hints)
+    read_fast = _fast_reader(kind, hints)
 
     def parse(value: object) -> object:
-        made_quickly = quickly(value) if type(value) is dict else None
-        if made_quickly is not None:
-            return made_quickly
+        fast_value = read_fast(value) if type(value) is dict else None
+        if fast_value is not None:
+            return fast_value
         if not isinstance(value, Mapping):
-            raise _MisfitError(_NO_MAP, given=type(value).__name__)
+            raise _MisfitError(_NOT_A_MAP, given=type(value).__name__)
         found: dict[str, object] = {}
         for name, usual, reader, field in readers:
             item = value.get(name, MISSING)
@@ -405,7 +407,7 @@ def _of_dataclass(kind: type) -> Reader:
     return parse
 
 
-def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
+def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object]], object | None]:
     # Returns a function for the common case in graphs: a map of exactly the fields, each of its type. It
     # returns None for any other map, which the general parser then handles or rejects.
     plain = {name: _plain_types(hint) for name, hint in hints.items()}
@@ -415,7 +417,7 @@ def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object
     known: set[tuple[type, ...]] = set()
     """Combinations of types found valid; two for each optional field."""
 
-    def quickly(value: dict[str, object]) -> object | None:
+    def read_fast(value: dict[str, object]) -> object | None:
         if len(value) != len(plain):
             return None
         try:
@@ -432,7 +434,7 @@ def _quickly(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, object
         fresh: object = make_frozen(kind, fields_of_it)
         return fresh
 
-    return quickly
+    return read_fast
 
 
 def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is any object

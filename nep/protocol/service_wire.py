@@ -59,7 +59,7 @@ _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
 HEADER_BYTES = _HEADER.size
 _TIMEOUT_MAX_MS = 2**32 - 1
 _JSON = 1
-_CLASS_LETTERS, _REASON_LETTERS = 100, 2000
+_MAX_CLASS_LENGTH, _MAX_REASON_LENGTH = 100, 2000
 _FAILURE = b'{"nep_error":'
 
 
@@ -170,21 +170,21 @@ class _Original:
         return [b"", data]
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
-        return CallHeader(0, _JSON, None, _only(parts))
+        return CallHeader(0, _JSON, None, _single_part(parts))
 
     # not in this format
     def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
         return [b"", reply.data]
 
     def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
-        data = _only(parts)
+        data = _single_part(parts)
         is_failure = bytes(data[: len(_FAILURE)]) == _FAILURE
         name, _reason = read_failure(data) if is_failure else ("", "")
         kind = CallKind.ANSWER if not is_failure else CallKind.ERROR if name else CallKind.REFUSED
         return ReadAnswer(None, Reply(kind, data))
 
 
-def _only(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
+def _single_part(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
     if len(parts) != 2 or len(parts[0]):
         raise WireError(_("REQ and REP send an empty part and one with the payload"), code="call-parts")
     return parts[1]
@@ -199,8 +199,8 @@ ORIGINAL: Framing = _Original()
 def failure(kind: CallKind, name: str, reason: str) -> Reply:
     """Return an error reply: class name of the exception ("" for REFUSED) and message."""
     # lone surrogates become "?"
-    said = {"nep_error": _bounded(name, _CLASS_LETTERS), "reason": _bounded(reason, _REASON_LETTERS)}
-    return Reply(kind, orjson.dumps(said))
+    content = {"nep_error": _bounded(name, _MAX_CLASS_LENGTH), "reason": _bounded(reason, _MAX_REASON_LENGTH)}
+    return Reply(kind, orjson.dumps(content))
 
 
 def _bounded(text: str, most: int) -> str:
@@ -210,13 +210,13 @@ def _bounded(text: str, most: int) -> str:
 def read_failure(data: bytes | memoryview) -> tuple[str, str]:
     """Return class name and message of an error reply; accepts any untrusted data."""
     try:
-        said = orjson.loads(data)
+        content = orjson.loads(data)
     except ValueError:
-        said = None
-    if not isinstance(said, dict):
+        content = None
+    if not isinstance(content, dict):
         return "", _("the reason cannot be read")
-    name, reason = said.get("nep_error", ""), said.get("reason", "")
-    return escaped(bounded_str(name, _CLASS_LETTERS)), escaped(bounded_str(reason, _REASON_LETTERS))
+    name, reason = content.get("nep_error", ""), content.get("reason", "")
+    return escaped(bounded_str(name, _MAX_CLASS_LENGTH)), escaped(bounded_str(reason, _MAX_REASON_LENGTH))
 
 
 def check_service(name: str) -> str:

@@ -31,15 +31,15 @@ def widened(pattern: str) -> str:
 def glob_matches(pattern: str, topic: str) -> bool:
     """Return True if a topic matches a glob pattern."""
     parts = pattern.split("/")
-    at = _with_empty(parts, {0})
+    at = _skip_empty_matches(parts, {0})
     for part in topic.split("/"):
         after = {each for each in at if each < len(parts) and parts[each] == "**"}
-        after |= {each + 1 for each in at - after if each < len(parts) and _is_part(parts[each], part)}
-        at = _with_empty(parts, after)
+        after |= {each + 1 for each in at - after if each < len(parts) and _level_matches(parts[each], part)}
+        at = _skip_empty_matches(parts, after)
     return len(parts) in at
 
 
-def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
+def _skip_empty_matches(parts: Sequence[str], at: set[int]) -> set[int]:
     # Adds the positions after each reachable `**`, which may match nothing.
     found = set(at)
     for each in range(len(parts)):
@@ -48,7 +48,7 @@ def _with_empty(parts: Sequence[str], at: set[int]) -> set[int]:
     return found
 
 
-def _is_part(pattern: str, part: str) -> bool:
+def _level_matches(pattern: str, part: str) -> bool:
     # Linear backtracking to the last `*` only: a regular expression takes minutes for `*a*a*a*a*a*b`.
     at = begin = after = 0
     star = -1

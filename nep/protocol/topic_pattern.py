@@ -27,7 +27,7 @@ def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
     """Return True if levels match the levels of a pattern; see `matches`."""
     if _ANY not in parts and len(parts) != len(levels):
         return False
-    at = _with_none(parts, {0})
+    at = _skip_empty_matches(parts, {0})
     for level in levels:
         after = {each for each in at if each < len(parts) and parts[each] == _ANY}
         after |= {
@@ -35,13 +35,13 @@ def levels_match(parts: Sequence[str], levels: Sequence[str]) -> bool:
             for each in at - after
             if each < len(parts) and (parts[each] == level or (parts[each] == _ONE and level))
         }
-        at = _with_none(parts, after)
+        at = _skip_empty_matches(parts, after)
         if not at:
             return False
     return len(parts) in at
 
 
-def _with_none(parts: Sequence[str], at: set[int]) -> set[int]:
+def _skip_empty_matches(parts: Sequence[str], at: set[int]) -> set[int]:
     # Adds the positions after each reachable `**`, which may match nothing.
     found = set(at)
     for each, part in enumerate(parts):

@@ -94,7 +94,7 @@ SHARES = b"\xffshares/"
 _HEX = re.compile(rb"[0-9a-fA-F]{16}")
 """Stricter than `int`, which accepts signs and underscores."""
 _HEADER = struct.Struct("<BBHIQQQ")  # version, codec, flags, size, seq, stamp_ns, publisher
-_QUICKLY = struct.Struct("<IIQQQ")  # the first three fields in one
+_FAST_HEADER = struct.Struct("<IIQQQ")  # the first three fields in one
 SIZE_MAX = 2**32 - 1
 
 
@@ -129,14 +129,14 @@ def form_of(codec: int, flags: int) -> int:
     return VERSION | codec << 8 | flags << 16
 
 
-pack_quickly: Callable[[int, int, int, int, int], bytes] = _QUICKLY.pack
+pack_quickly: Callable[[int, int, int, int, int], bytes] = _FAST_HEADER.pack
 """Fast encoder of a header: (form, size, seq, stamp_ns, publisher). Sizes beyond `SIZE_MAX` are sent as 0."""
-unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _QUICKLY.unpack
+unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack
 """Fast decoder of a header without validation: (form, size, seq, stamp_ns, publisher).
 
 Raises `struct.error`.
 """
-unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _QUICKLY.unpack_from
+unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack_from
 """Fast decoder of a header at an offset."""
 
 
@@ -253,7 +253,7 @@ def read_part(read: Read) -> bytes:
 
 def parse_read(part: bytes) -> Read | None:
     """Parse an acknowledgement; return None for anything else."""
-    numbers = _numbers_behind(READ, part, 4)
+    numbers = _numbers_after(READ, part, 4)
     return None if numbers is None else Read(*numbers)
 
 
@@ -264,11 +264,11 @@ def shares_part(shares: Shares) -> bytes:
 
 def parse_shares(part: bytes) -> Shares | None:
     """Parse an acceptance of shared memory; return None for anything else."""
-    numbers = _numbers_behind(SHARES, part, 3)
+    numbers = _numbers_after(SHARES, part, 3)
     return None if numbers is None else Shares(*numbers)
 
 
-def _numbers_behind(begin: bytes, part: bytes, count: int) -> list[int] | None:
+def _numbers_after(begin: bytes, part: bytes, count: int) -> list[int] | None:
     words = part[len(begin) :].split(b"/")
     if not part.startswith(begin) or len(words) != count or not all(map(_HEX.fullmatch, words)):
         return None
@@ -372,13 +372,15 @@ def split_rest(
     if not rest:
         raise WireError(_("a message has 3 or 4 parts, this one has 1"), code="part-count")
     header = read_header(bytes(rest[0]))
-    wanted, there = 4 if header.flags & EXTENSION else 3, len(rest) + 1
-    if there not in {3, 4}:
-        reason = _("a message has 3 or 4 parts, this one has {there}").format(there=there)
+    expected_count, part_count = 4 if header.flags & EXTENSION else 3, len(rest) + 1
+    if part_count not in {3, 4}:
+        reason = _("a message has 3 or 4 parts, this one has {there}").format(there=part_count)
         raise WireError(reason, code="part-count")
-    if there != wanted:
+    if part_count != expected_count:
         raise WireError(
-            _("the flags require {wanted} parts, but there are {there}").format(wanted=wanted, there=there),
+            _("the flags require {wanted} parts, but there are {there}").format(
+                wanted=expected_count, there=part_count
+            ),
             code="part-count",
         )
     if header.flags & BATCH and not (is_one_part and header.flags == BATCH):

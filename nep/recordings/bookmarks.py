@@ -23,8 +23,8 @@ from nep.system.replace_file import replace_file
 __all__ = ["MOST_BOOKMARKS", "Bookmark", "Bookmarks"]
 
 MOST_BOOKMARKS = 10_000
-_MOST_BYTES = 10_000_000
-_MOST_LETTERS = 200
+_MAX_FILE_BYTES = 10_000_000
+_MAX_NAME_LENGTH = 200
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ class Bookmarks:
         for at_ns, value in recording.said("notes"):
             text = value.get("text") if isinstance(value, dict) else None
             if isinstance(text, str) and len(notes) < MOST_BOOKMARKS:
-                notes.append(Bookmark(at_ns, text[:_MOST_LETTERS], is_note=True))
+                notes.append(Bookmark(at_ns, text[:_MAX_NAME_LENGTH], is_note=True))
         self._notes = notes
-        self._made = self._read()
+        self._saved = self._read()
         self._sort()
 
     def _sort(self) -> None:
-        self._all = tuple(sorted((*self._notes, *self._made), key=_at_ns))
+        self._all = tuple(sorted((*self._notes, *self._saved), key=_at_ns))
 
     @property
     def all(self) -> Sequence[Bookmark]:
@@ -76,48 +76,48 @@ class Bookmarks:
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
         """Add a bookmark within the recording's time. Raises `RecordingError` if it can't be saved."""
-        if len(self._made) >= MOST_BOOKMARKS:
+        if len(self._saved) >= MOST_BOOKMARKS:
             reason = _("it has {most} bookmarks, and there is no room for more").format(most=MOST_BOOKMARKS)
             raise RecordingError(str(self._recording.path), reason)
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
-        made = Bookmark(at_ns, name[:_MOST_LETTERS])
-        self._keep([*self._made, made])
-        return made
+        bookmark = Bookmark(at_ns, name[:_MAX_NAME_LENGTH])
+        self._save([*self._saved, bookmark])
+        return bookmark
 
     def rename(self, bookmark: Bookmark, name: str) -> Bookmark:
         """Rename a bookmark. Raises `ValueError` for a note or an unknown bookmark, else as `add` does."""
-        new = replace(bookmark, name=name[:_MOST_LETTERS])
-        made = list(self._made)
-        made[self._place(bookmark)] = new
-        self._keep(made)
+        new = replace(bookmark, name=name[:_MAX_NAME_LENGTH])
+        saved = list(self._saved)
+        saved[self._index_of(bookmark)] = new
+        self._save(saved)
         return new
 
     def remove(self, bookmark: Bookmark) -> None:
         """Remove a bookmark. Raises as `rename` does."""
-        made = list(self._made)
-        del made[self._place(bookmark)]
-        self._keep(made)
+        saved = list(self._saved)
+        del saved[self._index_of(bookmark)]
+        self._save(saved)
 
-    def _place(self, bookmark: Bookmark) -> int:
-        if bookmark not in self._made:
+    def _index_of(self, bookmark: Bookmark) -> int:
+        if bookmark not in self._saved:
             raise ValueError(_("a note of the recording cannot be changed"))
-        return self._made.index(bookmark)
+        return self._saved.index(bookmark)
 
     # ---- on the disk
 
     def _read(self) -> list[Bookmark]:
         try:
-            if self.path.stat().st_size > _MOST_BYTES:
+            if self.path.stat().st_size > _MAX_FILE_BYTES:
                 raise ValueError("size")
-            told = orjson.loads(self.path.read_bytes())
-            return [_bookmark(each) for each in told["bookmarks"]][:MOST_BOOKMARKS]
+            content = orjson.loads(self.path.read_bytes())
+            return [_bookmark(each) for each in content["bookmarks"]][:MOST_BOOKMARKS]
         except FileNotFoundError:
             return []
         except (OSError, ValueError, TypeError, KeyError):
             self._is_damaged = True
             return []
 
-    def _keep(self, made: list[Bookmark]) -> None:
+    def _save(self, made: list[Bookmark]) -> None:
         plain = {"bookmarks": [{"at_ns": each.at_ns, "name": each.name} for each in made]}
         unfinished = self.path.with_name(f"{self.path.name}.part")
         try:
@@ -137,7 +137,7 @@ class Bookmarks:
             with suppress(OSError):
                 unfinished.unlink(missing_ok=True)
             raise disk_sentence(self.path, error) from error
-        self._made = made
+        self._saved = made
         self._sort()
 
 
@@ -147,7 +147,7 @@ def _bookmark(plain: object) -> Bookmark:
     name = plain.get("name") if isinstance(plain, dict) else None
     if type(at_ns) is not int or not 0 <= at_ns < 2**64 or not isinstance(name, str):
         raise ValueError("no bookmark")
-    return Bookmark(at_ns, name[:_MOST_LETTERS])
+    return Bookmark(at_ns, name[:_MAX_NAME_LENGTH])
 
 
 def _at_ns(bookmark: Bookmark) -> int:

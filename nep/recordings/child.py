@@ -53,11 +53,11 @@ from nep.recordings.writer import RecordingStatus, RecordingWriter
 __all__ = ["RecorderService", "main"]
 
 FIGURES_S = 1.0
-_LONGEST_LINE = 1_000_000
-_MOST_SECONDS = 1e9
+_MAX_LINE_BYTES = 1_000_000
+_MAX_SECONDS = 1e9
 SAID = ("runs", "alarms")
 """Roles accepted by "say"; the recorder itself writes the others."""
-_MOST_KEEPING = 4
+_MAX_COPIES = 4
 """Maximum number of concurrent copies of the ring: each reads and writes at the speed of the disk."""
 Tell = Callable[[Mapping[str, object]], object]
 
@@ -93,26 +93,26 @@ class RecorderService:
     ) -> None:
         """The node remains open."""
         self._clock = clock
-        self._node, self._tell_one = node, tell
+        self._node, self._report = node, tell
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
         """Held while a recording or the ring starts or stops."""
         self._recording: _OneRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
-        self._keeping: list[threading.Thread] = []
+        self._copies: list[threading.Thread] = []
         self._is_ending = False
-        self._look_now = threading.Event()
-        self._orders: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+        self._check_now = threading.Event()
+        self._commands: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
             "record": self._record,
             "stop": self._stop,
             "note": self._note,
             "say": self._say,
-            "ring": self._begin_ring,
+            "ring": self._start_ring,
             "keep": self._keep,
             "end_ring": self._end_ring,
         }
         self._figures_s = figures_s
-        self._thread = threading.Thread(target=self._tell_figures, name="recorder-figures", daemon=True)
+        self._thread = threading.Thread(target=self._report_figures, name="recorder-figures", daemon=True)
         self._thread.start()
 
     def order(self, line: bytes) -> None:
@@ -122,15 +122,15 @@ class RecorderService:
         except orjson.JSONDecodeError:
             order = None
         op = order.get("op") if isinstance(order, dict) else None
-        carry_out = self._orders.get(op) if isinstance(op, str) else None
+        carry_out = self._commands.get(op) if isinstance(op, str) else None
         if carry_out is None or not isinstance(order, dict):
             self._problem(str(op), _("that is no order"))
             return
         path = order.get("path")
         with self._lock:
-            self._guarded(str(op), path if isinstance(path, str) else "", lambda: carry_out(order))
+            self._report_errors(str(op), path if isinstance(path, str) else "", lambda: carry_out(order))
 
-    def _guarded(self, op: str, path: str, work: Callable[[], object]) -> None:
+    def _report_errors(self, op: str, path: str, work: Callable[[], object]) -> None:
         try:
             work()
         except (NepError, OSError) as error:
@@ -142,25 +142,25 @@ class RecorderService:
     def close(self) -> None:
         """Stop everything and finish the recording. Errors are reported as events, not raised."""
         self._is_ending = True
-        self._look_now.set()
+        self._check_now.set()
         self._thread.join()
-        for thread in self._keeping:
+        for thread in self._copies:
             thread.join()
         with self._lock:
-            self._guarded("stop", "", lambda: self._stop({}))
-            self._guarded("end_ring", "", lambda: self._end_ring({}))
+            self._report_errors("stop", "", lambda: self._stop({}))
+            self._report_errors("end_ring", "", lambda: self._end_ring({}))
 
     def tell(self, event: str, **content: object) -> None:
         """Report an event."""
         with self._tell_lock:
-            self._tell_one({"event": event, **content})
+            self._report({"event": event, **content})
 
     def _problem(self, op: str, sentence: str, path: str = "") -> None:
         self.tell("problem", op=op, sentence=sentence, path=path)
 
-    def _has_failed(self, _reason: str) -> None:
+    def _wake_on_failure(self, _reason: str) -> None:
         # Called by a writer thread, which can't join itself.
-        self._look_now.set()
+        self._check_now.set()
 
     # ---- commands
 
@@ -177,7 +177,7 @@ class RecorderService:
         writer = RecordingWriter(
             path,
             note=_text(order, "note", ""),
-            on_problem=self._has_failed,
+            on_problem=self._wake_on_failure,
         )
         try:
             recorder = Recorder(self._node, writer, selection)
@@ -187,7 +187,7 @@ class RecorderService:
                 Path(path).unlink()
             raise
         self._recording = _OneRecording(writer, recorder, path, until, most_bytes)
-        self._look_now.set()  # the limit may be reached before the next figures
+        self._check_now.set()  # the limit may be reached before the next figures
         self.tell("recording", path=path)
 
     def _stop(self, _order: Mapping[str, Any], limit: str = "") -> None:
@@ -211,7 +211,7 @@ class RecorderService:
         if self._ring is not None and to != "recording":
             self._ring[0].say(role, value)
 
-    def _begin_ring(self, order: Mapping[str, Any]) -> None:
+    def _start_ring(self, order: Mapping[str, Any]) -> None:
         if self._ring is not None:
             self._problem("ring", _("the flight recorder is on already"))
             return
@@ -220,7 +220,7 @@ class RecorderService:
             _text(order, "folder"),
             seconds=float(order.get("seconds", 60.0)),
             size_bytes=int(order.get("size_bytes", 2_000_000_000)),
-            on_problem=self._has_failed,
+            on_problem=self._wake_on_failure,
         )
         try:
             recorder = Recorder(self._node, ring, selection)
@@ -236,8 +236,8 @@ class RecorderService:
         if self._ring is None:
             self._problem("keep", _("the flight recorder is off"), path)
             return
-        self._keeping = [each for each in self._keeping if each.is_alive()]
-        if len(self._keeping) >= _MOST_KEEPING:
+        self._copies = [each for each in self._copies if each.is_alive()]
+        if len(self._copies) >= _MAX_COPIES:
             self._problem("keep", _("the last seconds are being kept already"), path)
             return
         ring = self._ring[0]
@@ -249,15 +249,15 @@ class RecorderService:
                 "kept", path=path, message_count=kept.message_count, duration_s=kept.duration_s, note=note
             )
 
-        work = partial(self._guarded, "keep", path, copy)
-        self._keeping.append(threading.Thread(target=work, name="recorder-keep", daemon=True))
-        self._keeping[-1].start()
+        work = partial(self._report_errors, "keep", path, copy)
+        self._copies.append(threading.Thread(target=work, name="recorder-keep", daemon=True))
+        self._copies[-1].start()
 
     def _end_ring(self, _order: Mapping[str, Any]) -> None:
         if self._ring is None:
             return
         (ring, recorder), self._ring = self._ring, None
-        for thread in self._keeping:
+        for thread in self._copies:
             thread.join()
         recorder.close()
         ring.close()
@@ -265,13 +265,13 @@ class RecorderService:
 
     # ---- once a second
 
-    def _tell_figures(self) -> None:
+    def _report_figures(self) -> None:
         while True:
-            self._look_now.wait(self._wait_s())
-            self._look_now.clear()
+            self._check_now.wait(self._wait_s())
+            self._check_now.clear()
             if self._is_ending:
                 return
-            self._end_what_is_over()
+            self._stop_finished()
             recording, ring = self._recording, self._ring
             if recording is not None or ring is not None:
                 self.tell(
@@ -288,16 +288,16 @@ class RecorderService:
             return self._figures_s
         return max(0.0, min(self._figures_s, recording.until - self._clock()))
 
-    def _end_what_is_over(self) -> None:
+    def _stop_finished(self) -> None:
         # Stops what has failed or reached its limit.
         with self._lock:
             recording = self._recording
             if recording is not None:
                 limit = recording.limit(self._clock())
                 if limit or recording.writer.problem:
-                    self._guarded("stop", recording.path, lambda: self._stop({}, limit))
+                    self._report_errors("stop", recording.path, lambda: self._stop({}, limit))
             if self._ring is not None and self._ring[0].status.problem:
-                self._guarded("end_ring", "", lambda: self._end_ring({}))
+                self._report_errors("end_ring", "", lambda: self._end_ring({}))
 
 
 def _free_bytes(path: str) -> int | None:
@@ -313,7 +313,7 @@ def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
 
 def _positive(seconds: object) -> float:
     # Raises `ValueError`.
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MOST_SECONDS:
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MAX_SECONDS:
         raise ValueError(_("{given} is no time").format(given=seconds))
     return float(seconds)
 
@@ -339,14 +339,14 @@ def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str
 def _lines(stream: IO[bytes]) -> Iterator[bytes]:
     # A line longer than any command is replaced by an empty one, which is not a command.
     is_inside = False
-    while line := stream.readline(_LONGEST_LINE):
+    while line := stream.readline(_MAX_LINE_BYTES):
         is_end = line.endswith(b"\n")
         if not is_inside:
-            yield line if is_end or len(line) < _LONGEST_LINE else b""
+            yield line if is_end or len(line) < _MAX_LINE_BYTES else b""
         is_inside = not is_end
 
 
-def _end_well_when_told() -> None:
+def _stop_on_signals() -> None:
     # SIGTERM and SIGHUP end the process as Ctrl+C does, so that the recording is finished.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
@@ -371,7 +371,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     node = Node(f"nep-recorder-{os.getpid()}", given.transport, master=given.master, wait_s=None)
     service = RecorderService(node, tell)
-    _end_well_when_told()
+    _stop_on_signals()
     service.tell("ready")
     try:
         for line in _lines(sys.stdin.buffer):

@@ -21,10 +21,10 @@ from nep.recordings.reader import Recording
 
 __all__ = ["copy_part"]
 
-_MAX_SAID = 100_000
-_SAID = frozenset({"notes", "runs", "alarms", "alerts"})
-_FLUSH_NS = 500_000_000
-_FIGURES_NS = 1_000_000_000
+_MAX_ENTRIES = 100_000
+_COPIED_ROLES = frozenset({"notes", "runs", "alarms", "alerts"})
+_FLUSH_INTERVAL_NS = 500_000_000
+_FIGURES_INTERVAL_NS = 1_000_000_000
 _OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
 
 
@@ -71,15 +71,15 @@ class _Copy:
         self._numbers: dict[int, int] = {}
         for channel, definition in recording.facts.channels.items():
             role = dict(definition.metadata).get("nep.role")
-            if role in _SAID:
+            if role in _COPIED_ROLES:
                 self._roles[channel] = role
             elif role is None and definition.topic in topics:
                 self._numbers[channel] = self._number(channel)
         self.channels = frozenset((*self._roles, *self._numbers))
         writer.define(dict.fromkeys(self._numbers.values()))
         self._figures = _Figures(recording) if recording.figures() else None
-        self._said: dict[tuple[str, str], object] = {}
-        self._said_count = 0
+        self._last_entries: dict[tuple[str, str], object] = {}
+        self._entry_count = 0
         self._chunk_ns: int | None = None
         self._last_ns = 0
 
@@ -91,7 +91,7 @@ class _Copy:
 
     def add(self, raw: RawMessage) -> None:
         if raw.channel in self._roles:
-            self._say(raw)
+            self._copy_entry(raw)
             return
         self._last_ns = raw.log_ns
         self._put(self._numbers[raw.channel], raw)
@@ -105,11 +105,11 @@ class _Copy:
         self._writer.add(number, (raw.log_ns, raw.publish_ns), raw.sequence, b"", bytes(raw.data))
         if self._chunk_ns is None:
             self._chunk_ns = raw.log_ns
-        if self._writer.pending_bytes >= CHUNK_BYTES or raw.log_ns - self._chunk_ns >= _FLUSH_NS:
+        if self._writer.pending_bytes >= CHUNK_BYTES or raw.log_ns - self._chunk_ns >= _FLUSH_INTERVAL_NS:
             self._writer.flush()
             self._chunk_ns = None
 
-    def _say(self, raw: RawMessage) -> None:
+    def _copy_entry(self, raw: RawMessage) -> None:
         # Repeated values, such as a running behaviour, are copied only when they change.
         role = self._roles[raw.channel]
         try:
@@ -118,11 +118,11 @@ class _Copy:
             return
         id = value.get("id") if isinstance(value, Mapping) else None
         if isinstance(id, str):
-            if self._said.get((role, id)) == value:
+            if self._last_entries.get((role, id)) == value:
                 return
-            self._said[role, id] = value
-        if self._said_count < _MAX_SAID:
-            self._said_count += 1
+            self._last_entries[role, id] = value
+        if self._entry_count < _MAX_ENTRIES:
+            self._entry_count += 1
             self._put(self._number(raw.channel), raw)
 
     def _write_figures(self, at_ns: int, *, is_final: bool = False) -> None:
@@ -169,13 +169,13 @@ class _Figures:
     def record(self, at_ns: int, *, is_final: bool) -> bytes | None:
         # Changed counts once a second; all of them at the end.
         if self._next_ns is None:
-            self._next_ns = at_ns + _FIGURES_NS
+            self._next_ns = at_ns + _FIGURES_INTERVAL_NS
         if not is_final and at_ns < self._next_ns:
             return None
-        self._next_ns = at_ns + _FIGURES_NS
-        told = dict(self._counters) if is_final else dict(changed(self._counters))
-        plain = {topic: each.figures().to_plain() for topic, each in told.items()}
-        for each in told.values():
+        self._next_ns = at_ns + _FIGURES_INTERVAL_NS
+        counters = dict(self._counters) if is_final else dict(changed(self._counters))
+        plain = {topic: each.figures().to_plain() for topic, each in counters.items()}
+        for each in counters.values():
             each.is_changed = False
         return orjson.dumps({"topics": plain, "is_final": is_final})
 

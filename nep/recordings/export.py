@@ -31,10 +31,10 @@ FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MOST_COLUMNS = 5_000
 MAX_FILES = 1_000
 """Maximum number of files, one per topic."""
-_MOST_ITEMS = 100
+_MAX_LIST_COLUMNS = 100
 """Maximum length of a list with a column per item; longer lists are one column of JSON."""
-_DEEPEST = 20
-_CELLS_AT_ONCE = 200_000
+_MAX_DEPTH = 20
+_CELLS_PER_BATCH = 200_000
 _FIRST_COLUMNS = ("time_ns", "time_s", "stamp_ns", "stamp_s", "seq", "publisher")
 _FPS = 30.0
 _SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "pictures": ""}
@@ -100,7 +100,7 @@ def export(
     """
     if kind not in FORMATS:
         raise ValueError(_("no format '{kind}'").format(kind=kind))
-    topics, counted = _wanted(recording, kind, part, progress)
+    topics, counted = _suitable_topics(recording, kind, part, progress)
     if kind == "mcap":
         return [_mcap(recording, folder, replace(part, topics=topics), counted)]
     make: Callable[[_Source, Path, float], int]
@@ -137,9 +137,9 @@ def takes(kind: str, codec: str) -> bool:
     return kind == "mcap" or codec in {"json", "msgpack", "string"}
 
 
-def _wanted(
+def _suitable_topics(
     recording: Recording, kind: str, part: Part, progress: Progress | None
-) -> tuple[list[str], _Counted]:
+) -> tuple[list[str], _Progress]:
     # Suitable topics that have messages. Raises `RecordingError`.
     topics = [
         name
@@ -165,7 +165,7 @@ def _wanted(
             _("it has no message that can be decoded") if is_all else _("nothing of it came in that part")
         )
         raise RecordingError(str(recording.path), reason)
-    return topics, _Counted(sum(counts.values()), progress)
+    return topics, _Progress(sum(counts.values()), progress)
 
 
 def _counts(recording: Recording, topics: list[str], part: Part) -> dict[str, int]:
@@ -202,7 +202,7 @@ def _file_name(topic: str, taken: set[str], suffix: str) -> str:
     return name + suffix
 
 
-class _Counted:
+class _Progress:
     """Progress of the whole export."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
@@ -218,7 +218,7 @@ class _Counted:
 class _Source:
     """Messages of one topic."""
 
-    def __init__(self, recording: Recording, topic: str, part: Part, counted: _Counted) -> None:
+    def __init__(self, recording: Recording, topic: str, part: Part, counted: _Progress) -> None:
         self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
         self.unreadable = 0
 
@@ -239,8 +239,8 @@ class _Source:
                 continue
             row = _times(each)
             for name, value in values.items():
-                column = _letters(name) if name not in row else f"payload.{name}"
-                row[column] = _letters(value) if isinstance(value, str) else value
+                column = _encodable(name) if name not in row else f"payload.{name}"
+                row[column] = _encodable(value) if isinstance(value, str) else value
             yield row
 
 
@@ -256,7 +256,7 @@ def _times(each: RecordedMessage) -> dict[str, object]:
     }
 
 
-def _letters(text: str) -> str:
+def _encodable(text: str) -> str:
     # JSON may contain lone surrogates, which can't be encoded.
     return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
@@ -264,7 +264,7 @@ def _letters(text: str) -> str:
 def flattened(payload: object) -> dict[str, object]:
     """Return scalar values by path, such as "pose.x" and "joints[3]", or "value" for a scalar payload."""
     made: dict[str, object] = {}
-    _flatten(payload, "", made, _DEEPEST)
+    _flatten(payload, "", made, _MAX_DEPTH)
     return made
 
 
@@ -272,7 +272,7 @@ def _flatten(value: object, path: str, made: dict[str, object], depth: int) -> N
     if isinstance(value, Mapping) and value and depth > 0:
         for key, each in value.items():
             _flatten(each, f"{path}.{key}" if path else str(key), made, depth - 1)
-    elif isinstance(value, list | tuple) and 0 < len(value) <= _MOST_ITEMS and depth > 0:
+    elif isinstance(value, list | tuple) and 0 < len(value) <= _MAX_LIST_COLUMNS and depth > 0:
         for number, each in enumerate(value):
             _flatten(each, f"{path}[{number}]", made, depth - 1)
     elif value is None or isinstance(value, bool | int | float | str):
@@ -303,7 +303,7 @@ def _columns(source: _Source) -> dict[str, set[type]]:
 # ---- MCAP
 
 
-def _mcap(recording: Recording, folder: Path, part: Part, counted: _Counted) -> Exported:
+def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) -> Exported:
     # Copies bytes, sequence numbers, times, and the recorder's own entries. Raises `RecordingError`.
     path = folder / f"{recording.path.stem}.mcap"
     unfinished = path.with_name(f"{path.name}.part")
@@ -364,7 +364,7 @@ def _parquet(source: _Source, path: Path, _fps: float) -> int:
         "text": pa.string(),
     }
     schema = pa.schema([(name, arrow[kind]) for name, kind in kinds.items()])
-    count, at_once = 0, max(1, _CELLS_AT_ONCE // len(columns))
+    count, at_once = 0, max(1, _CELLS_PER_BATCH // len(columns))
     with pq.ParquetWriter(path, schema) as writer:
         rows: list[dict[str, object]] = []
 

@@ -113,7 +113,7 @@ class RawFile(Protocol):
         """Close the file; later calls raise `ClosedError`. Idempotent."""
 
 
-class _Loaded:
+class _LoadedChunk:
     """Chunk in memory."""
 
     def __init__(self, data: bytes | memoryview) -> None:
@@ -172,9 +172,9 @@ class FileReader:
         self.path = Path(path)
         self._lock = threading.RLock()
         self._budget = budget
-        self._bad: dict[int, Damage] = {}
-        self._broken: set[int] = set()
-        self._cache: OrderedDict[int, _Loaded] = OrderedDict()
+        self._damaged: dict[int, Damage] = {}
+        self._unreadable: set[int] = set()
+        self._cache: OrderedDict[int, _LoadedChunk] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
         try:
             self._file: BinaryIO = open(self.path, "rb", buffering=65_536)  # noqa: SIM115, PTH123
@@ -186,7 +186,7 @@ class FileReader:
             self._starts = array("Q", [each.start_ns for each in self._chunks])
             self._latest_ends = array("Q")
             self._in_chunks: dict[int, array[int]] = {}
-            self._place_chunks()
+            self._index_chunks()
             self._facts = self._read_facts()
         except OSError as error:
             self._file.close()
@@ -195,7 +195,7 @@ class FileReader:
             self._file.close()
             raise
 
-    def _place_chunks(self) -> None:
+    def _index_chunks(self) -> None:
         latest = 0
         for number, chunk in enumerate(self._chunks):
             latest = max(latest, chunk.end_ns)
@@ -241,7 +241,8 @@ class FileReader:
         with self._lock:
             return tuple(
                 sorted(
-                    (*self._index.damage, *self._bad.values()), key=lambda each: (each.start_ns, each.offset)
+                    (*self._index.damage, *self._damaged.values()),
+                    key=lambda each: (each.start_ns, each.offset),
                 )
             )
 
@@ -259,33 +260,33 @@ class FileReader:
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
         """Iterate over messages of channels by log time. See `RawFile.raw`."""
-        wanted = self._wanted(start_ns, end_ns, channels, pieces)
+        numbers = self._chunks_in(start_ns, end_ns, channels, pieces)
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
-        waiting: list[tuple[int, int, RawMessage]] = []
+        pending: list[tuple[int, int, RawMessage]] = []
         order = held = 0
-        for at, number in enumerate(wanted):
-            came = [each for each in self._messages(number, channels) if first <= each.log_ns < last]
-            came.sort(key=_log_ns)  # usually sorted, which costs no time
-            following = wanted[at + 1] if at + 1 < len(wanted) else None
+        for at, number in enumerate(numbers):
+            messages = [each for each in self._messages(number, channels) if first <= each.log_ns < last]
+            messages.sort(key=_log_ns)  # usually sorted, which costs no time
+            following = numbers[at + 1] if at + 1 < len(numbers) else None
             limit = 2**64 if following is None else self._starts[following]
             held += self._size(number)
             if following is None or held + self._size(following) > _MAX_HELD_BYTES:
                 limit = 2**64
-            until = 0 if waiting else bisect_left(came, limit, key=_log_ns)
-            yield from came[:until]
-            for each in came[until:]:
+            until = 0 if pending else bisect_left(messages, limit, key=_log_ns)
+            yield from messages[:until]
+            for each in messages[until:]:
                 order += 1
-                heappush(waiting, (each.log_ns, order, each))
-            del came
-            while waiting and waiting[0][0] < limit:
-                yield heappop(waiting)[2]
-            if not waiting:
+                heappush(pending, (each.log_ns, order, each))
+            del messages
+            while pending and pending[0][0] < limit:
+                yield heappop(pending)[2]
+            if not pending:
                 held = 0
 
     def _size(self, number: int) -> int:
         return self._chunks[number].uncompressed_bytes
 
-    def _wanted(
+    def _chunks_in(
         self,
         start_ns: int | None,
         end_ns: int | None,
@@ -350,11 +351,11 @@ class FileReader:
         with self._lock:
             self._check_open()
             try:
-                told = read_entries(self._file, self._chunks[number], channel)
+                entries = read_entries(self._file, self._chunks[number], channel)
             except OSError:
-                told = None
-        if told is not None:
-            return told
+                entries = None
+        if entries is not None:
+            return entries
         return [(each.log_ns, each.offset) for each in self._messages(number, (channel,))]
 
     def _message_at(self, number: int, offset: int, channel: int) -> RawMessage | None:
@@ -364,7 +365,7 @@ class FileReader:
         record = next(messages_in(chunk.data, offset), None)
         if not isinstance(record, RawMessage) or record.channel != channel:
             return None
-        return self._owned(record, chunk)
+        return self._detached(record, chunk)
 
     # ---- counts
 
@@ -431,14 +432,14 @@ class FileReader:
         chunk = self._chunk(number)
         if chunk is not None:
             for each in chunk.messages(self._chunks[number], channels):
-                yield self._owned(each, chunk)
+                yield self._detached(each, chunk)
 
-    def _owned(self, raw: RawMessage, chunk: _Loaded) -> RawMessage:
+    def _detached(self, raw: RawMessage, chunk: _LoadedChunk) -> RawMessage:
         if len(chunk.data) <= _LARGE_CHUNK_BYTES:
             return raw
         return raw._replace(data=memoryview(bytes(raw.data)))
 
-    def _chunk(self, number: int) -> _Loaded | None:
+    def _chunk(self, number: int) -> _LoadedChunk | None:
         # None if it is damaged.
         with self._lock:
             self._check_open()
@@ -446,20 +447,20 @@ class FileReader:
             if known is not None:
                 self._cache.move_to_end(number)
                 return known
-            if number in self._broken:
+            if number in self._unreadable:
                 return None
             info = self._chunks[number]
             if self._budget is not None:
                 self._budget.spend(max(info.length, info.uncompressed_bytes))
             self._make_room(info.uncompressed_bytes)
             try:
-                made = _Loaded(read_chunk(self._file, info))
+                made = _LoadedChunk(read_chunk(self._file, info))
             except (ValueError, OSError) as error:
-                self._bad[number] = self._damage_of(info)
+                self._damaged[number] = self._damage_of(info)
                 if isinstance(error, ValueError):  # an I/O error may be temporary
-                    self._broken.add(number)
+                    self._unreadable.add(number)
                 return None
-            self._bad.pop(number, None)
+            self._damaged.pop(number, None)
             self._cache[number] = made
             self._cached_bytes += len(made.data)
             return made

@@ -21,7 +21,7 @@ __all__ = ["Container", "Film", "container_there", "frame_of"]
 
 LONGEST_S = 86_400.0
 """Maximum duration: an image of another day would lead to millions of frames."""
-_TRIED_PX = (64, 48)
+_TRIAL_SIZE_PX = (64, 48)
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a
     """
     with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
         for container in CONTAINERS:
-            writer = container.writer(opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIED_PX)
+            writer = container.writer(opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIAL_SIZE_PX)
             is_open = writer.isOpened()
             writer.release()
             if is_open:

@@ -45,12 +45,12 @@ __all__ = [
 ]
 
 SPEED_MIN, SPEED_MAX = 0.1, 10.0
-_MOST_LAG_S = 0.25
+_MAX_LAG_S = 0.25
 """Maximum backlog of a slow sink: instead of a burst the playback slows down, reported in `true_speed`."""
-_MOST_AT_ONCE = 2_000
-_MOST_WAIT_S = 0.05
-_MEASURED_S = 1.0
-_MOST_KINDS = 10_000
+_MAX_BATCH = 2_000
+_MAX_WAIT_S = 0.05
+_SPEED_WINDOW_S = 1.0
+_MAX_KINDS = 10_000
 _COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
 """Message types that move a robot or a ROS base (docs/robots.md)."""
 _MAX_DESCRIPTIONS = 10_000
@@ -117,12 +117,12 @@ class Playback:
         self._loop: tuple[int, int] | None = None
         self._position_ns = recording.start_ns
         self._anchor = (clock(), self._position_ns)
-        self._measured: deque[tuple[float, int]] = deque()
+        self._progress: deque[tuple[float, int]] = deque()
         self._jump: list[Message] | None = None
         self._shown_ns = recording.start_ns
         self._from_ns = recording.start_ns
         """Time from which no message was returned yet."""
-        self._coming: Iterator[RecordedMessage] = iter(())
+        self._upcoming: Iterator[RecordedMessage] = iter(())
         self._next: RecordedMessage | None = None
         self._read_from(recording.start_ns)
 
@@ -246,14 +246,14 @@ class Playback:
             return Due((), is_jump=False, wait_s=None)
         target = min(self._target(), self._last_ns())
         due = self._due(target)
-        if len(due) >= _MOST_AT_ONCE and self._next is not None and self._next.log_ns <= target:
+        if len(due) >= _MAX_BATCH and self._next is not None and self._next.log_ns <= target:
             self._position_ns = due[-1].log_ns
             self._anchor_here(is_measured=False)
         else:
             self._position_ns = target
         self._measure()
         if self._position_ns >= self._last_ns():
-            self._come_to_end()
+            self._handle_end()
         messages = [self._renamed(each.message) for each in due]
         return Due(messages, False, self._wait_s(), [each.log_ns for each in due])
 
@@ -265,14 +265,14 @@ class Playback:
         first_ns = self._first_ns()
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
             return ()
-        there = self._recording.read(first_ns, first_ns + 1, topics)
-        return [self._renamed(each.message) for each in there]
+        messages = self._recording.read(first_ns, first_ns + 1, topics)
+        return [self._renamed(each.message) for each in messages]
 
     def _target(self) -> int:
         now = self._clock()
         started, from_ns = self._anchor
         target = from_ns + int((now - started) * self._speed * 1e9)
-        most = self._position_ns + int(_MOST_LAG_S * self._speed * 1e9)
+        most = self._position_ns + int(_MAX_LAG_S * self._speed * 1e9)
         if target > most:
             self._anchor = (now, most)
             return most
@@ -280,9 +280,9 @@ class Playback:
 
     def _due(self, until_ns: int) -> list[RecordedMessage]:
         due: list[RecordedMessage] = []
-        while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MOST_AT_ONCE:
+        while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MAX_BATCH:
             due.append(self._next)
-            self._next = next(self._coming, None)
+            self._next = next(self._upcoming, None)
         if self._next is None or self._next.log_ns > until_ns:
             given_ns = until_ns
         else:  # several messages of one time: a cut between them repeats some
@@ -290,12 +290,12 @@ class Playback:
         self._from_ns = max(self._from_ns, given_ns + 1)
         return due
 
-    def _come_to_end(self) -> None:
+    def _handle_end(self) -> None:
         if self._is_looping and self._last_ns() > self._first_ns():
             self._show_and_read_from(self._first_ns() - 1, self._first_ns())
         elif self._next is None or self._next.log_ns > self._last_ns():
             self._is_playing = False
-            self._measured.clear()
+            self._progress.clear()
 
     def _wait_s(self) -> float | None:
         if not self._is_playing:
@@ -303,7 +303,7 @@ class Playback:
         if self._jump is not None:
             return 0.0
         ahead = self._last_ns() if self._next is None else min(self._next.log_ns, self._last_ns())
-        return max(0.0, min(_MOST_WAIT_S, (ahead - self._position_ns) / 1e9 / self._speed))
+        return max(0.0, min(_MAX_WAIT_S, (ahead - self._position_ns) / 1e9 / self._speed))
 
     def _first_ns(self) -> int:
         return self._recording.start_ns if self._loop is None else self._loop[0]
@@ -318,24 +318,24 @@ class Playback:
 
     def _read_from(self, at_ns: int) -> None:
         self._from_ns = at_ns
-        self._coming = self._recording.read(at_ns, None, self._topics)
-        self._next = next(self._coming, None)
+        self._upcoming = self._recording.read(at_ns, None, self._topics)
+        self._next = next(self._upcoming, None)
 
     def _anchor_here(self, *, is_measured: bool = True) -> None:
         self._anchor = (self._clock(), self._position_ns)
         if is_measured:
-            self._measured.clear()
+            self._progress.clear()
 
     def _measure(self) -> None:
         now = self._clock()
-        self._measured.append((now, self._position_ns))
-        while len(self._measured) > 2 and self._measured[0][0] < now - _MEASURED_S:
-            self._measured.popleft()
+        self._progress.append((now, self._position_ns))
+        while len(self._progress) > 2 and self._progress[0][0] < now - _SPEED_WINDOW_S:
+            self._progress.popleft()
 
     def _true_speed(self) -> float | None:
-        if len(self._measured) < 2:
+        if len(self._progress) < 2:
             return None
-        (started, from_ns), (now, to_ns) = self._measured[0], self._measured[-1]
+        (started, from_ns), (now, to_ns) = self._progress[0], self._progress[-1]
         return (to_ns - from_ns) / 1e9 / (now - started) if now > started else None
 
     def _renamed(self, message: Message) -> Message:
@@ -345,14 +345,14 @@ class Playback:
             return message
         known = self._kinds.get(id(message.kind))
         if known is None:
-            if len(self._kinds) >= _MOST_KINDS:
+            if len(self._kinds) >= _MAX_KINDS:
                 self._kinds.clear()
             known = self._kinds[id(message.kind)] = (message.kind, message.kind._replace(topic=new))
-        made = new_message(Message)
-        made.kind = known[1]
-        made.raw, made.stamp_ns, made.seq = message.raw, message.stamp_ns, message.seq
-        made.publisher, made.extension, made.decoded = message.publisher, message.extension, UNDECODED
-        return made
+        copy = new_message(Message)
+        copy.kind = known[1]
+        copy.raw, copy.stamp_ns, copy.seq = message.raw, message.stamp_ns, message.seq
+        copy.publisher, copy.extension, copy.decoded = message.publisher, message.extension, UNDECODED
+        return copy
 
 
 def _log_ns(each: RecordedMessage) -> int:

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Recorder", "TopicSelection"]
 
-_LOOK_S = 1.0
-_PATIENCE_S = 0.5
+_GRAPH_POLL_S = 1.0
+_MASTER_TIMEOUT_S = 0.5
 """Time limit of requests to the master, so that an absent one does not delay the recorder."""
-_MOST_KNOWN = 20_000
+_MAX_CACHED_TOPICS = 20_000
 _ALL = "**"
 
 
-class _Takes(Protocol):
+class _Writer(Protocol):
     """Writer: a `RecordingWriter` or a `FlightRecorder`."""
 
     def post(self, messages: Sequence[Message]) -> None:
@@ -86,18 +86,18 @@ class Recorder:
     def __init__(
         self,
         node: Node,
-        writer: _Takes,
+        writer: _Writer,
         selection: TopicSelection = TopicSelection(),
         *,
-        look_s: float = _LOOK_S,
+        look_s: float = _GRAPH_POLL_S,
     ) -> None:
         """Subscribe. The node remains open. Raises the exceptions of `Node.new_sub`."""
         self._node, self._writer, self._selection = node, writer, selection
         self._subscriptions = selection.subscriptions
-        self._known: dict[str, int] = {}
+        self._owners: dict[str, int] = {}
         self._subscribers: list[Subscriber] = []
         self._exact: set[str] = set()
-        self._told_alerts: object = None
+        self._last_alerts: object = None
         self._end = threading.Event()
         self._has_patterns = True
         try:
@@ -106,31 +106,33 @@ class Recorder:
         except BaseException:
             self._unsubscribe()
             raise
-        self._thread = threading.Thread(target=self._look, args=(look_s,), name="recorder-look", daemon=True)
+        self._thread = threading.Thread(
+            target=self._poll_graph, args=(look_s,), name="recorder-look", daemon=True
+        )
         self._thread.start()
 
     def _subscribe(self, number: int, topic: str) -> None:
         if is_glob(topic):
             try:
-                self._subscribers.append(self._node.new_sub(topic, sink=partial(self._take, number)))
+                self._subscribers.append(self._node.new_sub(topic, sink=partial(self._record, number)))
             except BadTopicError:  # a back end without patterns: use the names in the graph
                 self._has_patterns = False
         else:
             self._subscribers.append(
                 self._node.new_sub(
-                    topic, self._type_of(topic), sink=partial(self._take, number), wildcards=False
+                    topic, self._type_of(topic), sink=partial(self._record, number), wildcards=False
                 )
             )
 
     def _type_of(self, topic: str) -> str:
         # Subscribing with another type would cause an alert.
         with suppress(NepError):
-            known = self._node.graph(_PATIENCE_S).topics.get(topic)
+            known = self._node.graph(_MASTER_TIMEOUT_S).topics.get(topic)
             if known is not None and known.msg_type:
                 return known.msg_type
         return "json"
 
-    def _take(self, number: int, messages: Sequence[Message]) -> None:
+    def _record(self, number: int, messages: Sequence[Message]) -> None:
         # With overlapping subscriptions the first one counts.
         mine = [each for each in messages if self._owner(each.topic) == number]
         if mine:
@@ -138,30 +140,30 @@ class Recorder:
 
     def _owner(self, topic: str) -> int:
         # -1 if the topic is not selected.
-        known = self._known.get(topic)
+        known = self._owners.get(topic)
         if known is None:
-            if len(self._known) >= _MOST_KNOWN:
-                self._known.clear()
+            if len(self._owners) >= _MAX_CACHED_TOPICS:
+                self._owners.clear()
             known = -1
             if self._selection.has(topic):
                 heard = enumerate(self._subscriptions)
                 known = next((at for at, each in heard if glob_matches(each, topic)), -1)
-            self._known[topic] = known
+            self._owners[topic] = known
         return known
 
     # ---- once a second
 
-    def _look(self, look_s: float) -> None:
+    def _poll_graph(self, look_s: float) -> None:
         while not self._end.is_set():
             with suppress(NepError):
-                self._look_at(self._node.graph(_PATIENCE_S))
+                self._handle_graph(self._node.graph(_MASTER_TIMEOUT_S))
             self._end.wait(look_s)
 
-    def _look_at(self, graph: GraphView) -> None:
+    def _handle_graph(self, graph: GraphView) -> None:
         alerts = [asdict(each) for each in graph.alerts]
-        if alerts != self._told_alerts and (alerts or self._told_alerts is not None):
+        if alerts != self._last_alerts and (alerts or self._last_alerts is not None):
             self._writer.say("alerts", {"alerts": alerts})
-        self._told_alerts = alerts
+        self._last_alerts = alerts
         for name, topic in graph.topics.items():
             # descriptions are recorded in any case, unless excluded explicitly
             is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.leaves_out(name)

@@ -47,10 +47,12 @@ from nep.system.replace_file import replace_file
 __all__ = ["RepairReport", "repair", "repaired_path"]
 
 _WINDOW = 4_000_000
-_LIKE_A_CHUNK = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
+_CHUNK_PATTERN = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
 """Opcode of a chunk, and a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
-_READ_HERE = frozenset({Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA})
+_PARSED_OPCODES = frozenset(
+    {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA}
+)
 """Records parsed here; a very long one has a damaged length."""
 
 
@@ -131,15 +133,15 @@ def repair(
         raise disk_sentence(path, error) from error
     try:
         with file:
-            mending = _Mending(file, path, unfinished, progress or _no_progress)
+            repairer = _Repair(file, path, unfinished, progress or _no_progress)
             try:
-                counts = mending.run()
-                first_ns, last_ns = _read_back(unfinished, mending.writer)
+                counts = repairer.run()
+                first_ns, last_ns = _read_back(unfinished, repairer.writer)
                 if not counts.recovered:
                     raise RecordingError(str(path), _("it has no message that can be decoded"))
                 replace_file(unfinished, target)
             finally:
-                mending.writer.close()
+                repairer.writer.close()
     except OSError as error:
         raise disk_sentence(target, error) from error
     finally:
@@ -180,7 +182,7 @@ def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
     return writer.start_ns or 0, writer.end_ns
 
 
-class _Mending:
+class _Repair:
     """Repair of one file."""
 
     def __init__(
@@ -218,13 +220,13 @@ class _Mending:
                 self._others.add(place.opcode)
             if place is not None and place.opcode == Opcode.DATA_END:
                 break
-            if place is not None and self._take(place):
+            if place is not None and self._copy(place):
                 offset += HEAD_BYTES + place.length
                 continue
-            offset = self._beyond_damage(offset)
+            offset = self._skip_damage(offset)
         else:
             self._discard_bytes(max(0, self._size - offset))
-        self._end()
+        self._finish()
         self._progress(self._size, self._size)
         return self._counts
 
@@ -235,26 +237,26 @@ class _Mending:
         known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
         return Place(offset, opcode, length) if known and length < 2**39 else None
 
-    def _take(self, place: Place) -> bool:
+    def _copy(self, place: Place) -> bool:
         # False if it is not a whole record.
         end = place.offset + HEAD_BYTES + place.length
         if end > self._size:
             return False
         if place.opcode == Opcode.CHUNK:
-            return self._take_chunk(place)
+            return self._copy_chunk_at(place)
         most = MOST_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MOST_SMALL_BYTES
-        if place.opcode in _READ_HERE and place.length > most:
+        if place.opcode in _PARSED_OPCODES and place.length > most:
             return False
         if place.opcode == Opcode.MESSAGE_INDEX:
-            self._take_index(place)
+            self._count_lost(place)
         elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             self._define(place.opcode, self._content(place))
         elif place.opcode == Opcode.METADATA:
-            self._take_metadata(self._content(place))
+            self._copy_metadata(self._content(place))
         elif place.opcode == Opcode.MESSAGE:
             self._file.seek(place.offset)
             for record in messages_in(self._file.read(end - place.offset)):
-                self._take_record(record)
+                self._copy_record(record)
         return self._is_record_at(end)
 
     def _is_record_at(self, offset: int) -> bool:
@@ -271,7 +273,7 @@ class _Mending:
         for number in self._definitions.add(opcode, content):
             self._table.put(number, self._definitions.channels[number])
 
-    def _take_metadata(self, content: bytes) -> None:
+    def _copy_metadata(self, content: bytes) -> None:
         try:
             made = read_record("Metadata", content)
         except ValueError:
@@ -287,7 +289,7 @@ class _Mending:
 
     # ---- chunks
 
-    def _take_chunk(self, place: Place) -> bool:
+    def _copy_chunk_at(self, place: Place) -> bool:
         self._file.seek(place.offset)
         head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
         self._damaged_chunk = None
@@ -307,10 +309,10 @@ class _Mending:
             self._discard_bytes(HEAD_BYTES + place.length)
             return True
         self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
-        self._keep_chunk(record, head, chunk)
+        self._copy_chunk(record, head, chunk)
         return True
 
-    def _keep_chunk(self, record: memoryview, head: ChunkHead, chunk: bytes | memoryview) -> None:
+    def _copy_chunk(self, record: memoryview, head: ChunkHead, chunk: bytes | memoryview) -> None:
         # Copied unchanged if it contains only messages of known channels.
         indexes: dict[int, list[int]] = {}
         is_plain = True
@@ -322,7 +324,7 @@ class _Mending:
             self._read_own(each)
         if not is_plain or not indexes:
             for each in messages_in(chunk):
-                self._take_record(each)
+                self._copy_record(each)
             return
         info = ChunkInfo(
             head.start_ns,
@@ -341,7 +343,7 @@ class _Mending:
             len(entries) // 2 for number, entries in indexes.items() if not self._is_own(number)
         )
 
-    def _take_record(self, record: RawMessage | tuple[int, memoryview]) -> None:
+    def _copy_record(self, record: RawMessage | tuple[int, memoryview]) -> None:
         # From outside of chunks, or from a chunk that can't be copied unchanged.
         if not isinstance(record, RawMessage):
             self._define(*record)
@@ -372,7 +374,7 @@ class _Mending:
         with suppress(orjson.JSONDecodeError, AttributeError):
             self._counts.figures.update(orjson.loads(record.data).get("topics", {}))
 
-    def _take_index(self, place: Place) -> None:
+    def _count_lost(self, place: Place) -> None:
         # The index of a damaged chunk has the number of its lost messages.
         if self._damaged_chunk is None:
             return
@@ -388,13 +390,13 @@ class _Mending:
     def _discard_bytes(self, count: int) -> None:
         self._counts.discarded_bytes += count
 
-    def _beyond_damage(self, offset: int) -> int:
+    def _skip_damage(self, offset: int) -> int:
         # Returns the offset to continue at. Keeps whole messages of a chunk truncated by the end of the file.
         found = next(self._whole_chunks(offset + 1), None)
         self._counts.damaged_places += 1
         self._counts.is_unknown = True
         if found is None:
-            kept = self._take_cut_chunk(offset)
+            kept = self._copy_truncated_chunk(offset)
             self._discard_bytes(self._size - offset - kept)
             return self._size
         self._discard_bytes(found - offset)
@@ -408,7 +410,7 @@ class _Mending:
         while offset + CHUNK_HEAD_BYTES <= self._size:
             self._file.seek(offset)
             window = self._file.read(_WINDOW)
-            for match in _LIKE_A_CHUNK.finditer(window):
+            for match in _CHUNK_PATTERN.finditer(window):
                 at = match.start()
                 _opcode, length = RECORD_HEAD.unpack_from(window, at)
                 if offset + at + HEAD_BYTES + length > self._size:
@@ -435,7 +437,7 @@ class _Mending:
             return False
         return True
 
-    def _take_cut_chunk(self, offset: int) -> int:
+    def _copy_truncated_chunk(self, offset: int) -> int:
         # Returns the number of its bytes in the file.
         self._file.seek(offset)
         begin = self._file.read(CHUNK_HEAD_BYTES)
@@ -454,12 +456,12 @@ class _Mending:
                 is_plausible = head.start_ns <= each.log_ns <= head.end_ns
                 if not is_plausible or each.channel not in self._definitions.channels:
                     break
-            self._take_record(each)
+            self._copy_record(each)
         return len(record) if self._counts.recovered > before else 0
 
     # ---- finishing
 
-    def _end(self) -> None:
+    def _finish(self) -> None:
         counts, writer = self._counts, self.writer
         writer.flush()
         words = dict(counts.words)

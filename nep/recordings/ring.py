@@ -41,10 +41,10 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightRecorder", "KeptRecording", "RingStatus"]
 
-_SEGMENTS = 8
+_SEGMENT_COUNT = 8
 """Number of segments of a full ring."""
 _PREFIX = "ring-"
-_MOST_SECONDS = 1e9
+_MAX_SECONDS = 1e9
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class _Segments:
         self._lock = threading.Lock()
         self._number = 0
         folder.mkdir(parents=True, exist_ok=True)
-        _remove_left_behind(folder)
+        _remove_stale_segments(folder)
         self._all: list[_Segment] = [self._new()]
 
     def _new(self) -> _Segment:
@@ -107,25 +107,25 @@ class _Segments:
         writer = self._all[-1].writer
         if writer.start_ns is None:
             return
-        is_old = writer.end_ns - writer.start_ns >= self._span_ns // _SEGMENTS
-        if is_old or writer.size_bytes >= self._size_bytes // _SEGMENTS:
+        is_old = writer.end_ns - writer.start_ns >= self._span_ns // _SEGMENT_COUNT
+        if is_old or writer.size_bytes >= self._size_bytes // _SEGMENT_COUNT:
             new = self._new()
             with self._lock:
                 self._all.append(new)
             writer.close()
         with self._lock:
-            self._trim()
+            self._trim_locked()
 
-    def _trim(self) -> None:
+    def _trim_locked(self) -> None:
         newest = max(each.writer.end_ns for each in self._all)
         while len(self._all) > 1:
             oldest = self._all[0]
             total = sum(each.writer.size_bytes for each in self._all)
             if oldest.writer.end_ns >= newest - self._span_ns and total <= self._size_bytes:
                 return
-            self._remove_oldest()
+            self._remove_oldest_locked()
 
-    def _remove_oldest(self) -> None:
+    def _remove_oldest_locked(self) -> None:
         oldest = self._all.pop(0)
         oldest.is_unwanted = True
         if not oldest.users:
@@ -139,7 +139,7 @@ class _Segments:
                     raise RecordingError(str(self._folder), _("the disk is full"))
                 if self._all[0].users:  # removing it would free nothing until the copy is done
                     return
-                self._remove_oldest()
+                self._remove_oldest_locked()
 
     is_full = False
     """Always False: segments are removed as a whole and have no counts of their own."""
@@ -162,15 +162,15 @@ class _Segments:
         with self._lock:
             starts = [each.writer.start_ns for each in self._all if each.writer.start_ns is not None]
             size = sum(each.writer.size_bytes for each in self._all)
-            return (self._newest() - min(starts)) / 1e9 if starts else 0.0, size
+            return (self._newest_ns_locked() - min(starts)) / 1e9 if starts else 0.0, size
 
-    def _newest(self) -> int:
+    def _newest_ns_locked(self) -> int:
         return max(each.writer.end_ns for each in self._all)
 
     def take(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
         # `give_back` must follow.
         with self._lock:
-            since = self._newest() - int(seconds * 1e9)
+            since = self._newest_ns_locked() - int(seconds * 1e9)
             taken = []
             for segment in self._all:
                 chunks = [each for each in segment.writer.chunks or () if each.end_ns >= since]
@@ -192,7 +192,7 @@ def _remove(path: Path) -> None:
         path.unlink()
 
 
-def _remove_left_behind(folder: Path) -> None:
+def _remove_stale_segments(folder: Path) -> None:
     # Of processes that have ended.
     for each in folder.glob(f"{_PREFIX}*-*.mcap"):
         pid = each.name.removeprefix(_PREFIX).split("-")[0]
@@ -232,7 +232,7 @@ class FlightRecorder:
             RecordingError: The folder can't be written.
             ValueError: `seconds` or `size_bytes` is not positive.
         """
-        if not 0.0 < seconds < _MOST_SECONDS or size_bytes < 1:
+        if not 0.0 < seconds < _MAX_SECONDS or size_bytes < 1:
             raise ValueError(_("a ring has more than 0 seconds and bytes"))
         path = Path(folder)
         self._clock = LogClock() if clock is None else clock
@@ -274,7 +274,7 @@ class FlightRecorder:
             RecordingError: No message was received yet, or the file can't be written.
             ValueError: `seconds` is not positive.
         """
-        if not 0.0 < seconds < _MOST_SECONDS:
+        if not 0.0 < seconds < _MAX_SECONDS:
             raise ValueError(_("a ring has more than 0 seconds and bytes"))
         target = Path(path)
         if not self._writer.flush():
@@ -283,7 +283,7 @@ class FlightRecorder:
         if not taken:
             raise RecordingError(str(target), _("no message has come yet"))
         try:
-            return self._copied(target, taken, note)
+            return self._copy_segments(target, taken, note)
         except FileExistsError:
             raise RecordingError(
                 str(target), _("there is such a file already; choose another name")
@@ -293,12 +293,12 @@ class FlightRecorder:
         finally:
             self._segments.give_back(taken)
 
-    def _copied(
+    def _copy_segments(
         self, target: Path, taken: Sequence[tuple[_Segment, list[ChunkInfo]]], note: str
     ) -> KeptRecording:
         writer = FileWriter(target, self._segments.table)
         try:
-            figures = _FiguresSince(self._segments.table)
+            figures = _FiguresInChunks(self._segments.table)
             damaged = 0
             for segment, chunks in taken:
                 with segment.path.open("rb") as file:
@@ -333,7 +333,7 @@ class FlightRecorder:
         self.close()
 
 
-def _copy(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _FiguresSince) -> bool:
+def _copy(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _FiguresInChunks) -> bool:
     # False if it was damaged on disk. Raises `OSError`.
     file.seek(chunk.offset)
     record = memoryview(file.read(chunk.length))
@@ -362,7 +362,7 @@ def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-class _FiguresSince:
+class _FiguresInChunks:
     """Counts within some chunks: the ring's own counts start with the ring."""
 
     def __init__(self, table: ChannelTable) -> None:

@@ -42,9 +42,9 @@ __all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 MOST_ONES_CHANNELS = 10_000
 """Number of channels beyond which new publishers share a channel per topic."""
 _CLOSE_S = 30.0
-_KNOWN = 10_000
+_MAX_CACHED_KINDS = 10_000
 _MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
-_OTHERS = ""
+_OTHER_TOPICS = ""
 """Key of the counter for all topics beyond the limit."""
 _log = logging.getLogger("nep.recordings")
 
@@ -87,7 +87,7 @@ class RecordingStatus:
 
 
 @dataclass
-class _Known:
+class _KindCache:
     """Cached properties of a publisher's messages, by their `MessageKind`."""
 
     kind: MessageKind
@@ -96,7 +96,7 @@ class _Known:
     channels: dict[tuple[str, bool, bool], int] = field(default_factory=dict)
 
 
-class _Said:
+class _Entry:
     """Entry of the recorder's own."""
 
     __slots__ = ("role", "text")
@@ -194,21 +194,21 @@ class RecordingWriter:
         self._limits = limits
         self._on_problem = on_problem
         self._lock = threading.Condition()
-        self._queue: deque[tuple[int, Sequence[Message]] | _Said] = deque()
+        self._queue: deque[tuple[int, Sequence[Message]] | _Entry] = deque()
         self._queued_bytes = self._queued_messages = 0
-        self._left_out: dict[tuple[str, int | None], list[int]] = {}
+        self._dropped_counts: dict[tuple[str, int | None], list[int]] = {}
         self._flush_wanted = self._flush_done = 0
         self._is_closing = self._has_ended = False
         self._problem = ""
         self._last_ns = 0
         self._counters: dict[str, TopicCounter] = {}
-        self._known: dict[int, _Known] = {}
+        self._known: dict[int, _KindCache] = {}
         self._figures: dict[str, TopicFigures] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
         self._part = _Part()
         self._own_numbers: set[int] = set()
-        self._rest: list[Sequence[Message]] = []
+        self._unwritten: list[Sequence[Message]] = []
         """Messages taken from the queue but not added to the file when writing failed."""
         self._message_count = self._size_bytes = 0
         self._thread = threading.Thread(target=self._run, name="recording-writer", daemon=True)
@@ -229,14 +229,14 @@ class RecordingWriter:
                 or self._queued_messages + len(messages) > self._limits.queue_messages
             )
             if self._is_closing or self._problem or is_full:
-                self._post_what_fits(messages, now, may_fit=not (self._is_closing or self._problem))
+                self._post_part_locked(messages, now, may_fit=not (self._is_closing or self._problem))
                 return
             self._queue.append((now, messages))
             self._queued_bytes += size
             self._queued_messages += len(messages)
             self._lock.notify_all()
 
-    def _post_what_fits(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
+    def _post_part_locked(self, messages: Sequence[Message], now: int, *, may_fit: bool) -> None:
         # Called with the lock held, when there is not room for all.
         fits = []
         for message in messages:
@@ -251,9 +251,9 @@ class RecordingWriter:
                 self._queued_messages += 1
                 continue
             key = (message.topic, message.publisher)
-            if key not in self._left_out and len(self._left_out) >= MOST_TOPICS:
-                key = (_OTHERS, None)
-            count = self._left_out.setdefault(key, [0, 0])
+            if key not in self._dropped_counts and len(self._dropped_counts) >= MOST_TOPICS:
+                key = (_OTHER_TOPICS, None)
+            count = self._dropped_counts.setdefault(key, [0, 0])
             count[0] += 1
             count[1] += size
         if fits:
@@ -268,7 +268,7 @@ class RecordingWriter:
                 not (self._is_closing or self._problem)
                 and self._queued_messages < self._limits.queue_messages
             ):
-                self._queue.append(_Said(role, text))
+                self._queue.append(_Entry(role, text))
                 self._queued_bytes += len(text)
                 self._queued_messages += 1
                 self._lock.notify_all()
@@ -289,7 +289,7 @@ class RecordingWriter:
         """Current state; counts by topic are at most a second old."""
         with self._lock:
             first = self._first_ns
-            waiting = sum(count for count, _size in self._left_out.values())
+            waiting = sum(count for count, _size in self._dropped_counts.values())
             return RecordingStatus(
                 self._message_count,
                 self._size_bytes,
@@ -334,9 +334,9 @@ class RecordingWriter:
         except OSError as error:
             self._fail(disk_sentence(self._destination.file.path, error))
         except RecordingError as error:
-            self._end_early(error)
+            self._finish_early(error)
         except Exception as error:  # noqa: BLE001 - any error must be reported as the end of the recording
-            _log.exception("a recording has ended by an error of nep's own")
+            _log.exception("a recording stopped because of an internal error")
             self._fail(
                 RecordingError(
                     str(self._destination.file.path),
@@ -375,9 +375,9 @@ class RecordingWriter:
             if is_closing and not self._queue:
                 return
 
-    def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Said]) -> None:
+    def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Entry]) -> None:
         for number, part in enumerate(batch):
-            if isinstance(part, _Said):
+            if isinstance(part, _Entry):
                 self._write_own(part.role, part.text)
                 size, count = len(part.text), 1
             else:
@@ -388,9 +388,9 @@ class RecordingWriter:
                     try:
                         self._write_message(message, self._log_ns(message, now))
                     except Exception:
-                        self._rest = [
+                        self._unwritten = [
                             messages[at + 1 :],
-                            *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Said)),
+                            *(each[1] for each in batch[number + 1 :] if not isinstance(each, _Entry)),
                         ]
                         raise
             with self._lock:
@@ -412,7 +412,7 @@ class RecordingWriter:
     def _write_message(self, message: Message, log_ns: int) -> None:
         known = self._known.get(id(message.kind))
         if known is None or known.publisher != message.publisher:
-            known = self._get_to_know(message)
+            known = self._cache_kind(message)
         encoding = encoding_of(message, log_ns)
         key = (encoding.form, message.seq is None, message.stamp_ns is None)
         channel = known.channels.get(key)
@@ -433,16 +433,16 @@ class RecordingWriter:
         if file.pending_bytes >= CHUNK_BYTES:
             self._flush()
 
-    def _get_to_know(self, message: Message) -> _Known:
-        if len(self._known) >= _KNOWN:
+    def _cache_kind(self, message: Message) -> _KindCache:
+        if len(self._known) >= _MAX_CACHED_KINDS:
             self._known.clear()
-        known = _Known(message.kind, message.publisher, self._counter(message.topic))
+        known = _KindCache(message.kind, message.publisher, self._counter(message.topic))
         self._known[id(message.kind)] = known  # `known` keeps the kind alive, so its id stays unique
         return known
 
     def _counter(self, topic: str) -> TopicCounter:
         if topic not in self._counters and len(self._counters) >= MOST_TOPICS:
-            topic = _OTHERS
+            topic = _OTHER_TOPICS
         return self._counters.setdefault(topic, TopicCounter())
 
     def _channel(self, message: Message, encoding: Encoding, log_ns: int) -> tuple[int | None, Encoding]:
@@ -469,9 +469,9 @@ class RecordingWriter:
         self._count_file(file)
         self._destination.flushed()
         if self._destination.is_full:
-            self._begin_next()
+            self._start_next_file()
 
-    def _begin_next(self) -> None:
+    def _start_next_file(self) -> None:
         # The counts of the full file are written before it is finished.
         self._write_figures(all_of_them=True)
         file = self._destination.file
@@ -489,14 +489,14 @@ class RecordingWriter:
 
     def _write_figures(self, *, all_of_them: bool = False) -> None:
         with self._lock:
-            left_out, self._left_out = self._left_out, {}
-        for (topic, publisher), (count, size) in left_out.items():
+            dropped, self._dropped_counts = self._dropped_counts, {}
+        for (topic, publisher), (count, size) in dropped.items():
             self._counter(topic).leave_out(publisher, count, size)
-        told = dict(self._counters) if all_of_them else dict(changed(self._counters))
-        if not told:
+        counters = dict(self._counters) if all_of_them else dict(changed(self._counters))
+        if not counters:
             return
-        figures = {topic: counter.figures() for topic, counter in told.items()}
-        for counter in told.values():
+        figures = {topic: counter.figures() for topic, counter in counters.items()}
+        for counter in counters.values():
             counter.is_changed = False
         with self._lock:
             self._figures = {**self._figures, **figures}
@@ -541,29 +541,29 @@ class RecordingWriter:
             self._message_count = part.messages_before + max(0, file.message_count - own - part.repeated)
             self._size_bytes = part.bytes_before + file.size_bytes
 
-    def _end_early(self, error: RecordingError) -> None:
+    def _finish_early(self, error: RecordingError) -> None:
         # Stops, but the file can be finished.
         self._stop(error.reason)
         try:
             self._finish(error.reason)
         except (OSError, RecordingError):
-            self._let_go()
+            self._close_after_error()
 
     def _fail(self, error: RecordingError) -> None:
         # Nothing more can be written: the file ends with its last whole record.
         file = self._destination.file
         with self._lock:
-            for messages in self._rest:
-                self._leave_out(messages)
+            for messages in self._unwritten:
+                self._count_dropped_locked(messages)
             for number, count in file.pending_counts.items():  # received, but only in memory
                 definition = file.table.definitions[number]
-                left = self._left_out.setdefault((definition.topic, None), [0, 0])
+                left = self._dropped_counts.setdefault((definition.topic, None), [0, 0])
                 left[0] += 0 if number in self._own_numbers else count
         self._count_file(file)
-        self._let_go()
+        self._close_after_error()
         self._stop(error.reason)
 
-    def _let_go(self) -> None:
+    def _close_after_error(self) -> None:
         with suppress(OSError):  # a further error doesn't matter
             self._destination.fail()
 
@@ -571,13 +571,13 @@ class RecordingWriter:
         with self._lock:
             self._problem = reason
             for part in self._queue:
-                if not isinstance(part, _Said):
-                    self._leave_out(part[1])
+                if not isinstance(part, _Entry):
+                    self._count_dropped_locked(part[1])
             self._queue.clear()
             self._queued_bytes = self._queued_messages = 0
             self._lock.notify_all()
         if self._on_problem is not None:
             self._on_problem(reason)
 
-    def _leave_out(self, messages: Sequence[Message]) -> None:
-        self._post_what_fits(messages, 0, may_fit=False)
+    def _count_dropped_locked(self, messages: Sequence[Message]) -> None:
+        self._post_part_locked(messages, 0, may_fit=False)

@@ -54,11 +54,11 @@ _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re
 
 ANY = "0.0.0.0"  # noqa: S104 - bound only at a user's request
 """All IPv4 addresses of a computer."""
-_AGAIN_S = 5.0
+_RETRY_S = 5.0
 _SLICE_S = 0.1
-_HERE = frozenset({"localhost", "*"})
+_LOCAL_NAMES = frozenset({"localhost", "*"})
 """Names of this computer that need no resolution; a master at "*" is local, too."""
-_TUNNELS = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
+_TUNNEL_PREFIXES = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
 
 
 def master_address(address: str | None = None) -> str:
@@ -78,7 +78,7 @@ def master_address(address: str | None = None) -> str:
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
-    if not _HOST.fullmatch(host) or not _is_possible(host) or not _is_port(port):
+    if not _HOST.fullmatch(host) or not _is_valid_host(host) or not _is_port(port):
         raise NepError(
             _("'{chosen}' is no address of a master; write it as '{example}'").format(
                 chosen=quotable(chosen), example=DEFAULT_MASTER
@@ -105,7 +105,7 @@ def checked_host(host: object) -> str:
                 "'{host}' is a URL; write the address alone, such as '127.0.0.1', or the computer's name"
             ).format(host=quotable(host))
         )
-    if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_possible(host):
+    if not isinstance(host, str) or not _HOST.fullmatch(host) or not _is_valid_host(host):
         raise NepError(
             _("'{host}' is no address of a computer; use one such as '127.0.0.1', or a name").format(
                 host=quotable(str(host))
@@ -128,7 +128,7 @@ def _is_port(word: str) -> bool:
     return _PORT.fullmatch(word) is not None and int(word) <= 65535
 
 
-def _is_possible(host: str) -> bool:
+def _is_valid_host(host: str) -> bool:
     if not _NUMBERS.fullmatch(host):
         return True
     numbers = host.split(".")
@@ -207,7 +207,7 @@ def _is_hidden(host: str) -> bool:
 
 
 def _is_tunnel(interface: str) -> bool:
-    return interface.lower().startswith(_TUNNELS)
+    return interface.lower().startswith(_TUNNEL_PREFIXES)
 
 
 # ---- name resolution
@@ -259,13 +259,13 @@ class MasterName:
         self._on_change = on_change
         self._look_up = look_up
         self._thread: threading.Thread | None = None
-        self._again_at = 0.0
-        self._is_told = False
-        self._answered = threading.Event()
-        host = "127.0.0.1" if self._host in _HERE else self._host
+        self._retry_at = 0.0
+        self._is_failure_logged = False
+        self._resolved = threading.Event()
+        host = "127.0.0.1" if self._host in _LOCAL_NAMES else self._host
         if _is_number(host):
             self.known = f"{host}:{self._port}"
-            self._answered.set()
+            self._resolved.set()
 
     def look(self, now: float) -> None:
         """Start to resolve again, unless the host is numeric or the last attempt was recent.
@@ -273,10 +273,10 @@ class MasterName:
         Call while disconnected.
         """
         is_asking = self._thread is not None and self._thread.is_alive()
-        if _is_number(self._host) or self._host in _HERE or is_asking or now < self._again_at:
+        if _is_number(self._host) or self._host in _LOCAL_NAMES or is_asking or now < self._retry_at:
             return
-        self._again_at = now + _AGAIN_S
-        thread = threading.Thread(target=self._ask, name=f"nep-name-{self._host}", daemon=True)
+        self._retry_at = now + _RETRY_S
+        thread = threading.Thread(target=self._resolve, name=f"nep-name-{self._host}", daemon=True)
         try:
             thread.start()
         except RuntimeError:
@@ -286,28 +286,28 @@ class MasterName:
     def wait(self, timeout_s: float | None) -> bool:
         """Wait until the address is resolved; return False after the time limit (None: no limit)."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        while not self._answered.is_set():
+        while not self._resolved.is_set():
             left = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return False
-            self._answered.wait(left)
+            self._resolved.wait(left)
         return True
 
-    def _ask(self) -> None:
+    def _resolve(self) -> None:
         try:
             known = f"{self._look_up(self._host)}:{self._port}"
         except (OSError, UnicodeError) as error:
-            if not self._is_told:
-                self._is_told = True
+            if not self._is_failure_logged:
+                self._is_failure_logged = True
                 _logger.info(  # `MasterUnreachable` reports it to callers
-                    "nobody knows the computer '%s' of the master (%s); asking again", self._host, error
+                    "can't resolve the master's host name '%s' (%s); retrying", self._host, error
                 )
             return
-        self._is_told = False
+        self._is_failure_logged = False
         if known != self.known:
             self.known = known
             self._on_change(known)
-        self._answered.set()
+        self._resolved.set()
 
 
 def _is_number(host: str) -> bool:

@@ -29,9 +29,9 @@ __all__ = [
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
-_LETTERS = 200
+_MAX_LENGTH = 200
 """Maximum length of a type's name, as at the master."""
-_LONGEST_S = sys.float_info.max
+_MAX_SECONDS = sys.float_info.max
 """Larger ints can't be added to a clock; they count as no limit."""
 
 
@@ -41,11 +41,11 @@ def text(name: str, value: object) -> str:
         raise WrongTypeError(_("{name} is a '{kind}'; give a 'str'").format(name=name, kind=_kind(value)))
     if not value:
         raise ValueError(_("{name} is empty; give a name such as 'json'").format(name=name))
-    if len(value) > _LETTERS or control_in(value):
-        said = escaped(shortened(value, 40))
+    if len(value) > _MAX_LENGTH or control_in(value):
+        shown = escaped(shortened(value, 40))
         raise ValueError(
             _("{name} is '{said}'; use {most} letters at most, and none that controls").format(
-                name=name, said=said, most=_LETTERS
+                name=name, said=shown, most=_MAX_LENGTH
             )
         )
     return value
@@ -117,7 +117,7 @@ def seconds(name: str, value: object) -> float | None:
         raise ValueError(
             _("{name} is {value}; give seconds, 0 or more, or None").format(name=name, value=_shown(value))
         )
-    return None if value > _LONGEST_S else value
+    return None if value > _MAX_SECONDS else value
 
 
 def period(name: str, value: object) -> float:
@@ -126,7 +126,7 @@ def period(name: str, value: object) -> float:
         raise WrongTypeError(
             _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
         )
-    if not 0.0 < value <= _LONGEST_S:  # also NaN
+    if not 0.0 < value <= _MAX_SECONDS:  # also NaN
         raise ValueError(
             _("{name} is {value}; give seconds, more than 0").format(name=name, value=_shown(value))
         )
@@ -170,7 +170,7 @@ def is_coroutine_function(call: object) -> bool:
 def _shown(value: object) -> str:
     # Bounded `repr` of an untrusted value.
     try:
-        return escaped(shortened(repr(value), _LETTERS))
+        return escaped(shortened(repr(value), _MAX_LENGTH))
     except (RecursionError, ValueError):  # too deep, or too many digits
         return type(value).__name__
 

@@ -29,9 +29,9 @@ def computer_id() -> str:
 
 def clock_name() -> str:
     """Return the identifier of this system, or "" if unknown."""
-    ask = _NAMES.get(sys.platform)
+    query = _NAME_QUERIES.get(sys.platform)
     try:
-        return "" if ask is None else ask()
+        return "" if query is None else query()
     except (OSError, ValueError, AttributeError):
         return ""
 
@@ -56,7 +56,7 @@ def _machine_guid() -> str:
         return f"{winreg.QueryValueEx(key, 'MachineGuid')[0]} {platform.node()}"
 
 
-_NAMES: Mapping[str, Callable[[], str]] = {
+_NAME_QUERIES: Mapping[str, Callable[[], str]] = {
     "linux": _boot_id,
     "darwin": _boot_session,
     "win32": _machine_guid,

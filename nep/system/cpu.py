@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 __all__ = ["CpuLoad"]
 
-_SHORTEST_S = 0.5
+_MIN_INTERVAL_S = 0.5
 
 
 class CpuLoad:
@@ -25,20 +25,20 @@ class CpuLoad:
     ) -> None:
         self._used_s = used_s
         self._clock = clock
-        self._before: tuple[float, float] | None = None
+        self._last_reading: tuple[float, float] | None = None
         self._ratio: float | None = None
 
     def ratio(self) -> float | None:
         """Return the usage since the last reading, or None at the first; cached for half a second."""
         now = self._clock()
-        if self._before is not None and now - self._before[0] < _SHORTEST_S:
+        if self._last_reading is not None and now - self._last_reading[0] < _MIN_INTERVAL_S:
             return self._ratio
         used = self._used_s()
         if used is None:
-            self._before = self._ratio = None
+            self._last_reading = self._ratio = None
             return None
-        if self._before is not None:
-            then, before = self._before
+        if self._last_reading is not None:
+            then, before = self._last_reading
             self._ratio = max(0.0, used - before) / (now - then)
-        self._before = (now, used)
+        self._last_reading = (now, used)
         return self._ratio

@@ -20,14 +20,14 @@ __all__ = ["SPARE", "allow_many", "check_room", "has_room", "is_lack", "limit", 
 
 SPARE = 32
 """Number of descriptors reserved for accepted connections and the rest of the program."""
-_WANTED = 8192
+_TARGET_LIMIT = 8192
 _FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
-_LACKS = frozenset({errno.EMFILE, errno.ENFILE})
+_NO_DESCRIPTOR_ERRNOS = frozenset({errno.EMFILE, errno.ENFILE})
 
 
 def is_lack(number: int | None) -> bool:
     """Return True if an errno means that the process or the system has too many open files."""
-    return number in _LACKS
+    return number in _NO_DESCRIPTOR_ERRNOS
 
 
 def opened() -> int | None:
@@ -48,7 +48,7 @@ def limit() -> int | None:
     return None if soft == resource.RLIM_INFINITY else soft
 
 
-class _Room:
+class _DescriptorCheck:
     """Check for free descriptors by polling the highest numbers, which are assigned last: takes 5 µs.
 
     Only if some of them are in use all are counted, which takes 0.1 ms per few hundred.
@@ -56,8 +56,8 @@ class _Room:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._most: int | None = None
-        self._last: dict[int, select.poll] = {}
+        self._polled_limit: int | None = None
+        self._pollers: dict[int, select.poll] = {}
 
     def check(self, needed: int, what: str) -> None:
         most = limit()
@@ -66,41 +66,41 @@ class _Room:
 
     def has(self, needed: int) -> bool:
         most = limit()
-        if most is None or self._free_at_the_end(most, needed) >= needed:
+        if most is None or self._count_free_at_end(most, needed) >= needed:
             return True
         count = opened()
         return count is None or most - count >= needed
 
-    def _free_at_the_end(self, most: int, needed: int) -> int:
+    def _count_free_at_end(self, most: int, needed: int) -> int:
         with self._lock:
-            if self._most != most:
-                self._most = most
-                self._last.clear()
-            last = self._last.get(needed)
+            if self._polled_limit != most:
+                self._polled_limit = most
+                self._pollers.clear()
+            last = self._pollers.get(needed)
             if last is None:
-                last = self._last[needed] = select.poll()
+                last = self._pollers[needed] = select.poll()
                 for number in range(max(0, most - needed), most):
                     last.register(number, 0)
             return sum(event == select.POLLNVAL for _number, event in last.poll(0))
 
 
-_room = _Room()
+_check = _DescriptorCheck()
 
 
 def check_room(needed: int, what: str) -> None:
     """Raise `TooManyFilesError` if `needed` more descriptors for `what` would not leave `SPARE`."""
-    _room.check(needed, what)
+    _check.check(needed, what)
 
 
 def has_room(needed: int) -> bool:
     """Return True if this process may open this number of files."""
-    return _room.has(needed)
+    return _check.has(needed)
 
 
 def _forked() -> None:
     # In a forked child the lock may be held for ever.
-    global _room  # noqa: PLW0603 - one per process
-    _room = _Room()
+    global _check  # noqa: PLW0603 - one per process
+    _check = _DescriptorCheck()
 
 
 in_child(_forked)
@@ -116,6 +116,6 @@ def allow_many() -> None:
     import resource  # noqa: PLC0415 - not on Windows
 
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = _WANTED if hard == resource.RLIM_INFINITY else min(_WANTED, hard)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+    target = _TARGET_LIMIT if hard == resource.RLIM_INFINITY else min(_TARGET_LIMIT, hard)
+    if soft != resource.RLIM_INFINITY and soft < target:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))

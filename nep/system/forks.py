@@ -33,9 +33,9 @@ class Inherited(Protocol):
 
 _watched: WeakSet[Inherited] = WeakSet()
 _calls: list[Callable[[], None]] = []
-_given_up: set[str] = set()
+_inherited_endpoints: set[str] = set()
 _FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
-_EVERYWHERE = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
+_ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
 def watch(owner: Inherited) -> None:
@@ -48,7 +48,7 @@ def give_up(*endpoints: str) -> None:
 
     Call it in `forked`. Endpoints are `tcp://IPV4:PORT` or `ipc://@NAME`; others are ignored.
     """
-    _given_up.update(endpoints)
+    _inherited_endpoints.update(endpoints)
 
 
 def in_child(call: Callable[[], None]) -> None:
@@ -56,16 +56,16 @@ def in_child(call: Callable[[], None]) -> None:
     _calls.append(call)
 
 
-def _tell() -> None:
+def _notify_owners() -> None:
     owners = list(_watched)
     _watched.clear()
     for tell in (*(owner.forked for owner in owners), *_calls):
         with contextlib.suppress(Exception):  # a failure must not prevent the others
             tell()
-    if _given_up:
+    if _inherited_endpoints:
         with contextlib.suppress(OSError):
-            _close_sockets(*_addresses(_given_up))
-        _given_up.clear()
+            _close_sockets(*_addresses(_inherited_endpoints))
+        _inherited_endpoints.clear()
 
 
 def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
@@ -79,7 +79,7 @@ def _addresses(endpoints: set[str]) -> tuple[set[object], set[object]]:
             exact.add(b"\0" + place[1:].encode())
         elif scheme == "tcp" and port.isdigit():
             exact.add((host, int(port)))
-            if host in _EVERYWHERE:
+            if host in _ANY_HOSTS:
                 ports.add(int(port))
     return exact, ports
 
@@ -90,23 +90,23 @@ def _close_sockets(exact: set[object], ports: set[object]) -> None:
     usual = socket.getdefaulttimeout()
     socket.setdefaulttimeout(None)
     try:
-        _close_those_at(exact, ports)
+        _close_matching(exact, ports)
     finally:
         socket.setdefaulttimeout(usual)
 
 
-def _close_those_at(exact: set[object], ports: set[object]) -> None:
+def _close_matching(exact: set[object], ports: set[object]) -> None:
     for name in os.listdir(_FOLDER):  # noqa: PTH208 - plain numbers
         with contextlib.suppress(OSError, ValueError):  # the listing's own descriptor is closed already
             number = int(name)
             if stat.S_ISSOCK(os.fstat(number).st_mode) and any(
                 address in exact or (isinstance(address, tuple) and address[1] in ports)
-                for address in _ends_of(number)
+                for address in _socket_addresses(number)
             ):
                 os.close(number)
 
 
-def _ends_of(number: int) -> list[object]:
+def _socket_addresses(number: int) -> list[object]:
     ends: list[object] = []
     known = socket.socket(fileno=number)
     try:
@@ -119,4 +119,4 @@ def _ends_of(number: int) -> list[object]:
 
 
 if sys.platform != "win32":
-    os.register_at_fork(after_in_child=_tell)
+    os.register_at_fork(after_in_child=_notify_owners)

@@ -8,12 +8,12 @@ from types import TracebackType
 
 __all__ = ["SurvivedErrors", "is_logged"]
 
-_TOLD = frozenset(10**n for n in range(20))
+_LOGGED_COUNTS = frozenset(10**n for n in range(20))
 
 
 def is_logged(count: int) -> bool:
     """Return True if the `count`-th occurrence is logged."""
-    return count in _TOLD
+    return count in _LOGGED_COUNTS
 
 
 class SurvivedErrors:

@@ -41,7 +41,7 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
         if bound is None:
             continue
         if not isinstance(bound, kind):
-            raise TypeError(f"'{info.name}.{attribute}' is no '{kind.__name__}'")
+            raise TypeError(f"'{info.name}.{attribute}' is not a '{kind.__name__}'")
         found[bound.name] = bound
     if not found:
         raise PluginsMissingError(package, attribute)
@@ -63,10 +63,10 @@ def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
         try:
             bound = point.load()
         except (Exception, SystemExit):
-            _logger.exception("the plug-in '%s' of '%s' cannot be loaded", point.name, package)
+            _logger.exception("can't load the plug-in '%s' of '%s'", point.name, package)
             continue
         if isinstance(bound, kind):
             found.setdefault(bound.name, bound)
         else:
-            _logger.error("the plug-in '%s' of '%s' is no '%s'", point.name, package, kind.__name__)
+            _logger.error("the plug-in '%s' of '%s' is not a '%s'", point.name, package, kind.__name__)
     return found

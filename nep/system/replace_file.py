@@ -11,9 +11,9 @@ from nep.i18n import _
 
 __all__ = ["replace_file"]
 
-_TRIES = 20
+_MAX_ATTEMPTS = 20
 _PAUSE_S = 0.05
-_SHARING = frozenset({5, 32, 33})
+_OPEN_FILE_ERRORS = frozenset({5, 32, 33})
 """Windows errors of an open file: access denied, sharing violation, lock violation."""
 
 
@@ -30,15 +30,15 @@ def replace_file(
     for a second. `replace` and `pause` are for tests.
     """
     wait = pause or threading.Event().wait
-    for tried in range(1, _TRIES + 1):
+    for tried in range(1, _MAX_ATTEMPTS + 1):
         try:
             replace(new, old)
         except PermissionError as error:
-            if getattr(error, "winerror", None) not in _SHARING:
+            if getattr(error, "winerror", None) not in _OPEN_FILE_ERRORS:
                 raise
-            if tried == _TRIES:
-                said = _("another program has the file open; close it there")
-                raise PermissionError(error.errno, said, str(old)) from error
+            if tried == _MAX_ATTEMPTS:
+                reason = _("another program has the file open; close it there")
+                raise PermissionError(error.errno, reason, str(old)) from error
             wait(_PAUSE_S)
         else:
             return

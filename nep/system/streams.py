@@ -16,16 +16,18 @@ from io import RawIOBase, TextIOWrapper
 
 __all__ = ["buffer_output", "close_streams", "output_problem", "prepare_streams", "tell", "words_given"]
 
-_PLAIN = {
+_REPLACEMENTS = {
     **dict.fromkeys("\u2010\u2011\u2013\u2014\u2212─━·", "-"),  # dashes, minus, lines
     **dict.fromkeys("\u2018\u2019", "'"), **dict.fromkeys("“”„", '"'), **dict.fromkeys("\u00a0\u202f", " "),
     **dict.fromkeys("●•", "*"), "│": "|", "…": "...", "→": "->", "←": "<-", "↔": "<->", "✗": "x", "✓": "+",
     "≤": "<=", "≥": ">=", "\u00d7": "x", "°": " deg",
 }  # fmt: skip
 _HANDLER = "nep.protocol.encoding"
-_GONE = frozenset({errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])})
+_READER_GONE_ERRNOS = frozenset(
+    {errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])}
+)
 """Errors of writing to a pipe without a reader; Windows reports an invalid argument."""
-_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
+_DISK_ERRNOS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
 """Errors of writing to a full or failing disk, or to a stream closed before the start."""
 
 
@@ -35,7 +37,7 @@ def prepare_streams() -> None:
     Streams closed before the program started are opened to the null device, so that their descriptors are not
     assigned to sockets. Reading or writing them fails as usual; messages to a closed stderr are discarded.
     """
-    codecs.register_error(_HANDLER, _plainer)
+    codecs.register_error(_HANDLER, _replace_unencodable)
     ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
     for name, way in ways.items():
         stream = getattr(sys, name)
@@ -66,11 +68,11 @@ def words_given() -> list[str]:
     return [word.encode("utf-8", escape).decode("utf-8", escape) for word in sys.argv[1:]]
 
 
-def _plainer(error: UnicodeError) -> tuple[str, int]:
+def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = error.object[error.start : error.end]
-    return "".join(_PLAIN.get(letter, "?") for letter in letters), error.end
+    return "".join(_REPLACEMENTS.get(letter, "?") for letter in letters), error.end
 
 
 def tell(text: str) -> None:
@@ -88,18 +90,18 @@ def output_problem(raised: OSError | None = None) -> str | None:
     try:
         sys.stdout.flush()
     except OSError as error:
-        return _words_of(error)
+        return _reason_of(error)
     except ValueError:  # closed
         return ""
-    if raised is not None and raised.filename is None and raised.errno in _GONE | _FULL:
-        return _words_of(raised)
+    if raised is not None and raised.filename is None and raised.errno in _READER_GONE_ERRNOS | _DISK_ERRNOS:
+        return _reason_of(raised)
     return None
 
 
-def _words_of(error: OSError) -> str:
+def _reason_of(error: OSError) -> str:
     if error.errno == errno.EBADF:
         return "it is closed"
-    return "" if error.errno in _GONE else (error.strerror or str(error)).lower()
+    return "" if error.errno in _READER_GONE_ERRNOS else (error.strerror or str(error)).lower()
 
 
 def close_streams() -> None:

@@ -25,7 +25,7 @@ __all__ = ["LineFormatter", "Terminal", "log_to"]
 MAX_CHARACTERS = 256 * 1024
 """Maximum size of queued text in characters."""
 CLOSE_S = 0.5
-_AGAIN_S = 0.05
+_RETRY_S = 0.05
 
 
 class Terminal(io.TextIOBase):
@@ -39,10 +39,10 @@ class Terminal(io.TextIOBase):
         super().__init__()
         self._stream = stream
         self._max_characters = max_characters
-        self._waiting: deque[str] = deque()
+        self._queue: deque[str] = deque()
         self._size = 0
         self._lines_dropped = 0
-        self._is_over = stream is None
+        self._has_failed = stream is None
         self._is_closing = False
         self._is_writing = False
         self._changed = threading.Condition()
@@ -65,15 +65,15 @@ class Terminal(io.TextIOBase):
     def write(self, text: str) -> int:
         """Queue text; drop it if the queue is full or the stream has failed."""
         with self._changed:
-            if self._is_over or self._is_closing or not text:
+            if self._has_failed or self._is_closing or not text:
                 return len(text)
-            if self._waiting and self._size + len(text) > self._max_characters:
+            if self._queue and self._size + len(text) > self._max_characters:
                 self._lines_dropped += max(1, text.count("\n"))
                 return len(text)
-            self._waiting.append(text)
+            self._queue.append(text)
             self._size += len(text)
             if self._thread is None:
-                self._begin()
+                self._start_thread_locked()
             self._changed.notify_all()
         return len(text)
 
@@ -83,7 +83,7 @@ class Terminal(io.TextIOBase):
     def drain(self, timeout_s: float = CLOSE_S) -> bool:
         """Wait until everything is written; return False after the time limit."""
         with self._changed:
-            return self._changed.wait_for(lambda: not self._waiting and not self._is_writing, timeout_s)
+            return self._changed.wait_for(lambda: not self._queue and not self._is_writing, timeout_s)
 
     def close(self, timeout_s: float = CLOSE_S) -> None:
         """Wait at most `timeout_s` seconds for queued text, then stop. Idempotent."""
@@ -104,11 +104,11 @@ class Terminal(io.TextIOBase):
         """Reset in a forked child process: queued text is the parent's. See `nep.system.forks`."""
         self._changed = threading.Condition()
         self._thread = None
-        self._waiting.clear()
+        self._queue.clear()
         self._size = self._lines_dropped = 0
         self._is_writing = False
 
-    def _begin(self) -> None:
+    def _start_thread_locked(self) -> None:
         thread = threading.Thread(target=self._run, name="nep-terminal", daemon=True)
         try:
             thread.start()
@@ -119,27 +119,27 @@ class Terminal(io.TextIOBase):
     # ---- thread
 
     def _run(self) -> None:
-        while (text := self._next()) is not None:
+        while (text := self._next_text()) is not None:
             try:
-                self._put(text)
+                self._write_all(text)
             except (OSError, ValueError):  # the reader is gone, or the stream is closed
                 with self._changed:
-                    self._is_over = True
+                    self._has_failed = True
                     self._is_writing = False
-                    self._waiting.clear()
+                    self._queue.clear()
                     self._changed.notify_all()
                 return
 
-    def _next(self) -> str | None:
+    def _next_text(self) -> str | None:
         # Blocks until there is text; None at the end.
         with self._changed:
             self._is_writing = False
             self._changed.notify_all()
-            self._changed.wait_for(lambda: self._waiting or self._lines_dropped or self._is_closing)
-            if not self._waiting and not self._lines_dropped:
+            self._changed.wait_for(lambda: self._queue or self._lines_dropped or self._is_closing)
+            if not self._queue and not self._lines_dropped:
                 return None
-            text = "".join(self._waiting)
-            self._waiting.clear()
+            text = "".join(self._queue)
+            self._queue.clear()
             self._size = 0
             self._is_writing = True
             dropped, self._lines_dropped = self._lines_dropped, 0
@@ -152,7 +152,7 @@ class Terminal(io.TextIOBase):
             text += "\n"
         return text
 
-    def _put(self, text: str) -> None:
+    def _write_all(self, text: str) -> None:
         # Bypasses the stream's buffer: at exit the interpreter needs its lock, and would abort while this
         # thread holds it.
         stream = self._stream
@@ -170,7 +170,7 @@ class Terminal(io.TextIOBase):
         while data:
             written = raw.write(data)
             if written is None:  # a non-blocking stream that is full
-                never.wait(_AGAIN_S)
+                never.wait(_RETRY_S)
             else:
                 data = data[written:]
 

@@ -128,7 +128,10 @@ class Server:
             try:
                 self._execute(call)
             except BaseException:  # also SystemExit: the client has its reply, and the thread must go on
-                _logger.exception("a thread of the server of '%s' was to end; it goes on", self.service)
+                _logger.exception(
+                    "a callback of the server of '%s' tried to end its thread; the thread continues",
+                    self.service,
+                )
 
     def _execute(self, call: IncomingCall) -> None:
         if call.is_late:

@@ -159,7 +159,7 @@ class Surveyor:
             self.failures += 1
             if is_logged(self.failures):
                 _logger.warning(
-                    "a respondent of '%s' has no answer (%d so far): %s", self.survey, self.failures, error
+                    "a respondent of '%s' failed (%d so far): %s", self.survey, self.failures, error
                 )
             raise
 

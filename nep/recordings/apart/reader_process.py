@@ -35,10 +35,10 @@ class RecordingService:
     """Executor of requests. `tell` is called with progress frames."""
 
     def __init__(self, tell: Callable[[Answer], object]) -> None:
-        self._tell = tell
+        self._report_progress = tell
         self._files: dict[int, FileReader] = {}
         self._numbers = count(1)
-        self._told: dict[int, int] = {}
+        self._reported_damage: dict[int, int] = {}
         self._cursors: OrderedDict[int, Iterator[RawMessage]] = OrderedDict()
         self._operations: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
             "open": self._open,
@@ -77,8 +77,8 @@ class RecordingService:
         if file is None or not isinstance(number, int):
             return
         damage = file.damage
-        if len(damage) != self._told.get(number, 0):
-            self._told[number] = len(damage)
+        if len(damage) != self._reported_damage.get(number, 0):
+            self._reported_damage[number] = len(damage)
             answer["damage"] = plain_damage(damage)
 
     def _open(self, request: Mapping[str, Any]) -> Answer:
@@ -86,7 +86,7 @@ class RecordingService:
         budget = None if request["budget"] is None else ReadBudget(path, *request["budget"])
 
         def progress(done: int, whole: int) -> None:
-            self._tell({"progress": (done, whole)})
+            self._report_progress({"progress": (done, whole)})
 
         file = FileReader(path, cache_bytes=request["cache_bytes"], progress=progress, budget=budget)
         number = next(self._numbers)

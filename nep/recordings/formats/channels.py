@@ -85,7 +85,7 @@ class Encoding(NamedTuple):
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
 _DATA_FIELD = {"picture": 2, "raw": 6, "text": 1, "wrapped": 1}
-_RAW_SHOWN = frozenset({
+_VIEWABLE_LAYOUTS = frozenset({
     "bgr8", "bgra8", "rgb8", "rgba8", "mono8", "mono16", "8UC1", "8UC3", "16UC1", "32FC1",
 })  # fmt: skip
 """Pixel layouts supported by `foxglove.RawImage`."""
@@ -185,7 +185,7 @@ def _picture_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
     step = message.size_bytes // height
     if width * _pixel_bytes(layout.numbers, layout.channels) * height != message.size_bytes:
         return "wrapped", False, b""
-    if encoding not in _RAW_SHOWN or step > _U32:
+    if encoding not in _VIEWABLE_LAYOUTS or step > _U32:
         return "wrapped", True, b""
     name = str(encoding).encode()
     sizes = fixed_field(2, width) + fixed_field(3, height) + bytes_field(4, len(name)) + name
@@ -269,13 +269,13 @@ class ChannelDecoder:
         self._form = metadata.get("nep.form", "")
         self._has_seq = bool(metadata.get("nep.has_seq", "1" if not self._form else ""))
         self._has_stamp = bool(metadata.get("nep.has_stamp", "1" if not self._form else ""))
-        self._publisher = _number(metadata.get("nep.publisher", ""))
+        self._publisher = _parse_id(metadata.get("nep.publisher", ""))
         schema = definition.schema_name
         self._is_wrapped = definition.message_encoding == "protobuf" and (
             self._form in _DATA_FIELD or schema in {"foxglove.CompressedImage", "foxglove.RawImage"}
         )
         self._data_field = 6 if schema == "foxglove.RawImage" else 2 if schema.endswith("Image") else 1
-        self.codec = metadata.get("nep.codec", "") or self._likely_codec()
+        self.codec = metadata.get("nep.codec", "") or self._guess_codec()
         self.msg_type = metadata.get("nep.msg_type", "") or schema or self.codec
         self._kind = kind_of(
             definition.topic,
@@ -285,7 +285,7 @@ class ChannelDecoder:
         )
         self._kinds: dict[tuple[str, str, bool], MessageKind] = {}
 
-    def _likely_codec(self) -> str:
+    def _guess_codec(self) -> str:
         # For channels of other programs.
         if self._is_wrapped:
             return "image" if self.definition.schema_name.endswith("Image") else "bytes"
@@ -309,13 +309,13 @@ class ChannelDecoder:
         stamp = raw.publish_ns if self._has_stamp else None
         publisher, extension = self._publisher, NOTHING
         if self._is_wrapped:
-            data, extra = self._unwrapped(data)
+            data, extra = self._unwrap(data)
             if extra:  # untrusted: may contain any values
-                told = extra.get("extension", NOTHING)
-                extension = told if isinstance(told, Mapping) else NOTHING
-                seq, stamp = _whole(extra.get("seq", seq)), _whole(extra.get("stamp_ns", stamp))
+                extra_extension = extra.get("extension", NOTHING)
+                extension = extra_extension if isinstance(extra_extension, Mapping) else NOTHING
+                seq, stamp = _int_or_none(extra.get("seq", seq)), _int_or_none(extra.get("stamp_ns", stamp))
                 if "publisher" in extra:
-                    publisher, kind = _whole(extra["publisher"]), self._kind_of(extra)
+                    publisher, kind = _int_or_none(extra["publisher"]), self._kind_of(extra)
         # `arrived` accepts a missing publisher
         return arrived(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
 
@@ -327,9 +327,9 @@ class ChannelDecoder:
             self._kinds[key] = kind_of(self.topic, key[0], key[1], is_latched=key[2])
         return self._kinds[key]
 
-    def _unwrapped(self, data: memoryview) -> tuple[memoryview, dict[str, Any]]:
+    def _unwrap(self, data: memoryview) -> tuple[memoryview, dict[str, Any]]:
         payload, extra = data, {}
-        told: dict[int, int | memoryview] = {}
+        values: dict[int, int | memoryview] = {}
         try:
             for number, value in fields(data):
                 if number == self._data_field and isinstance(value, memoryview):
@@ -338,11 +338,11 @@ class ChannelDecoder:
                     made = unpack(value)
                     extra = made if isinstance(made, dict) else {}
                 else:
-                    told[number] = value
+                    values[number] = value
         except ValueError:
             return data, {}
         if not self._form and self._data_field != 1:  # an image of another program
-            extra = {"extension": self._foreign_extension(told)}
+            extra = {"extension": self._foreign_extension(values)}
         return payload, extra
 
     def _foreign_extension(self, told: Mapping[int, int | memoryview]) -> Mapping[str, object]:
@@ -352,12 +352,15 @@ class ChannelDecoder:
             return {"encoding": encoding}
         layout = raw_layout(encoding)
         channels = 1 if layout is None else layout.channels
-        return {"shape": [_whole(told.get(3)) or 0, _whole(told.get(2)) or 0, channels], "encoding": encoding}
+        return {
+            "shape": [_int_or_none(told.get(3)) or 0, _int_or_none(told.get(2)) or 0, channels],
+            "encoding": encoding,
+        }
 
 
-def _whole(value: object) -> int | None:
+def _int_or_none(value: object) -> int | None:
     return value if type(value) is int else None
 
 
-def _number(text: str) -> int | None:
+def _parse_id(text: str) -> int | None:
     return int(text) if text.isascii() and text.isdigit() and len(text) <= 20 else None

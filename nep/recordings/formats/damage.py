@@ -21,23 +21,23 @@ def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
         return ""
     known = [each.message_count for each in damage]
     start_ns = start_ns or damage[0].start_ns
-    places = "; ".join(_place(each, start_ns) for each in damage[:_MAX_NAMED])
+    places = "; ".join(_format_place(each, start_ns) for each in damage[:_MAX_NAMED])
     if len(damage) > _MAX_NAMED:
         places += "; …"
-    said = ngettext(
+    summary = ngettext(
         "{count} piece of the file is damaged and was skipped ({places})",
         "{count} pieces of the file are damaged and were skipped ({places})",
         len(damage),
     ).format(count=len(damage), places=places)
     if any(each is None for each in known):
-        return _("{damage}; how many messages are missing is not known").format(damage=said)
+        return _("{damage}; how many messages are missing is not known").format(damage=summary)
     missing = sum(each or 0 for each in known)
     return ngettext(
         "{damage}; {count} message is missing", "{damage}; {count} messages are missing", missing
-    ).format(damage=said, count=missing)
+    ).format(damage=summary, count=missing)
 
 
-def _place(each: Damage, start_ns: int) -> str:
+def _format_place(each: Damage, start_ns: int) -> str:
     if not each.end_ns:
         return _("{size} bytes after byte {offset}").format(size=each.length, offset=each.offset)
     begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (each.start_ns, each.end_ns))

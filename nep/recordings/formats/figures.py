@@ -81,7 +81,7 @@ def read_figures(value: object) -> TopicFigures | None:
 
 
 @dataclass
-class _Numbers:
+class _SequenceRange:
     """Sequence numbers of one publisher."""
 
     first: int
@@ -104,7 +104,7 @@ class TopicCounter:
     size_bytes: int = 0
     is_changed: bool = True
     """True if the counts have changed since they were last written."""
-    _publishers: dict[int | None, _Numbers] = field(default_factory=dict)
+    _publishers: dict[int | None, _SequenceRange] = field(default_factory=dict)
 
     def add(self, publisher: int | None, seq: int | None, size_bytes: int, *, is_decodable: bool) -> None:
         """Count a recorded message."""
@@ -118,7 +118,7 @@ class TopicCounter:
         numbers = self._publishers.get(publisher)
         if numbers is None:
             if len(self._publishers) < MOST_PUBLISHERS:
-                self._publishers[publisher] = _Numbers(seq, seq, 1)
+                self._publishers[publisher] = _SequenceRange(seq, seq, 1)
             return
         numbers.came += 1
         if seq > numbers.last:

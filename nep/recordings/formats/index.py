@@ -64,7 +64,7 @@ _MAX_CHANNEL_BYTES = 256_000
 _MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
 _MAX_DEFINITION_BYTES = 64_000_000
 _MAX_OTHER_RECORDS = 200_000
-_MANY = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
+_UNCOUNTED_OPCODES = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
 _MAX_METADATA_BYTES = 4_000_000
 """Maximum size of all metadata; a recording of 10,000 topics has half of it."""
 _MAX_ATTACHMENTS = 1_000
@@ -112,7 +112,7 @@ class RecordCounter:
 
     def add(self, opcode: int) -> None:
         """Count a record. Raises `RecordingTooLargeError` beyond the limit."""
-        if opcode in _MANY:
+        if opcode in _UNCOUNTED_OPCODES:
             return
         self._count += 1
         if self._count > _MAX_OTHER_RECORDS:
@@ -126,7 +126,7 @@ class Definitions:
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
         self._schemas: dict[int, Schema] = {}
-        self._waiting: dict[int, dict[int, Channel]] = {}
+        self._without_schema: dict[int, dict[int, Channel]] = {}
         """Channels by missing schema and channel number."""
         self._read: dict[tuple[int, int], int] = {}
         """Hashes of records by opcode and number, to skip the repetitions in a file."""
@@ -135,7 +135,7 @@ class Definitions:
     @property
     def lacks_schemas(self) -> bool:
         """True if the schema of a channel is still missing."""
-        return bool(self._waiting)
+        return bool(self._without_schema)
 
     def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
         """Add a schema or channel record; ignore other, damaged and huge records.
@@ -160,7 +160,7 @@ class Definitions:
         channels = [made]
         if opcode == Opcode.SCHEMA:
             self._schemas[made.id] = made
-            channels = list(self._waiting.pop(made.id, {}).values())
+            channels = list(self._without_schema.pop(made.id, {}).values())
         for channel in channels:
             self._add_channel(channel)
         return [channel.id for channel in channels]
@@ -168,10 +168,10 @@ class Definitions:
     def _add_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
         if schema is None and channel.schema_id:
-            self._waiting.setdefault(channel.schema_id, {})[channel.id] = channel
-        told = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
+            self._without_schema.setdefault(channel.schema_id, {})[channel.id] = channel
+        schema_fields = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
         self.channels[channel.id] = ChannelDefinition(
-            channel.topic, channel.message_encoding, *told, tuple(channel.metadata.items())
+            channel.topic, channel.message_encoding, *schema_fields, tuple(channel.metadata.items())
         )
 
 
@@ -281,7 +281,7 @@ class _Summary:
         self._message_count = 0
         self._seen: set[int] = set()
         self._opcodes: set[int] = set()
-        self._lacks_places: Mapping[int, bool] = {}
+        self._has_unlisted: Mapping[int, bool] = {}
 
     def read(self, footer: bytes) -> FileIndex | None:
         # None if the summary is missing, damaged or incomplete.
@@ -295,7 +295,7 @@ class _Summary:
         except ValueError:
             return None
         index = self._index
-        return index if index.chunks and self._is_true(start) else None
+        return index if index.chunks and self._is_plausible(start) else None
 
     def _is_crc_right(self, start: int, end: int, footer: bytes) -> bool:
         wanted = int.from_bytes(footer[25:29], "little")
@@ -321,7 +321,7 @@ class _Summary:
         elif opcode == Opcode.STATISTICS and place.length <= _MAX_METADATA_BYTES:
             statistics = read_record("Statistics", _content(self._file, place))
             index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
-            self._lacks_places = {
+            self._has_unlisted = {
                 Opcode.METADATA_INDEX: bool(statistics.metadata_count),
                 Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
             }
@@ -355,10 +355,10 @@ class _Summary:
         if info.packed_offsets:
             self._index.chunks.append(info)
 
-    def _is_true(self, start: int) -> bool:
+    def _is_plausible(self, start: int) -> bool:
         # Chunks must not overlap, all channels must be known, and everything in the file must be listed.
         index, known = self._index, self._index.definitions.channels
-        if any(lacks and opcode not in self._opcodes for opcode, lacks in self._lacks_places.items()):
+        if any(lacks and opcode not in self._opcodes for opcode, lacks in self._has_unlisted.items()):
             return False
         end = 0
         for info in sorted(index.chunks, key=lambda each: each.offset):
@@ -398,13 +398,13 @@ class _Scan:
 
     def run(self) -> FileIndex:
         # Raises `RecordingTooLargeError`, `OSError`, and what `progress` raises.
-        index, told = self._index, 0
+        index, reported = self._index, 0
         is_closed = self._data_end < self._size
         for place in walk(self._file, self._data_end, self._budget):
             self._add(place)
             index.end = place.end
-            if self._progress is not None and index.end - told >= _READ_BYTES:
-                told = index.end
+            if self._progress is not None and index.end - reported >= _READ_BYTES:
+                reported = index.end
                 self._progress(index.end, self._size)
             if place.opcode == Opcode.DATA_END:
                 index.end = self._data_end if is_closed else place.end

@@ -356,14 +356,14 @@ class FileWriter:
         crc = zlib.crc32(made + offsets + head)
         return data_end + made + offsets + head + crc.to_bytes(4, "little") + MAGIC
 
-    def _place_in_summary(self, number: int) -> tuple[bool, int]:
+    def _summary_order(self, number: int) -> tuple[bool, int]:
         # Wrapped channels last: viewers read all messages of a topic as those of its first channel.
         return ("nep.form", "wrapped") in self.table.definitions[number].metadata, number
 
     def _groups(self) -> list[tuple[Opcode, bytes]]:
         schemas: dict[int, bytes] = {}
         channels = []
-        for number in sorted(self._written_channels, key=self._place_in_summary):
+        for number in sorted(self._written_channels, key=self._summary_order):
             schema, channel = self.table.records(number)
             channels.append(packed(channel))
             if schema is not None:

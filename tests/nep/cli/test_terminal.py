@@ -99,7 +99,7 @@ def test_no_stream_and_a_dead_one_are_stood() -> None:
     os.close(reading)
     with io.TextIOWrapper(io.FileIO(writing, "w")) as broken, Terminal(broken) as terminal:
         terminal.write("x\n")
-        eventually(lambda: terminal._is_over)
+        eventually(lambda: terminal._has_failed)
         assert terminal.write("y\n") == 2
 
 

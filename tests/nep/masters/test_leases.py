@@ -25,7 +25,7 @@ from tests.nep.programs import eventually, running
 def census_of(nodes: int, managed: int = 0) -> Registry:
     registry = Registry()
     for n in range(nodes + managed):
-        registry.meet(NodeRecord(f"n{n}", f"N{n}", "host", 1), 0.0, is_managed=n >= nodes)
+        registry.add_node(NodeRecord(f"n{n}", f"N{n}", "host", 1), 0.0, is_managed=n >= nodes)
     return registry
 
 
@@ -137,8 +137,8 @@ for line in sys.stdin:
 def test_a_killed_program_is_gone_within_3_s_though_it_may_be_silent_for_longer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(leases, "_RENEWALS_A_S", 0.01)
-    monkeypatch.setattr(leases, "_LONGEST_RENEW_S", 20.0)
+    monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
+    monkeypatch.setattr(leases, "_MAX_RENEW_S", 20.0)
     with Master("127.0.0.1:0", learn_s=0.0) as master:
         monkeypatch.setenv("NEP_MASTER", master.address)
         with running(PUBLISH) as program, nep.node("tester") as node:
@@ -152,8 +152,8 @@ def test_a_killed_program_is_gone_within_3_s_though_it_may_be_silent_for_longer(
 
 
 def test_a_node_that_waits_is_known_at_once_to_a_new_master(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(leases, "_RENEWALS_A_S", 0.01)
-    monkeypatch.setattr(leases, "_LONGEST_RENEW_S", 20.0)
+    monkeypatch.setattr(leases, "_MAX_RENEWALS_PER_S", 0.01)
+    monkeypatch.setattr(leases, "_MAX_RENEW_S", 20.0)
     master = Master("127.0.0.1:0", learn_s=0.0).start()
     with nep.node("n", master=master.address) as node:
         pub = node.new_pub("topic")

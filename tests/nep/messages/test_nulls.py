@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.messages.codecs import AGAIN_S, JsonEncoder, nan_in
+from nep.messages.codecs import NAN_WARNING_INTERVAL_S, JsonEncoder, nan_in
 
 
 @dataclasses.dataclass
@@ -60,7 +60,7 @@ def test_a_flood_is_counted_whole_and_told_seldom(caplog):
     teller = JsonEncoder("/odom", lambda: now[0])
     for _ in range(1000):
         teller.encode({"x": math.nan})
-    now[0] = AGAIN_S
+    now[0] = NAN_WARNING_INTERVAL_S
     teller.encode({"x": math.nan})
     assert teller.count == 1001
     assert [record.args[2] for record in caplog.records] == [1, 1001]

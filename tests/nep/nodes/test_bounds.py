@@ -45,7 +45,7 @@ from tests.nep.programs import eventually
 
 def census_with_node() -> Registry:
     registry = Registry()
-    registry.meet(NodeRecord("n", "N", "host", 1), 0.0)
+    registry.add_node(NodeRecord("n", "N", "host", 1), 0.0)
     return registry
 
 

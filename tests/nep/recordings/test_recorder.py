@@ -286,7 +286,7 @@ def test_what_ends_by_itself_is_told_and_something_new_may_begin(master, tmp_pat
 
 
 def test_a_line_that_is_too_long_is_no_order(monkeypatch):
-    monkeypatch.setattr(child, "_LONGEST_LINE", 10)
+    monkeypatch.setattr(child, "_MAX_LINE_BYTES", 10)
     lines = child._lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
     assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']
 

@@ -112,7 +112,7 @@ def test_who_fails_has_no_answer_and_is_counted(make: Make, caplog: pytest.LogCa
     surveyor = make("surveyor").new_surveyor("/who", LONG_MS)
     assert [each["says"] for each in surveyor.ask({})] == [1]
     assert surveyor.failures == 1
-    assert "a respondent of '/who' has no answer (1 so far): LookupError: no eyes" in caplog.text
+    assert "a respondent of '/who' failed (1 so far): LookupError: no eyes" in caplog.text
 
 
 def test_several_surveyors_and_threads_at_once(make: Make) -> None:

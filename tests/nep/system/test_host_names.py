@@ -70,7 +70,7 @@ def test_a_name_is_asked_for_again_only_after_a_while(caplog: pytest.LogCaptureF
             look(now)
     assert len(book.asked) == 2
     assert [record.getMessage().partition(" (")[0] for record in caplog.records] == [
-        "nobody knows the computer 'robot' of the master"
+        "can't resolve the master's host name 'robot'"
     ]
     assert not name.wait(0.0)
     for now in (20.0, 25.0, 30.0):

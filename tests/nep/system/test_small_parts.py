@@ -137,7 +137,7 @@ def test_one_file_is_a_plug_in(package: Path) -> None:
     )
     assert set(discover("plugs_for_test", "BACKEND", Backend)) == {"mine"}
     (package / "wrong.py").write_text("BACKEND = 5\n")
-    with pytest.raises(TypeError, match=r"'plugs_for_test.wrong.BACKEND' is no 'Backend'"):
+    with pytest.raises(TypeError, match=r"'plugs_for_test.wrong.BACKEND' is not a 'Backend'"):
         discover("plugs_for_test", "BACKEND", Backend)
 
 
