@@ -1,4 +1,5 @@
-"""Back ends: what carries bytes between nodes. Each module binds one `BACKEND`.
+"""Back ends: implementations of the transport between nodes. Each module defines one `BACKEND`.
 
-`base` is the contract, `memory` the template, `zeromq` the one that programs use.
+`base` defines the interface, `memory` is the reference implementation to copy from, and `zeromq` is the
+default.
 """

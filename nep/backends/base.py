@@ -1,9 +1,10 @@
-"""The contract of back ends, and choosing one by its name. One contract test runs over all of them.
+"""Interface of back ends, and their lookup by name.
 
-`nep.backends.memory` is the template. A `Backend` opens one `Transport` for a node; that makes a
-`PublisherTransport` for each publisher and a `SubscriberTransport` for each subscriber. All of them may be
-used from any thread. Sequence numbers and `count` begin with 1 at the first message published, whether
-somebody listens or not.
+A `Backend` opens one `Transport` per node. The transport creates a `PublisherTransport` for each publisher
+and a `SubscriberTransport` for each subscriber. All of them are thread-safe. Sequence numbers and `count`
+start at 1 with the first published message, with or without subscribers.
+
+`nep.backends.memory` is the reference implementation. One contract test runs against all back ends.
 """
 
 from __future__ import annotations
@@ -42,19 +43,29 @@ __all__ = [
 ]
 
 HANDSHAKE_S = 0.5
-"""How long a new publisher or subscriber waits for the other side, at most."""
+"""Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
 
 Sink = Callable[[Sequence[Message]], None]
-"""Takes messages in batches, in a thread of the transport's sinks; it returns soon and does not raise."""
+"""Callback for batches of messages. Runs in the transport's sink thread; must return soon and must not raise.
+"""
 
 
 @dataclass(frozen=True)
 class PublisherSpec:
-    """What a publisher shall be. `wait_s`: how long to wait for a master, None without limit.
+    """Settings of a new publisher.
 
-    `number` proves the id: see `nep.protocol.requests.is_proven`. `may_batch`: a back end may send messages
-    that follow each other within microseconds together. `qos`: one of the back end's words, or "".
-    `history`: so many messages are kept for subscribers that come late; 1 when it is only latched, else 0.
+    Attributes:
+        id: Random id of the publisher.
+        topic: Name of the topic.
+        msg_type: Message type as registered at the master.
+        codec: Encoder of the payloads.
+        is_latched: True to keep the newest message for late subscribers.
+        configuration: Connection through a master or to a fixed address.
+        wait_s: Seconds to wait for the master; None waits forever.
+        number: Secret that proves ownership of the id, see `nep.protocol.requests.is_proven`.
+        may_batch: True if messages published within microseconds of each other may be sent in one batch.
+        qos: Name of a QoS profile of the back end, or "".
+        history: Number of messages kept for late subscribers; 1 if only latched, otherwise 0.
     """
 
     id: int
@@ -72,10 +83,21 @@ class PublisherSpec:
 
 @dataclass(frozen=True)
 class SubscriberSpec:
-    """What a subscriber shall be. With a `sink` nothing is kept for `SubscriberTransport.poll`.
+    """Settings of a new subscriber.
 
-    `number` proves the id. `qos`: one of the back end's words, or "". With `is_pattern` it hears all topics
-    that match its own, as `nep.protocol.topic_pattern` has it.
+    Attributes:
+        id: Random id of the subscriber.
+        topic: Name of the topic, or a pattern.
+        msg_type: Expected message type.
+        configuration: Connection through a master or to a fixed address.
+        wait_s: Seconds to wait for the master; None waits forever.
+        keep: Queue policy: all messages or only the newest.
+        max_messages: Queue bound in messages.
+        max_bytes: Queue bound in bytes.
+        sink: Callback that receives the messages; nothing is queued for `SubscriberTransport.poll` then.
+        number: Secret that proves ownership of the id.
+        qos: Name of a QoS profile of the back end, or "".
+        is_pattern: True to subscribe to all topics that match `topic`, see `nep.protocol.topic_pattern`.
     """
 
     id: int
@@ -93,19 +115,21 @@ class SubscriberSpec:
 
 
 class Wakes(Protocol):
-    """Somebody who waits: a `nep.system.wakeup.Waker`, or what acts as one."""
+    """Object that can be woken, such as a `nep.system.wakeup.Waker`."""
 
     def wake(self) -> None:
-        """There may be something to do. From any thread, also under locks; does not wait."""
+        """Wake the waiting thread. Callable from any thread, also with locks held; doesn't block."""
 
 
 class QuickPublish(NamedTuple):
-    """What is asked of a transport that `PublishesQuickly`.
+    """Functions that a transport with `PublishesQuickly` needs for its fast path.
 
-    Payloads of the type `kind` are bytes that are sent as they are, and `ordinary` makes the bytes of others;
-    what it raises for, and all that is published while `owner` is closed or nobody listens, is given to
-    `slowly`; so is what is published with ``strict=True``. `look` is called first with a payload whose bytes
-    have `null` in them, unless it is None.
+    Attributes:
+        owner: Publisher; while it is closed, calls go to `slowly`.
+        kind: Payload type that is sent as is, without encoding.
+        ordinary: Encoder of other payloads. Payloads for which it raises go to `slowly`.
+        look: Called with a payload whose encoding contains ``null``; None to skip the check.
+        slowly: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
     """
 
     owner: Closes
@@ -116,175 +140,189 @@ class QuickPublish(NamedTuple):
 
 
 class Closes(Protocol):
-    """Somebody who may be closed."""
+    """Object that can be closed."""
 
     is_closed: bool
 
 
 @runtime_checkable
 class PublishesQuickly(Protocol):
-    """What a `PublisherTransport` may have besides."""
+    """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
     def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
-        """A function that publishes, with as few calls on the way as can be. It never blocks."""
+        """Return a publish function with as little call overhead as possible. It never blocks."""
 
 
 class PublisherTransport(Protocol):
-    """What a publisher sends through."""
+    """Sending end of a publisher."""
 
     @property
     def subscribers(self) -> int:
-        """How many subscribers are connected now."""
+        """Number of connected subscribers."""
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody gets what is sent, also those that are not counted in `subscribers`."""
+        """True if any subscriber is connected, including those that `subscribers` can't count."""
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of nodes whose subscribers are registered and have not connected."""
+        """Names of nodes whose subscribers are registered but not connected."""
 
     @property
     def count(self) -> int:
-        """Messages published so far."""
+        """Number of messages published so far."""
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
 
     def report(self, problem: str) -> None:
-        """The publisher cannot send what it is given, and why; an empty sentence means that it can again."""
+        """Set the problem that prevents payloads from being sent; an empty string clears it."""
 
     def lend(self, size_bytes: int) -> memoryview | None:
-        """Memory that all who listen share, to write a payload into before it is sent; None without such."""
+        """Return writable shared memory for a payload, or None if the subscribers don't share memory."""
 
     def send(self, encoded: Encoded) -> None:
-        """Publish. Never blocks: what a subscriber cannot take is lost to it, and it counts that."""
+        """Return writable shared memory for a payload, or None if the subscribers share none."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, and deliver what is on its way within `timeout_s`; what was not is logged."""
+        """Unregister and flush. Messages not delivered within `timeout_s` seconds are logged."""
 
 
 @runtime_checkable
 class KnowsSubscribers(Protocol):
-    """What a `PublisherTransport` may have besides: which subscribers of the graph are connected."""
+    """Optional interface of a `PublisherTransport`: the ids of connected subscribers."""
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
-        """Ids of the subscribers that are connected now."""
+        """Ids of the connected subscribers, as in the graph."""
 
 
 @runtime_checkable
 class GivesPayloads(Protocol):
-    """What a `SubscriberTransport` may have besides: payloads without messages, for who wants no more.
+    """Optional interface of a `SubscriberTransport`: decoded payloads without `Message` objects.
 
-    Whoever takes from `ready` lets `restore` be called before, while there are any.
+    While `payloads` is not empty, call `restore` before taking from `ready`.
     """
 
     payloads: deque[Any]
-    """Payloads of messages that come before those in `ready`; to be taken from the left, in any thread."""
+    """Payloads of the messages that precede those in `ready`. Pop from the left, in any thread."""
     wants_payloads: bool
-    """Whether the next ones shall come here as far as that saves anything. Whoever reads says so."""
+    """Set by the reader: True to receive payloads here where that is faster."""
 
     def restore(self) -> None:
-        """Make messages of the payloads that were not taken: they are the next ones in `ready`."""
+        """Convert the remaining payloads back to messages and put them first into `ready`."""
 
 
 class SubscriberTransport(Protocol):
-    """What a subscriber receives through."""
+    """Receiving end of a subscriber."""
 
     ready: deque[Message]
-    """Messages that come next and were read already; whoever reads may take them from its left. May be empty
-    while others wait elsewhere."""
+    """Next messages, already read. The reader may pop from the left; other messages may be queued elsewhere
+    while it is empty.
+    """
 
     @property
     def fd(self) -> int:
-        """What tells of messages between `enter_wait` and `leave_wait` when it can be read; -1: nothing."""
+        """Optional interface of a `SubscriberTransport`: payloads without `Message` objects.
+
+        While `payloads` is not empty, call `restore` before taking from `ready`.
+        """
 
     def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting: False when there is something to read already, or it is closed.
+        """Prepare to wait; return False if input is available or the subscriber is closed.
 
-        Else `waker` is woken by what does not show at `fd`, also by closing, until `leave_wait`. Who is woken
-        leaves soon: meanwhile it may be that nobody takes messages from the network.
+        Until `leave_wait`, `waker` is woken by events that `fd` doesn't show, including `close`. Call
+        `leave_wait` soon after waking: until then messages may not be read from the network.
         """
 
     def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
+        """End a wait that `enter_wait` began."""
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
 
     @property
     def lost(self) -> int | None:
-        """Messages that did not arrive or were dropped here for lack of room; None when nobody can know."""
+        """Number of messages that were lost or dropped for lack of room; None if the back end can't know."""
 
     @property
     def refused(self) -> int:
-        """What came and was no message at all."""
+        """Number of inputs rejected because they aren't valid messages."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or its transport was."""
+        """True after `close`, or after the transport was closed."""
 
     def poll(self) -> Message | None:
-        """The next message if one is there. Does not wait."""
+        """Return the next message, or None if none is available. Doesn't wait."""
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message; waits at most `timeout_s` seconds, may return None earlier."""
+        """Return the next message; wait up to `timeout_s` seconds. May return None earlier."""
 
     def report(self, problem: str) -> None:
-        """The reader could not read a message, and why; an empty sentence means that it can again."""
+        """Set the problem that prevents messages from being decoded; an empty string clears it."""
 
     def close(self) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
 
     def forked(self) -> None:
-        """In a child that was forked: be closed and empty, without taking a lock or touching a socket."""
+        """Become closed and empty in a forked child, without taking locks or touching sockets."""
 
 
 class Transport(Protocol):
-    """One node's way to the others."""
+    """Connection of one node to the other nodes."""
 
     def publisher(self, spec: PublisherSpec) -> PublisherTransport:
-        """A new publisher: the first message reaches every subscriber that was there before.
+        """Create a publisher. Existing subscribers receive its first message.
 
-        Raises `MasterUnreachable`, `AddressInUseError`, `RequestRefusedError`.
+        Raises:
+            MasterUnreachable: No master answered within `PublisherSpec.wait_s`.
+            AddressInUseError: The address can't be bound.
+            RequestRefusedError: The master rejected the registration.
         """
 
     def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
-        """A new subscriber: what is published after this arrives. Raises as `publisher` does."""
+        """Create a subscriber. It receives all messages published from now on. Raises as `publisher` does."""
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait until one of `subscribers` may have a message or `wake` is called, `timeout_s` at most.
+        """Wait until one of `subscribers` may have a message or `wake` is called.
 
-        One that has services (`nep.backends.services`) takes a third argument: the queues of calls to wait
-        for, too.
+        Returns after `timeout_s` seconds at the latest. Transports with services (`nep.backends.services`)
+        accept a third argument: call queues to wait for.
         """
 
     def wake(self) -> None:
-        """End all waits that are under way."""
+        """End all waits in progress."""
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Who is there. Raises `MasterUnreachable`."""
+        """Return the current graph. Raises `MasterUnreachable`."""
 
     def begin_close(self) -> None:
-        """Nothing is sent any more; say so, and wait for nothing. `close` follows, at once or later."""
+        """Announce the end to all peers and stop sending. Doesn't wait; `close` must follow."""
 
     def close(self, timeout_s: float) -> None:
-        """Close all publishers and subscribers, unregister, end the thread."""
+        """Close all publishers and subscribers, unregister the node and join the threads."""
 
 
 @dataclass(frozen=True)
 class Backend:
-    """A plug-in that carries bytes. `open` raises `BackendUnavailableError` when `needs` is not installed.
+    """Back-end plug-in.
 
-    `master` makes a `Hybrid.master` of what a node is given as `master`, None when that is nothing; it raises
-    `NepError` for what is no place where nodes of this back end meet. `codec_for` gives the codec of a
-    publisher's message type, `codec_of_calls` that of a client's calls, for a back end that has types of its
-    own. `qos`: its words for qualities of
-    service. `has_history`: its publishers keep more than the last message for subscribers that come late.
-    `has_patterns`: its subscribers take topics with wildcards.
-    `has_extensions`: what travels beside a payload arrives. `is_in_process`: only nodes of one process meet.
+    Attributes:
+        name: Name that `Node` accepts.
+        open: Opens the transport of a node. Raises `BackendUnavailableError` if `needs` is not installed.
+        needs: Package to install, or "".
+        aliases: Further accepted names.
+        master: Converts a node's `master` argument (None for the default) to `Hybrid.master`. Raises
+            `NepError` for an invalid address.
+        codec_for: Returns the codec of a message type of publishers.
+        codec_of_calls: Returns the codec of a client's calls, for back ends with service types of their own.
+        qos: Names of the QoS profiles.
+        has_history: True if publishers can keep more than the last message for late subscribers.
+        has_patterns: True if subscribers accept topics with wildcards.
+        has_extensions: True if extensions of messages are transferred.
+        is_in_process: True if only nodes of the same process can connect.
     """
 
     name: str
@@ -302,15 +340,19 @@ class Backend:
 
 
 def backend_named(name: str) -> Backend:
-    """The back end of this name, or of which it is an alias.
+    """Return the back end with this name or alias.
 
-    Entry points are looked for only when it is none of ours: a node is made in less than a millisecond.
-    Raises `UnknownBackendError`, `TooManyFilesError`.
+    Third-party entry points are searched only if no built-in back end matches, to keep creating a node below
+    a millisecond.
+
+    Raises:
+        UnknownBackendError: No back end has this name.
+        TooManyFilesError: The process is out of file descriptors.
     """
     try:
         own = discover_own("nep.backends", "BACKEND", Backend)
     except PluginsMissingError:
-        check_room(1, "a node")  # without a file to open a folder seems to be empty
+        check_room(1, "a node")  # listing a folder without a free descriptor finds no files
         raise
     backend = _named(name.lower(), own.values())
     if backend is None:

@@ -1,4 +1,4 @@
-"""How a publisher or subscriber is connected: with a master (hybrid) or straight to an address (direct)."""
+"""Connection settings: through a master (`Hybrid`) or to a fixed address (`Direct`)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many
 
 @dataclass(frozen=True)
 class Hybrid:
-    """Connected through the master at `master`. Any number on both sides, whatever the mode says.
+    """Connection through the master at `master`. Create with `Node.hybrid`.
 
-    `mode`: as the original NEP has it. `Node.hybrid` makes one.
+    Any number of publishers and subscribers can connect; `mode` is accepted for compatibility with the
+    original NEP.
     """
 
     master: str
@@ -29,14 +30,15 @@ class Hybrid:
 
 @dataclass(frozen=True)
 class Direct:
-    """Connected without a master, at `ip:port`. `Node.direct` makes one.
+    """Connection to a fixed address without a master. Create with `Node.direct`.
 
-    `ip`: an address, or a name of a computer. `port`: 1 to 65535. `mode`: who binds the port, see below.
-    `wire`: "original" frames of `generation` "A" (`topic {…}`) or "B" (`{…}`), the "native" wire, or plain
-    "tcp" (calls only).
-
-    one2many: the publisher binds the port. many2one: the subscriber does. many2many: both connect, publishers
-    to `port`, subscribers to `port + 1`, and a proxy of the original NEP has to run there.
+    Attributes:
+        ip: IP address or host name.
+        port: Port from 1 to 65535.
+        mode: Side that binds the port. one2many: the publisher. many2one: the subscriber. many2many: neither;
+            publishers connect to `port` and subscribers to `port + 1` of a proxy of the original NEP.
+        generation: Frame format of the "original" wire: "A" (`topic {…}`) or "B" (`{…}`).
+        wire: "original", "native", or "tcp" (calls only).
     """
 
     ip: str
@@ -47,18 +49,18 @@ class Direct:
 
 
 Configuration = Hybrid | Direct
-"""How a publisher, subscriber, server or client is connected; left out it is the node's own master."""
+"""Connection of a publisher, subscriber, server or client. The default is the node's own master."""
 
 
 def for_messages(configuration: Configuration) -> Configuration:
-    """`configuration` itself when it carries messages. Raises `NepError`."""
+    """Return `configuration` if it can carry messages. Raises `NepError`."""
     if isinstance(configuration, Direct) and configuration.wire == "tcp":
         raise NepError(_("plain TCP carries calls of services only; leave out wire='tcp' for a topic"))
     return configuration
 
 
 def checked_mode(mode: str) -> Mode:
-    """`mode` as a `Mode`. Raises `NepError` with the names there are."""
+    """Validate a mode. Raises `NepError`, which lists the valid modes."""
     try:
         return _MODES[mode]
     except KeyError:
@@ -70,7 +72,7 @@ def checked_mode(mode: str) -> Mode:
 
 
 def checked_port(port: str | int) -> int:
-    """`port` as a number from 1 to 65535. Raises `NepError`."""
+    """Parse a port number from 1 to 65535. Raises `NepError`."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:
         raise NepError(_("'{port}' is no port; use a number from 1 to 65535").format(port=quotable(text)))

@@ -1,4 +1,4 @@
-"""Deadlines: a thread that ends calls that waited too long, for back ends that have no loop of their own."""
+"""Timeout thread for calls, for back ends without an event loop of their own."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["Deadlines", "Expiring"]
 
 
 class Expiring(Protocol):
-    """A client that has calls under way."""
+    """Client whose pending calls can expire."""
 
     def expire(self, now: float) -> float:
-        """End what waited too long; when to do so again."""
+        """Fail expired calls; return the next deadline (`time.monotonic`)."""
 
 
 class Deadlines:
-    """A thread for all clients of a node, from the first one on."""
+    """Timeout thread: expires pending calls of all clients of a node. Started lazily."""
 
     def __init__(self, node_name: str) -> None:
         self._name = f"nep-calls-{node_name}"
@@ -29,7 +29,7 @@ class Deadlines:
         self._thread: threading.Thread | None = None
 
     def watch(self, client: Expiring) -> None:
-        """Its calls, too."""
+        """Include the calls of this client."""
         with self._changed:
             self._clients = (*self._clients, client)
             if self._thread is None:
@@ -37,12 +37,12 @@ class Deadlines:
                 self._thread.start()
 
     def forget(self, client: Expiring) -> None:
-        """It is closed."""
+        """Remove a closed client."""
         with self._changed:
             self._clients = tuple(each for each in self._clients if each is not client)
 
     def add(self, deadline: float) -> None:
-        """A call ends then at the latest."""
+        """Schedule an expiry check at `deadline` (`time.monotonic`) at the latest."""
         with self._changed:
             if deadline < self._due:
                 self._due = deadline
@@ -61,7 +61,7 @@ class Deadlines:
                 self.add(client.expire(time.monotonic()))
 
     def close(self, timeout_s: float) -> None:
-        """End the thread."""
+        """Stop and join the thread."""
         with self._changed:
             self._is_closing = True
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""The contract of back ends that have services: what a server and a client need of them."""
+"""Interface of back ends that support services: server, client and survey transports."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ __all__ = [
 
 _logger = logging.getLogger("nep")
 CALLS_MAX = 1000
-"""So many calls wait in a server, or are under way in a client,"""
+"""Maximum number of calls queued in a server or in flight in a client."""
 CALLS_MAX_BYTES = 256 * 2**20
-"""and so many bytes of them."""
+"""Maximum size in bytes of the calls queued in a server or in flight in a client."""
 
 
 @dataclass(frozen=True)
 class ServerSpec:
-    """What a server shall be. `number` proves the id, as that of a publisher.
+    """Settings of a new server.
 
-    `msg_type` is the type of its service, for back ends whose services have types.
+    `number` proves ownership of `id`. `msg_type` is the service type, for back ends with typed services.
     """
 
     id: int
@@ -64,9 +64,10 @@ class ServerSpec:
 
 @dataclass(frozen=True)
 class ClientSpec:
-    """What a client shall be. `codec` is that of its calls and their answers.
+    """Settings of a new client.
 
-    `msg_type` is what it was asked for, for back ends whose services have types.
+    `codec` encodes requests and replies. `msg_type` is the requested service type, for back ends with typed
+    services. `number` proves ownership of `id`.
     """
 
     id: int
@@ -79,14 +80,14 @@ class ClientSpec:
 
 
 class Tally:
-    """What a server did. Written in one thread at a time, read in any."""
+    """Statistics of a server. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.calls = self.errors = self.refused = self.bytes = self.unreadable = 0
 
     def add(self, reply: Reply) -> None:
-        """One more call was answered so."""
+        """Count a call and its reply."""
         with self._lock:
             if reply.kind == CallKind.REFUSED:
                 self.refused += 1
@@ -96,16 +97,20 @@ class Tally:
             self.errors += reply.kind == CallKind.ERROR
 
     def add_unreadable(self) -> None:
-        """Something came that was no call at all."""
+        """Count a malformed request."""
         with self._lock:
             self.unreadable += 1
 
 
 @dataclass(frozen=True)
 class IncomingCall:
-    """A call that waits in a server. `answer` sends what it is given; whether it could.
+    """Request queued in a server.
 
-    `deadline` (of `time.monotonic`): afterwards nobody waits for the answer; None: for ever.
+    Attributes:
+        data: Encoded request.
+        codec: Number of its codec.
+        deadline: Time (`time.monotonic`) after which the client no longer waits; None if it waits forever.
+        answer: Sends the reply; returns False if it couldn't be sent.
     """
 
     data: bytes | memoryview
@@ -115,12 +120,12 @@ class IncomingCall:
 
     @property
     def is_late(self) -> bool:
-        """Whether nobody waits for the answer any more."""
+        """True if the client no longer waits for the reply."""
         return self.deadline is not None and time.monotonic() >= self.deadline
 
 
 class CallQueue:
-    """Calls that wait for a server's callback, oldest first, up to a bound. May be used from any thread."""
+    """Bounded FIFO queue of calls for a server's callback. Thread-safe."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition(threading.Lock())
@@ -131,11 +136,11 @@ class CallQueue:
 
     @property
     def is_closed(self) -> bool:
-        """Whether nothing is taken any more."""
+        """True after `close`; new calls are rejected."""
         return self._is_closed
 
     def put(self, call: IncomingCall) -> bool:
-        """Append a call and wake who waits; False when there is no room, or it is closed."""
+        """Append a call and wake a waiting thread; return False if the queue is full or closed."""
         size = len(call.data)
         with self._changed:
             if self._is_closed or len(self._calls) >= CALLS_MAX or self._bytes + size > CALLS_MAX_BYTES:
@@ -149,7 +154,7 @@ class CallQueue:
         return True
 
     def take(self, timeout_s: float = 0.0) -> IncomingCall | None:
-        """The oldest call; waits for it at most `timeout_s` seconds, and not when closed."""
+        """Remove and return the oldest call, or None; wait up to `timeout_s` seconds unless closed."""
         with self._changed:
             if timeout_s > 0.0:
                 self._changed.wait_for(lambda: self._calls or self._is_closed, timeout_s)
@@ -160,7 +165,7 @@ class CallQueue:
             return call
 
     def enter_wait(self, wake: Callable[[], None]) -> bool:
-        """From now on `wake` is called for every call; False when there is one already."""
+        """Call `wake` for every new call from now on; return False if a call is already queued."""
         with self._changed:
             if self._calls:
                 return False
@@ -168,13 +173,13 @@ class CallQueue:
             return True
 
     def leave_wait(self, wake: Callable[[], None]) -> None:
-        """It is called no more."""
+        """Stop calling `wake`."""
         with self._changed:
-            if wake in self._wakes:  # else this is a child that was forked
+            if wake in self._wakes:  # not registered in a forked child
                 self._wakes.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
-        """Take nothing any more and wake all threads; the calls that nobody took."""
+        """Reject new calls, wake all waiting threads and return the remaining calls."""
         with self._changed:
             self._is_closed = True
             left = tuple(self._calls)
@@ -184,7 +189,7 @@ class CallQueue:
             return left
 
     def forked(self) -> None:
-        """In a child that was forked: be closed and empty, without taking a lock."""
+        """Become closed and empty in a forked child, without taking a lock."""
         self._changed = threading.Condition(threading.Lock())
         self._calls = deque()
         self._wakes = []
@@ -192,12 +197,12 @@ class CallQueue:
 
 
 Outcome = Reply | NepError
-"""How a call ended: with what the server gave back, or without it."""
+"""Result of a call: the server's reply, or an error."""
 
 
 @contextmanager
 def woken_by(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
-    """Inside of it `wake` is called for every call in one of `calls`; False when there is one already."""
+    """Register `wake` at all of `calls` within the context; yield False if a call is already queued."""
     entered: list[CallQueue] = []
     try:
         for queue in calls:
@@ -211,36 +216,36 @@ def woken_by(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[b
 
 
 class OpenCall(Protocol):
-    """A call that is under way."""
+    """Call in flight."""
 
     @property
     def number(self) -> int:
-        """Its number in its client."""
+        """Number of the call in its client."""
 
 
 class CallUnderWay(OpenCall, Protocol):
-    """One that a client keeps until it has ended."""
+    """Call in flight as a client stores it."""
 
     @property
     def then(self) -> Callable[[Outcome], None]:
-        """Is told how it ended."""
+        """Callback for the outcome."""
 
     @property
     def size(self) -> int:
-        """Bytes of what was asked."""
+        """Size of the request in bytes."""
 
 
 C = TypeVar("C", bound=CallUnderWay)
 
 
 class ClientCalls(Generic[C]):
-    """The calls of a client that are under way, guarded by `_lock`: what clients of all back ends share."""
+    """Calls in flight of a client, guarded by `_lock`: base class of the clients of all back ends."""
 
     def __init__(self, spec: ClientSpec) -> None:
         self.spec = spec
         self.is_closed = False
         self.late = 0
-        """Answers that came when nobody waited for them any more."""
+        """Number of replies that arrived after their call had timed out or was canceled."""
         self._lock = threading.Lock()
         self._calls: dict[int, C] = {}
         self._bytes = 0
@@ -248,28 +253,27 @@ class ClientCalls(Generic[C]):
         self._answered = self._failed = 0
 
     def _tell(self, call: C, outcome: Outcome) -> None:
-        """Without the lock."""
+        # Call without the lock: the callback may use the client.
         try:
             call.then(outcome)
-        except Exception:  # the others get theirs
+        except Exception:  # a failing callback must not affect other calls
             _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
 
     def _take(self, call: C) -> bool:
-        """It is not under way any more; whether it was. With the lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
         self._bytes -= call.size
         return True
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
+        """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
                 self._take(known)
 
     def forked(self) -> None:
-        """In a child. See `ClientTransport.forked`."""
+        """Become closed in a forked child, without taking the lock."""
         self.is_closed = True
         self._lock = threading.Lock()
         self._calls = {}
@@ -279,111 +283,120 @@ class ClientCalls(Generic[C]):
 
 
 class ServerTransport(Protocol):
-    """What a server answers through."""
+    """Server of a back end."""
 
     calls: CallQueue
     tally: Tally
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is reached."""
+        """Endpoints at which the server is reached."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or its transport was."""
+        """True after `close`, or after the transport was closed."""
 
     def begin_close(self) -> None:
-        """Unregister, and refuse the calls that wait and those that still come. Does not wait."""
+        """Unregister; reject queued and new calls. Doesn't wait."""
 
     def close(self, timeout_s: float) -> None:
-        """The same, and end; answers are delivered within `timeout_s`. May be called twice."""
+        """Unregister and close; replies are flushed within `timeout_s` seconds. Idempotent."""
 
     def forked(self) -> None:
-        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+        """Become closed in a forked child, without taking locks or touching sockets."""
 
 
 class ClientTransport(Protocol):
-    """What a client calls through."""
+    """Client of a back end."""
 
     @property
     def is_connected(self) -> bool:
-        """Whether a server was there a moment ago."""
+        """True if a server is connected."""
 
     @property
     def late(self) -> int:
-        """Answers that came when nobody waited for them any more."""
+        """Number of replies that arrived after their call had timed out or was canceled."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or its transport was."""
+        """True after `close`, or after the transport was closed."""
 
     def begin(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> OpenCall:
-        """Send a call as soon as there is a server. `then` gets the outcome, once; it must return soon.
+        """Send a call as soon as a server is connected.
 
-        It may be called in the thread that serves all sockets. Raises `ClosedError`, and `NepError` when too
-        much is under way.
+        Args:
+            data: Encoded request.
+            timeout_s: Seconds until the call fails; None waits forever.
+            then: Called once with the outcome. May run in the I/O thread; must return soon.
+
+        Raises:
+            ClosedError: The client is closed.
+            NepError: Too many calls or bytes are in flight.
         """
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more; `then` is not called."""
+        """Cancel a call; `then` isn't called."""
 
     def known(self, timeout_s: float) -> tuple[str, ...]:
-        """The services that have a server now; none when that cannot be told."""
+        """Return the names of services that have a server; empty if the back end can't know."""
 
     def close(self) -> None:
-        """Unregister; calls that are under way end with `ClosedError`."""
+        """Unregister; calls in flight fail with `ClosedError`."""
 
     def forked(self) -> None:
-        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+        """Become closed in a forked child, without taking locks or touching sockets."""
 
 
 class SurveyTransport(Protocol):
-    """What a surveyor asks through."""
+    """Surveyor of a back end."""
 
     @property
     def respondents(self) -> int:
-        """How many there are now."""
+        """Number of connected respondents."""
 
     @property
     def late(self) -> int:
-        """Answers that came when nobody waited for them any more."""
+        """Number of replies that arrived after their call had timed out or was canceled."""
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed, or its transport was."""
+        """True after `close`, or after the transport was closed."""
 
     def begin_all(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> Sequence[OpenCall]:
-        """Ask all respondents that are there. `then` gets the outcome of each; otherwise as `begin`."""
+        """Send a request to all connected respondents; `then` is called with the outcome of each.
+
+        Arguments and errors as in `ClientTransport.begin`.
+        """
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Nobody waits for these any more; `then` is not called."""
+        """Cancel these calls; `then` isn't called."""
 
     def close(self) -> None:
-        """Unregister; calls that are under way end with `ClosedError`."""
+        """Unregister; calls in flight fail with `ClosedError`."""
 
     def forked(self) -> None:
-        """In a child that was forked: be closed, without taking a lock or touching a socket."""
+        """Become closed in a forked child, without taking locks or touching sockets."""
 
 
 class ServiceTransport(Protocol):
-    """A node's transport that has services."""
+    """Transport of a node with services."""
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """A new server. Raises as `Transport.publisher` does."""
+        """Create a server. Raises as `Transport.publisher` does."""
 
     def client(self, spec: ClientSpec) -> ClientTransport:
-        """A new client. Raises as `Transport.subscriber` does."""
+        """Create a client. Raises as `Transport.subscriber` does."""
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
-        """A new surveyor of the respondents that are servers of `spec.service`. Raises as `client` does."""
+        """Create a surveyor whose respondents are the servers of `spec.service`. Raises as `client` does."""
 
 
 def check_calls(service: str, count: int, used: int, size: int) -> None:
-    """Whether a client that has so many calls and bytes under way may send one more. Raises `NepError`."""
+    """Raise `NepError` if a client with `count` calls of `used` bytes in flight can't send `size` more."""
     if size > PAYLOAD_MAX_BYTES:
         raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(size)))
     if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
@@ -395,20 +408,20 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
 
 
 def fitting(reply: Reply) -> Reply:
-    """`reply` itself when it can travel, else the error that says why not."""
+    """Return `reply`, or an error reply if it is too large."""
     if len(reply.data) <= PAYLOAD_MAX_BYTES:
         return reply
     return failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
 
 
 def refusal(service: str, *, is_closed: bool) -> Reply:
-    """Why a server does not take a call."""
+    """Return the reply that rejects a call."""
     reason = _("'{service}' closes") if is_closed else _("'{service}' has too many calls that wait")
     return failure(CallKind.REFUSED, "", reason.format(service=service))
 
 
 def too_large(size: int) -> str:
-    """Why so many bytes cannot travel at once."""
+    """Return the error text for a payload of `size` bytes."""
     return _("it has {size} bytes, {most} are allowed; send large data as messages").format(
         size=size, most=PAYLOAD_MAX_BYTES
     )

@@ -1,7 +1,7 @@
-"""The back end `tcp`: servers and clients over plain TCP sockets, also called "POSIX" and "socket".
+"""Back end `tcp`: servers and clients over plain TCP sockets. Aliases: "posix", "socket", "normal".
 
-It carries calls only, at an address that both sides name with `node.direct(ip, port)`; docs/services.md
-specifies its bytes, for programs in any language that has sockets.
+Supports calls only, at an address that both sides set with `node.direct(ip, port)`. docs/services.md
+specifies the wire format for programs in other languages.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ __all__ = ["BACKEND"]
 
 
 class TcpTransport(ZeromqTransport):
-    """Direct servers and clients of the wire "tcp"; everything else is an error that says so."""
+    """Transport for direct servers and clients on the "tcp" wire; everything else raises `NepError`."""
 
     def publisher(self, spec: PublisherSpec) -> NoReturn:
-        """Raise `NepError`."""
+        """Raise `NepError`: topics aren't supported."""
         raise _no_topics(spec.topic)
 
     def subscriber(self, spec: SubscriberSpec) -> NoReturn:
-        """Raise `NepError`."""
+        """Raise `NepError`: topics aren't supported."""
         raise _no_topics(spec.topic)
 
     def survey(self, spec: ClientSpec) -> NoReturn:
-        """Raise `NepError`."""
+        """Raise `NepError`: surveys aren't supported."""
         raise _no_topics(spec.service)
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """See `ServiceTransport.server`. Raises `NepError` for one without an address."""
+        """Create a server. Raises `NepError` without a direct address."""
         return super().server(replace(spec, configuration=_over_tcp(spec.configuration)))
 
     def client(self, spec: ClientSpec) -> ClientTransport:
-        """See `ServiceTransport.client`. Raises `NepError` for one without an address."""
+        """Create a client. Raises `NepError` without a direct address."""
         return super().client(replace(spec, configuration=_over_tcp(spec.configuration)))
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002
-        """Raise `NepError`."""
+        """Raise `NepError`: plain TCP has no master."""
         raise NepError(_("plain TCP has no master, so nobody knows who is there"))
 
 

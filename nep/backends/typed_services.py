@@ -1,7 +1,7 @@
-"""Services whose requests and answers have types, as ROS's have: bytes of a codec become bodies, and back.
+"""Typed services, as in ROS: conversion between codec data and typed request and response bodies.
 
-A service of a type of ROS has maps for requests and answers. Where nep itself calls nep the type is one that
-is installed nowhere:
+A service of a ROS type has maps as requests and responses. For calls between nep nodes the type is one that
+needs no installation:
 
     uint16 codec
     uint32 timeout_ms
@@ -11,8 +11,8 @@ is installed nowhere:
     uint16 codec
     uint8[] data
 
-`codec` is 1 (JSON) or 4 (msgpack), `timeout_ms` 0 for ever, `kind` 2 an answer, 3 an error, 4 refused; `data`
-of an error is JSON, see docs/services.md.
+`codec` is 1 (JSON) or 4 (msgpack). `timeout_ms` 0 waits forever. `kind` is 2 (reply), 3 (error) or 4
+(rejected); the `data` of an error is JSON, see docs/services.md.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _TIMEOUT_MAX_MS = 2**32 - 1
 
 
 class AskedCall(NamedTuple):
-    """A request as a server of nep's reads it."""
+    """Decoded request for a nep server."""
 
     data: bytes | memoryview
     codec: int
@@ -42,18 +42,18 @@ class AskedCall(NamedTuple):
 
 
 class CallBody(Protocol):
-    """A request or an answer: its fields ↔ bytes."""
+    """Codec of a request or response body: maps to and from bytes."""
 
     def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - whatever was given
-        """Raises `EncodeError`."""
+        """Encode a map. Raises `EncodeError`."""
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """Raises `DecodeError`."""
+        """Decode a map. Raises `DecodeError`."""
 
 
 @dataclass(frozen=True)
 class TypedService:
-    """A type of services. `is_nep`: the one above."""
+    """Service type with its request and response codecs. `is_nep` is True for the type of this module."""
 
     name: str
     request: CallBody
@@ -63,14 +63,17 @@ class TypedService:
     # ---- for clients
 
     def body_of_call(self, codec: Codec, data: bytes | memoryview, timeout_s: float | None) -> bytes:
-        """A request, which has bytes of a codec. Raises `EncodeError`, `DecodeError`."""
+        """Convert an encoded request to a request body. Raises `EncodeError`, `DecodeError`."""
         if not self.is_nep:
             return self.request.encode(codec.decode(data, {}))
         limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
         return self.request.encode({"codec": codec.number, "timeout_ms": limit_ms, "data": bytes(data)})
 
     def reply_in(self, body: bytes, codec: Codec) -> Reply:
-        """An answer as bytes of a codec. Raises `DecodeError`, and `EncodeError` for what has none of it."""
+        """Convert a response body to a reply.
+
+        Raises `DecodeError`, or `EncodeError` if `codec` can't encode the response.
+        """
         answer = self.answer.decode(body)
         if not self.is_nep:
             return Reply(CallKind.ANSWER, codec.encode(answer).data, codec.number)
@@ -83,7 +86,10 @@ class TypedService:
     # ---- for servers
 
     def call_in(self, body: bytes) -> AskedCall:
-        """A request; one of a type of ROS becomes msgpack, which has bytes and NaN. Raises `DecodeError`."""
+        """Parse a request body. Raises `DecodeError`.
+
+        Requests of ROS types are converted to msgpack, which supports bytes and NaN.
+        """
         asked = self.request.decode(body)
         if not self.is_nep:
             codec = CODECS["msgpack"]
@@ -94,7 +100,10 @@ class TypedService:
         return AskedCall(data, number, limit_ms / 1000 if limit_ms else None)
 
     def body_of_reply(self, reply: Reply) -> bytes:
-        """An answer; a failure only in nep's own type. Raises `EncodeError` for what is no such answer."""
+        """Convert a reply to a response body.
+
+        Raises `EncodeError` for an error reply of a ROS type, which has none.
+        """
         if self.is_nep:
             kind, data = int(reply.kind), bytes(reply.data)
             return self.answer.encode({"kind": kind, "codec": reply.codec, "data": data})

@@ -1,4 +1,4 @@
-"""WakingSubscriber: what subscribers have in common that wake who waits for them, without a descriptor."""
+"""Base class of subscribers without a file descriptor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["WakingSubscriber"]
 
 
 class WakingSubscriber(ABC):
-    """`changed` guards what is there to be read; whoever waits on it is notified as well."""
+    """Subscriber that wakes waiting threads itself; `changed` guards its input."""
 
     fd = -1
 
@@ -22,10 +22,10 @@ class WakingSubscriber(ABC):
     @property
     @abstractmethod
     def has_input(self) -> bool:
-        """Whether there is something to read already, or nothing will come any more. With `changed` held."""
+        """True if input is available or the subscriber is closed. Call with `changed` held."""
 
     def enter_wait(self, waker: Wakes) -> bool:
-        """Before waiting. See `SubscriberTransport.enter_wait`."""
+        """Register `waker`; return False if input is available."""
         with self._changed:
             if self.has_input:
                 return False
@@ -33,12 +33,12 @@ class WakingSubscriber(ABC):
             return True
 
     def leave_wait(self, waker: Wakes) -> None:
-        """After waiting."""
+        """Unregister `waker`."""
         with self._changed:
             self._waiting = tuple(each for each in self._waiting if each is not waker)
 
     def tell_waiting(self) -> None:
-        """Something is there, or will not be any more. With `changed` held."""
+        """Wake all waiting threads. Call with `changed` held."""
         self._changed.notify_all()
         for each in self._waiting:
             each.wake()
