@@ -181,7 +181,7 @@ class NanomsgClient(ClientCalls[_Call]):
         """None: there is no master."""
         return ()
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
         """Calls that are under way end. May be called twice."""

@@ -87,7 +87,7 @@ class NanomsgPublisher(GreetedPublisher):
         self._out.add_post_pipe_connect_cb(self._came)
         self._out.add_post_pipe_remove_cb(self._went)
 
-    # ---- who listens
+    # ---- subscribers
 
     @property
     def subscribers(self) -> int:

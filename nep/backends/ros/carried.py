@@ -102,7 +102,7 @@ def not_installed(name: str, what: str) -> NepError:
     )
 
 
-# ---- codecs: payloads of publishers become bytes
+# ---- encoding
 
 
 def codec_of(msg_type: str) -> Codec:
@@ -222,7 +222,7 @@ def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> byte
     ))  # fmt: skip
 
 
-# ---- the bytes of ROS messages become those of a codec
+# ---- ROS messages to codec data
 
 
 @dataclass(frozen=True)

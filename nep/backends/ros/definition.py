@@ -142,7 +142,7 @@ class Definition:
             raise EncodeError(self.name, type(payload).__name__, _not_a_map(self.fields))
 
 
-# ---- reading definitions
+# ---- parsing definitions
 
 
 def parse(name: str, text: str) -> Definition:
@@ -471,7 +471,7 @@ def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str
     return made
 
 
-# ---- words
+# ---- names
 
 
 def _whole(value: object) -> int | None:

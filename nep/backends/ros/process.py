@@ -255,7 +255,7 @@ class RosProcess:
                 )
             return self.rospy.Service(service, kind, handler)
 
-    # ---- who is connected
+    # ---- connections
 
     def peer_subscribe(self, *_told: object) -> None:
         """Called by rospy when somebody connected to a publisher."""

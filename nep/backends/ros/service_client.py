@@ -77,7 +77,7 @@ class RosClient(ClientCalls[_Call]):
             self._seek(call)
         return call
 
-    # ---- looking for a server: in one thread for all calls that wait for one
+    # ---- server discovery, in one thread for all waiting calls
 
     def _seek(self, call: _Call) -> None:
         """With the lock held."""
@@ -117,7 +117,7 @@ class RosClient(ClientCalls[_Call]):
                 return
             self._is_over.wait(max(0.0, min(_AGAIN_S, due - time.monotonic())))
 
-    # ---- calling: each in a thread
+    # ---- calling, in one thread per call
 
     def _run(self, call: _Call, uri: str) -> None:
         try:

@@ -68,7 +68,7 @@ class RosServer:
         """Where it is reached."""
         return (str(self._rospy_service.uri),)
 
-    # ---- what rospy calls, in a thread of each connection
+    # ---- callbacks of rospy, in a thread per connection
 
     def _handle(self, request: Any) -> Any:  # noqa: ANN401 - rospy has no types
         waiting = _Waiting()
@@ -113,7 +113,7 @@ class RosServer:
             return waiting.end(body)
         return waiting.end(None, ": ".join(filter(None, read_failure(reply.data))))
 
-    # ---- the end
+    # ---- closing
 
     def counts(self) -> PublisherCount:
         """The statistics for the graph."""

@@ -112,7 +112,7 @@ class RospySubscriber(WakingSubscriber):
         """Why a message could not be read; empty when all is well."""
         return self._told or self.refusals.told()
 
-    # ---- what rospy calls, in a thread of each connection
+    # ---- callbacks of rospy, in a thread per connection
 
     def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy has no types
         header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it

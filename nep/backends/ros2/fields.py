@@ -98,7 +98,7 @@ def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pair
     return RosField(name, item.kind, item.is_message, length, rest[1], item.text_most)
 
 
-# ---- maps become messages
+# ---- maps to messages
 
 
 def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - rosbags'
@@ -284,7 +284,7 @@ def _kind(value: object) -> str:
     return type(value).__name__
 
 
-# ---- messages become maps
+# ---- messages to maps
 
 
 def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - rosbags'

@@ -511,7 +511,7 @@ def policy(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
     return library.qos.Policy
 
 
-# ---- one for each domain
+# ---- participants by domain
 
 _participants: dict[int, Participant] = {}
 _lock = threading.Lock()

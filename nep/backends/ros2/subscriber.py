@@ -141,7 +141,7 @@ class Ros2Subscriber(WakingSubscriber):
                     self._add_reader(is_latched=True)
                     return
 
-    # ---- messages come
+    # ---- receiving
 
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """In the participant's thread, under its lock."""
@@ -241,7 +241,7 @@ class Ros2Subscriber(WakingSubscriber):
                 self._dropped += dropped
             self.tell_waiting()
 
-    # ---- messages go
+    # ---- sending
 
     @property
     def has_input(self) -> bool:

@@ -76,7 +76,7 @@ def mapping_for(msg_type: str) -> TypeMapping:
     return TypeMapping(_STRING, codec, _pack_text, _unpack_text)
 
 
-# ---- a ROS message by its name
+# ---- ROS message types by name
 
 
 def _ros_mapping(name: str) -> TypeMapping:
@@ -105,7 +105,7 @@ def _as_it_is(made: Encoded) -> bytes:
     return data
 
 
-# ---- nep's own types
+# ---- nep message types
 
 
 def _plain(made: Encoded) -> bytes:

@@ -57,7 +57,7 @@ class ZenohPublisher:
         self._is_matched = bool(self._out.matching_status.matching)
         self._hellos: Any = session.declare_queryable(hello_key(spec.topic, spec.id), callback(self._greeted))
 
-    # ---- who listens
+    # ---- subscribers
 
     @property
     def subscribers(self) -> int:

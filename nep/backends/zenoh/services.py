@@ -315,7 +315,7 @@ class ZenohClient(ClientCalls[_Call]):
         for call in calls:
             self.forget(call)
 
-    # ---- what happens meanwhile
+    # ---- events
 
     def servers_changed(self) -> None:
         """A server came or went: the thread of deadlines sends what waits."""
@@ -349,7 +349,7 @@ class ZenohClient(ClientCalls[_Call]):
         """The figures for who looks at the graph."""
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
         """Unregister; calls that are under way end."""

@@ -145,7 +145,7 @@ class ZenohSession:
             self.close(0.0)
             raise
 
-    # ---- questions
+    # ---- requests
 
     def ask(
         self,
@@ -249,7 +249,7 @@ class ZenohSession:
             node.id, node.name, node.host, node.pid, node.language, node.generation, node.since_ns
         )
 
-    # ---- who is there
+    # ---- discovery
 
     def _noticed(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
         """In one of zenoh's threads: a token came or went."""
@@ -432,7 +432,7 @@ class ZenohSession:
             attachment=header,
         )
 
-    # ---- the end
+    # ---- closing
 
     def close(self, timeout_s: float) -> None:
         """Take all off the network, tell everybody, and close."""

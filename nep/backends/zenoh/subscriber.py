@@ -86,7 +86,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._ears.popitem(last=False)
             return ear
 
-    # ---- what the reader sees
+    # ---- reading
 
     def poll(self) -> Message | None:
         """The next message if one is there."""
@@ -137,7 +137,7 @@ class ZenohSubscriber(WakingSubscriber):
         problem = self._problem or self._refusals.told()
         return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
 
-    # ---- what zenoh's threads tell
+    # ---- callbacks in zenoh's threads
 
     def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
         """A message on the topic."""

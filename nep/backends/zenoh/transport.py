@@ -173,7 +173,7 @@ class ZenohTransport:
                     raise ClosedError(f"node '{self._node.name}'")
         return session
 
-    # ---- closing one of them
+    # ---- closing
 
     def _close_subscriber(self, subscriber: ZenohSubscriber) -> None:
         with self._lock:
@@ -238,7 +238,7 @@ class ZenohTransport:
         """End all waits."""
         self._inboxes.wake()
 
-    # ---- who is there, and the end
+    # ---- graph and closing
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Who is there. See `Transport.graph`."""

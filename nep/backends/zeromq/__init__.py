@@ -1,7 +1,4 @@
-"""The back end `zeromq`: the native wire, and direct connections in the original one.
-
-Its publishers, subscribers and sockets, the thread that serves them, and the session with the master.
-"""
+"""Back end `zeromq`: the native wire, and direct connections on the original wire."""
 
 from nep.backends.base import Backend
 from nep.backends.zeromq.transport import ZeromqTransport

@@ -1,11 +1,12 @@
-"""The addresses of this computer at which publishers' sockets are bound, and at which they are reached.
+"""Endpoints that a publisher's socket binds, and the choice of the endpoint to connect to.
 
-`Bindings` binds one endpoint at each address, and beside the loopback endpoint a local name where there is
-one. Programs of one computer exchange small messages quicker through a Unix socket than through TCP, see
-docs/adr/0011-local-sockets.md; messages of hundreds of kilobytes wait for its small buffer. Only Linux has
-names for them that are no files, which somebody would have to clean up after a crash. A name holds the
-publisher's loopback port, and that belongs to no other program.
-With `NEP_LOCAL=0` publishers leave this out, for whoever wants to see the traffic with a network tool.
+`Bindings` binds one endpoint per address, and on Linux an abstract Unix socket beside the loopback endpoint.
+Small messages between programs of one computer are faster through it than through TCP
+(docs/adr/0011-local-sockets.md), but messages of hundreds of kilobytes stall on its small buffer. Only Linux
+has abstract names, which need no clean-up after a crash. The name contains the publisher's loopback port,
+which makes it unique.
+
+Set `NEP_LOCAL=0` to disable it, for example to capture the traffic with a network tool.
 """
 
 from __future__ import annotations
@@ -29,36 +30,35 @@ __all__ = ["SMALL", "Bindings", "has_local_names", "in_reach", "local_of", "may_
 
 _logger = logging.getLogger("nep")
 SMALL = frozenset({"json", "string", "msgpack"})
-"""Codecs of what is small as a rule: commands, answers, states."""
+"""Codecs whose messages are usually small: commands, replies, states."""
 _TCP = f"tcp://{LOOPBACK}:"
 _LOCAL = "ipc://@nep-"
 _ROOM_TO_BIND = 384
 _ROOM_TO_STAY = 192
-"""So many connections at once come to nobody within the second in which room is looked for again."""
+"""Free descriptors to keep: enough for the connections that can arrive between two checks."""
 _reached: set[bool] = set()
-"""Holds True once a program was reached in this way: then none is tried out any more."""
+"""Contains True after the first successful probe; later probes are skipped."""
 
 
 def has_local_names() -> bool:
-    """Whether this computer has such names."""
+    """Return True if this system has abstract Unix sockets."""
     return sys.platform == "linux" and zmq.has("ipc")
 
 
 def may_stay() -> bool:
-    """Whether this process has room for those who come by such a name.
+    """Return True if this process has enough free descriptors to accept connections on a Unix socket.
 
-    libzmq 4.3 ends the program when it has no descriptor for them; who comes by TCP just waits.
+    libzmq 4.3 aborts the process when it has none left; TCP connections wait in the kernel instead.
     """
     return has_room(_ROOM_TO_STAY)
 
 
 def local_of(endpoint: str) -> str:
-    """The name beside a loopback endpoint; "" for any other."""
+    """Return the Unix socket name for a loopback endpoint; "" for other endpoints."""
     return f"{_LOCAL}{endpoint.removeprefix(_TCP)}" if endpoint.startswith(_TCP) else ""
 
 
 def _bind_beside(owner: Socket, endpoint: str) -> str:
-    """Bind to the name beside a loopback endpoint; "" when it cannot be: then there is TCP."""
     name = (
         local_of(endpoint)
         if has_local_names() and has_room(_ROOM_TO_BIND) and os.environ.get("NEP_LOCAL", "") != "0"
@@ -74,7 +74,7 @@ def _bind_beside(owner: Socket, endpoint: str) -> str:
 
 
 def _is_reached(name: str) -> bool:
-    """Whether a program can be reached by this name: a sandbox may forbid it. Asked in earnest only once."""
+    # A sandbox may block Unix sockets. The first success is cached.
     if not _reached:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
@@ -87,9 +87,9 @@ def _is_reached(name: str) -> bool:
 
 
 def in_reach(remote: RemotePublisher, master: str) -> RemotePublisher:
-    """A publisher with the one endpoint at which a program reaches it that knows its master as `master`.
+    """Reduce a publisher's endpoints to the one to connect to from a node that knows its master as `master`.
 
-    On the master's computer that is the publisher's name, where it has one.
+    On the master's computer this is the publisher's Unix socket, if it has one.
     """
     publisher = remote.publisher
     if not publisher.endpoints:
@@ -102,9 +102,12 @@ def in_reach(remote: RemotePublisher, master: str) -> RemotePublisher:
 
 
 class Bindings:
-    """Belongs to the owner of `socket` and is used under its lock. `may_be_local`: bind the names, too.
+    """Bound endpoints of `socket`; guarded by the lock of the socket's owner.
 
-    `is_watched`: the owner looks after silent connections, see `keep_alive`.
+    Args:
+        socket: Socket to bind.
+        may_be_local: True to bind Unix socket names as well.
+        is_watched: True if the owner closes silent connections itself, see `keep_alive`.
     """
 
     def __init__(self, socket: Socket, *, may_be_local: bool, is_watched: bool = False) -> None:
@@ -113,23 +116,23 @@ class Bindings:
         self._is_watched = is_watched
         self._bound: dict[str, str] = {}
         self._local: dict[str, str] = {}
-        """The names beside them, by host."""
+        """Bound Unix socket names, by host."""
 
     @property
     def is_local(self) -> bool:
-        """Whether it is also bound to the name beside its loopback endpoint."""
+        """True if a Unix socket name is bound beside the loopback endpoint."""
         return bool(self._local)
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """All that it is bound to."""
+        """All bound endpoints."""
         return (*self._bound.values(), *self._local.values())
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind at these hosts and no others, each with a port of its own; the endpoints, in their order.
+        """Bind exactly these hosts, each at a port of its own; return the endpoints in the same order.
 
-        A host at which nothing can be bound is left out; raises `AddressInUseError` or
-        `TooManyFilesError` when none is left.
+        Hosts that can't be bound are skipped. Raises `AddressInUseError` or `TooManyFilesError` if none is
+        left.
         """
         for host in [known for known in self._bound if known not in hosts]:
             self._leave(host)
@@ -149,7 +152,7 @@ class Bindings:
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
     def leave_local(self) -> None:
-        """Be reached by TCP only from now on. Connections that are there stay."""
+        """Unbind the Unix socket names; existing connections stay open."""
         for name in self._local.values():
             self._unbind(name)
         self._local.clear()
@@ -161,5 +164,5 @@ class Bindings:
     def _unbind(self, endpoint: str) -> None:
         try:
             self._socket.unbind(endpoint)
-        except zmq.ZMQError as error:  # the address is gone: there was nothing to give back
+        except zmq.ZMQError as error:  # the address has disappeared, and with it the binding
             _logger.debug("'%s' could not be unbound: %s", endpoint, error)

@@ -1,7 +1,7 @@
-"""What is under way to subscribers, in bytes: libzmq bounds its queues by a number of messages only.
+"""Flow control in bytes, because libzmq bounds its queues only by a number of messages. No sockets.
 
-A `SendWindow` is for a subscriber that tells what it has read: what is queued here, in the kernel and in its
-own socket. `Backlog` is for all others: what libzmq still holds here. No sockets.
+`SendWindow` is for subscribers that acknowledge what they have read; it covers the queues of both sockets and
+of the kernel. `Backlog` is for all others and covers only what libzmq still queues in this process.
 """
 
 from __future__ import annotations
@@ -12,25 +12,28 @@ from typing import Protocol
 __all__ = ["BACKLOG_STEP_BYTES", "STEP_BYTES", "WINDOW_BYTES", "WINDOW_LEAST_BYTES", "Backlog", "SendWindow"]
 
 WINDOW_BYTES = 192 * 2**20
-"""So much may be under way to one subscriber. With the batch that its sink works on these are 256 MB."""
+"""Maximum number of unacknowledged bytes per subscriber. With the batch in its sink this makes 256 MB."""
 WINDOW_LEAST_BYTES = 24 * 2**20
-"""The least that a subscriber may ask for: two steps, so that nobody waits for each message to be read."""
+"""Smallest window that a subscriber may request: two steps, so that messages don't wait for each
+acknowledgement.
+"""
 STEP_BYTES = 12 * 2**20
-"""How often a subscriber is asked what it has read."""
+"""Bytes after which a subscriber is asked for an acknowledgement."""
 BACKLOG_STEP_BYTES = 2**20
-"""How often it is noted what libzmq holds for those that cannot be asked."""
+"""Bytes after which a message is tracked for subscribers without acknowledgements."""
 _ENTRY_BYTES = 2**20
-"""Small messages share an entry, which counts until the newest of them was read."""
+"""Small messages share an entry up to this size; it is acknowledged with its newest message."""
 _ASK_AGAIN_S = 0.5
-"""A subscriber without room is asked again after this: libzmq drops a question when its own queue is full."""
+"""Interval to repeat a request while a subscriber has no room: libzmq drops requests when its queue is full.
+"""
 
 
 class SendWindow:
-    """What was sent to one subscriber and is not known to be read. It lives under its publisher's lock."""
+    """Unacknowledged messages of one subscriber. Guarded by the publisher's lock."""
 
     def __init__(self) -> None:
         self.under_way = 0
-        """Bytes."""
+        """Unacknowledged bytes."""
         self._bound = WINDOW_BYTES
         self._sent: deque[tuple[int, int]] = deque()
         self._unasked = 0
@@ -38,11 +41,14 @@ class SendWindow:
         self._has_missed = False
 
     def has_room(self, size_bytes: int) -> bool:
-        """Whether a message of this size may follow. A larger one than the window has to wait for a step."""
+        """Return True if a message of this size can be sent.
+
+        One larger than the window waits for an almost empty one.
+        """
         return self.under_way <= STEP_BYTES or self.under_way + size_bytes <= self._bound
 
     def sent(self, seq: int, size_bytes: int) -> None:
-        """So many bytes more are under way, up to the message `seq`."""
+        """Count `size_bytes` that were sent up to and including message `seq`."""
         if self._sent and self._sent[-1][1] + size_bytes <= _ENTRY_BYTES:
             self._sent.append((seq, self._sent.pop()[1] + size_bytes))
         else:
@@ -51,24 +57,24 @@ class SendWindow:
         self._unasked += size_bytes
 
     def missed(self) -> None:
-        """There was no room for a message."""
+        """Note that a message was dropped for lack of room."""
         self._has_missed = True
 
     def is_to_tell(self) -> bool:
-        """Whether it has room again and does not know yet what it missed; True counts as telling."""
+        """Return True, once, if the subscriber has room again after a drop and should be notified."""
         if not self._has_missed or self.under_way > STEP_BYTES:
             return False
         self._has_missed = False
         return True
 
     def read(self, seq: int, bound_bytes: int) -> None:
-        """The subscriber has read everything up to `seq`, and wants so much under way at most."""
+        """Process an acknowledgement of everything up to `seq`, and adopt `bound_bytes` as the window."""
         self._bound = max(WINDOW_LEAST_BYTES, min(bound_bytes, WINDOW_BYTES))
         while self._sent and self._sent[0][0] <= seq:
             self.under_way -= self._sent.popleft()[1]
 
     def is_to_ask(self, now: float, *, has_room: bool) -> bool:
-        """Whether to ask it now what it has read; True counts as asking."""
+        """Return True, and reset the interval, if the subscriber should be asked for an acknowledgement."""
         if self._unasked < STEP_BYTES and (has_room or now < self._asked_at + _ASK_AGAIN_S):
             return False
         self._unasked = 0
@@ -77,17 +83,18 @@ class SendWindow:
 
 
 class Tracker(Protocol):
-    """Tells when libzmq has let go of a message's bytes; pyzmq's `MessageTracker`."""
+    """Object that reports when libzmq has released a message, as `zmq.MessageTracker` does."""
 
     @property
     def done(self) -> bool:
-        """Whether it has, for all connections."""
+        """True after libzmq has released the message for all connections."""
 
 
 class Backlog:
-    """What libzmq holds for the slowest of those that cannot be asked, at most. Messages leave it in order.
+    """Upper bound of what libzmq queues for the slowest subscriber without acknowledgements.
 
-    Only some messages are tracked: while one is held, all since are counted as held, too.
+    Only some messages are tracked. Messages are released in order, so while a tracked one is queued, all sent
+    since are counted as queued, too.
     """
 
     def __init__(self) -> None:
@@ -95,12 +102,12 @@ class Backlog:
         self._bytes = 0
 
     def has_room(self, size_bytes: int) -> bool:
-        """Whether a message of this size may follow."""
+        """Return True if a message of this size can be sent."""
         while self._held and self._held[0][0].done:
             self._bytes -= self._held.popleft()[1]
         return self._bytes <= BACKLOG_STEP_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
 
     def sent(self, tracker: Tracker, size_bytes: int) -> None:
-        """So many bytes were sent since the last call; the newest message is tracked."""
+        """Count `size_bytes` sent since the last call; `tracker` belongs to the newest message."""
         self._held.append((tracker, size_bytes))
         self._bytes += size_bytes

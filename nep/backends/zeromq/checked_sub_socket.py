@@ -1,8 +1,8 @@
-"""SubSocket that checks each message against the connection over which it came.
+"""SubSocket that verifies which connection each message came over.
 
-A message names its publisher in its header, and whoever is connected may write any number there. libzmq
-tells the descriptor of the connection of each message (ZMQ_SRCFD), and the system tells where that leads to:
-it must be the endpoint that the master lists for this publisher. docs/trust.md says what that leaves open.
+The header of a message contains the id of its publisher, which any sender could forge. libzmq reports the
+descriptor of a message's connection (ZMQ_SRCFD), and the system reports its peer address, which must be the
+endpoint that the master lists for this publisher. docs/trust.md describes the remaining risks.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nep.protocol.wire import HEADER_BYTES, unpack_at, unpack_quickly
 __all__ = ["CHECKED_TYPES", "CheckedSubSocket"]
 
 CHECKED_TYPES = frozenset({"robot/answer"})
-"""Types of messages that count only from their own publisher: the proof of a robot's stop."""
+"""Message types that are accepted only from their own publisher: the confirmation of a robot's stop."""
 
 _DONTWAIT = int(zmq.DONTWAIT)
 _SRCFD = int(zmq.SRCFD)
@@ -29,13 +29,13 @@ _ADDRESS = re.compile(r"\d+\.\d+\.\d+\.\d+", re.ASCII)
 
 
 class CheckedSubSocket(SubSocket):
-    """Drops what does not come from the endpoint of the publisher that it names; costs 10 µs a message."""
+    """SubSocket that rejects messages with a forged publisher id. Costs 10 µs per message."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         super().__init__(socket, spec)
         self._recv = self._receive_checked
         self._following: list[zmq.Frame] = []
-        """Parts of a message that were received with its first one."""
+        """Remaining parts of the current message, received together with the first one."""
 
     def _receive_checked(self, flags: int = 0, copy: bool = True) -> bytes | zmq.Frame:
         while not self._following:
@@ -65,10 +65,9 @@ class CheckedSubSocket(SubSocket):
 
 
 def _leads_to(frame: zmq.Frame, endpoint: str) -> bool:
-    """Whether a message came over a connection to this endpoint."""
     try:
         connection = sockets.socket(fileno=frame.get(_SRCFD))
-    except (OSError, ValueError, zmq.ZMQError):  # it has ended since: nobody can say any more
+    except (OSError, ValueError, zmq.ZMQError):  # closed since: the peer is unknown
         return False
     try:
         peer = connection.getpeername()

@@ -1,16 +1,17 @@
-"""IoThread: a thread that serves sockets: one for all nodes of a process, and one for the sinks of a node.
+"""IoThread: event loop for sockets.
 
-A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread never polls sockets. It
-polls their raw descriptors, and an owner then takes its lock and works until its socket has nothing more. A
-descriptor tells of a change only once, and any use of the socket may swallow that; so whoever uses a socket
-in another thread either empties it or asks for `serve_soon`.
+One thread serves all nodes of a process; each node has one for its sinks.
 
-Nothing ends this thread but `close`: an owner that fails is tried again each second, and when the system
-cannot poll (a descriptor was closed under it), it polls anew without those that are broken.
+A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread never polls sockets,
+only their file descriptors. When one is readable, its owner takes the lock and works until the socket is
+empty. ZMQ_FD is edge-triggered and any use of the socket may consume the edge; a thread that uses a socket
+therefore must either empty it or call `serve_soon`.
 
-`SharedContext` is the one ZeroMQ context of this process with the thread for all its nodes. It is made with
-the first node that needs it and ends with the last. A context of its own would cost every node three threads
-and a dozen descriptors.
+Only `close` ends the thread: an owner that raises is served again after a second, and when polling itself
+fails (a descriptor was closed under it), the poller is rebuilt without the broken descriptors.
+
+`SharedContext` is the ZeroMQ context of the process and its I/O thread, created with the first node and
+terminated with the last. A context per node would cost three threads and a dozen descriptors each.
 """
 
 from __future__ import annotations
@@ -43,23 +44,26 @@ _logger = logging.getLogger("nep.io")
 _RETRY_S = 1.0
 
 _MAX_SOCKETS = 65_535
-"""libzmq's highest limit: what bounds a program is how many files it may open."""
+"""libzmq's upper limit; the limit on open files is reached first."""
 _CONTEXT_FILES = 12
 _SOCKET_FILES = 4
-"""A socket, its port, its local name, and a connection."""
+"""Descriptors per socket: the socket, its port, its Unix socket name and a connection."""
 _IDLE_WAKERS = 8
 _LOOKS, _LOOK_S = 10, 0.01
 _Ready = tuple[selectors.SelectorKey, int]
 _ROUNDED_S = 0.001
 _ROUNDING = getattr(selectors, "EpollSelector", ())
 _SELECT_MOST = 1024
-"""`select` takes descriptors below this."""
+"""`select` supports descriptors below this number."""
 
 
 class Rest(NamedTuple):
-    """What an owner wants next: to be served at `due`; with `is_quiet` not to be polled for input until then.
+    """Next wake-up condition of a socket's owner.
 
-    With `sends` it is served, too, as soon as its descriptor can be written: never said of ZeroMQ's.
+    Attributes:
+        is_quiet: True to pause reading until `due`.
+        due: Time (`time.monotonic`) at which to serve it again; None to wait for input only.
+        sends: True to serve it also when its descriptor is writable. Not for ZeroMQ sockets.
     """
 
     is_quiet: bool = False
@@ -68,18 +72,21 @@ class Rest(NamedTuple):
 
 
 class Served(Protocol):
-    """An owner of a socket."""
+    """Owner of a socket that an `IoThread` serves."""
 
     @property
     def fd(self) -> int:
-        """The socket's descriptor."""
+        """File descriptor of the socket."""
 
     def serve(self, now: float) -> Rest:
-        """Work until the socket has nothing more. Takes the owner's lock; does not wait."""
+        """Process input until the socket is empty. Takes the owner's lock; doesn't block."""
 
 
 class IoThread:
-    """See the module. `add` may be called before `start`. `new_selector` makes what polls."""
+    """Event loop thread; see the module.
+
+    `add` may be called before `start`. `new_selector` creates the poller.
+    """
 
     def __init__(
         self, name: str, new_selector: Callable[[], selectors.BaseSelector] = selectors.DefaultSelector
@@ -91,9 +98,9 @@ class IoThread:
         self._orders: deque[tuple[str, Served, threading.Event | None]] = deque()
         self._served: set[Served] = set()
         self._polled: dict[Served, tuple[int, int]] = {}
-        """The descriptor of each, and what it is polled for."""
+        """Registered descriptor and event mask of each owner."""
         self._doubtful: set[Served] = set()
-        """Those that may be what could not be polled: tried alone before they are polled with the others."""
+        """Owners that may have broken the poller: each is polled alone before it is registered again."""
         self._due: dict[Served, float] = {}
         self._heap: list[tuple[float, int, Served]] = []
         self._numbers = itertools.count()
@@ -111,17 +118,18 @@ class IoThread:
         self._thread.start()
 
     def add(self, served: Served) -> None:
-        """Serve this one from now on, at once for the first time."""
+        """Start serving `served`; its first call follows at once."""
         self._order("add", served, None)
 
     def serve_soon(self, served: Served) -> None:
-        """Serve it again, whatever its descriptor says."""
+        """Serve `served` again, whether its descriptor is ready or not."""
         self._order("soon", served, None)
 
     def remove(self, served: Served, timeout_s: float = 2.0) -> None:
-        """Let go of it; when this returns its descriptor is polled no more and its socket may be closed.
+        """Stop serving `served`; afterwards its socket may be closed.
 
-        A thread that is held up (in a sink that does not return) is waited for only once.
+        While the thread is blocked (by a sink that doesn't return), only the first call waits for
+        `timeout_s`.
         """
         if threading.current_thread() is self._thread or not self._thread.is_alive():
             self._forget(served)
@@ -132,7 +140,7 @@ class IoThread:
             self._stuck_in = self._turns
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """End the thread; wait for that at most so long."""
+        """Stop the thread and join it for up to `timeout_s` seconds."""
         self._is_closing = True
         self._pause.set()
         self._waker.wake()
@@ -142,7 +150,7 @@ class IoThread:
             self._thread.join(timeout_s)
 
     def forked(self) -> None:
-        """In a child: the thread is not there; what polls belongs to the parent, too, and is not changed."""
+        """Become closed in a forked child, which has no such thread and shares the parent's poller."""
         self._is_closing = True
         self._pause = threading.Event()
         self._served.clear()
@@ -153,7 +161,7 @@ class IoThread:
         self._orders.append((what, served, done))
         self._waker.wake()
 
-    # ---- in the thread
+    # ---- in the I/O thread
 
     def _run(self) -> None:
         while not self._is_closing:
@@ -172,7 +180,7 @@ class IoThread:
     def _turn(self) -> None:
         timeout_s = self._timeout()
         ready = _ready(self._selector, timeout_s)
-        # Each system call lets another thread go on, and waits for it: so none without need.
+        # Each system call releases the GIL and then waits for it, so avoid needless ones.
         if any(key.data is None for key, _events in ready):
             self._waker.clear()
         self._obey()
@@ -182,9 +190,8 @@ class IoThread:
         self._serve_due()
 
     def _begin_anew(self) -> None:
-        """Another poll for all that is served; whoever cannot be polled is served each second."""
         while not self._is_closing:
-            with suppress(Exception):  # it may be what is broken
+            with suppress(Exception):  # the selector itself may be broken
                 self._selector.close()
             try:
                 self._selector = self._new_selector()
@@ -216,11 +223,11 @@ class IoThread:
         now = time.monotonic()
         try:
             rest = served.serve(now)
-        except Exception:  # one broken socket must not silence the others
+        except Exception:  # one broken socket must not block the others
             _logger.exception("a socket could not be served")
             rest = Rest(is_quiet=True, due=now + _RETRY_S)
         if served not in self._served or self._is_closing:
-            return  # it was removed while it was served
+            return  # removed while it was served
         try:
             self._poll(served, _events(rest))
         except (OSError, ValueError, KeyError) as error:
@@ -239,7 +246,7 @@ class IoThread:
         late: list[Served] = []
         while self._heap and self._heap[0][0] <= now:
             due, _number, served = heapq.heappop(self._heap)
-            if self._due.get(served) == due:  # else it was put off since
+            if self._due.get(served) == due:  # otherwise it was rescheduled
                 del self._due[served]
                 late.append(served)
         for served in late:
@@ -252,10 +259,7 @@ class IoThread:
         return max(0.0, self._heap[0][0] - time.monotonic()) if self._heap else None
 
     def _try_alone(self, served: Served, wanted: int) -> None:
-        """Raises OSError or ValueError when it can't be polled.
-
-        Windows' select says so only while it polls, and then serves none of all sockets.
-        """
+        # Windows' select reports a broken descriptor only while polling, and then for the whole set.
         with self._new_selector() as trial:
             trial.register(served.fd, wanted)
             trial.select(0)
@@ -281,7 +285,7 @@ class IoThread:
         self._doubtful.discard(served)
         self._due.pop(served, None)
         if served in self._polled:
-            with suppress(OSError, ValueError, KeyError):  # the poll is closed, or was begun anew without it
+            with suppress(OSError, ValueError, KeyError):  # the poller is closed or was rebuilt
                 self._poll(served, 0)
 
     def _release(self) -> None:
@@ -294,7 +298,7 @@ def _events(rest: Rest) -> int:
 
 
 def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_Ready]:
-    """Those that are ready within this time, also where epoll alone would wait for a whole millisecond."""
+    # epoll rounds timeouts up to a whole millisecond.
     if (
         timeout_s
         and timeout_s < _ROUNDED_S
@@ -308,12 +312,12 @@ def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequenc
 
 
 class SharedContext:
-    """See the module. `shared_context` gives it out; whoever got it calls `leave` once."""
+    """ZeroMQ context of the process; see the module. Each `shared_context` call needs one `leave` call."""
 
     def __init__(self) -> None:
         check_room(_CONTEXT_FILES, "a node")
         self._context: zmq.Context[Socket] = zmq.Context()
-        # libzmq refuses more than it was made for, which on Windows is 16383.
+        # libzmq rejects values above its compile-time limit, which is 16383 on Windows
         self._context.set(zmq.MAX_SOCKETS, min(_MAX_SOCKETS, self._context.get(zmq.SOCKET_LIMIT)))
         self.io = IoThread("nep-io")
         self._lock = threading.Lock()
@@ -321,7 +325,7 @@ class SharedContext:
         self._pause = threading.Event()
         self._is_over = False
         self.users = 0
-        """How many joined and have not left; under the lock of this module."""
+        """Number of users. Guarded by the module's lock."""
         try:
             self.io.start()
         except BaseException:
@@ -329,7 +333,7 @@ class SharedContext:
             raise
 
     def socket(self, kind: int, what: str) -> Socket:
-        """A socket that drops what it has when it is closed. Raises `TooManyFilesError`, for `what`."""
+        """Create a socket with a linger of 0. Raises `TooManyFilesError`, which names `what`."""
         self._wait_for_room(what)
         try:
             made = self._context.socket(kind)
@@ -343,7 +347,7 @@ class SharedContext:
         return made
 
     def _wait_for_room(self, what: str) -> None:
-        """For a moment: libzmq closes sockets in its own time, and some may just have been closed."""
+        # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
         for _ in range(_LOOKS):
             if has_room(_SOCKET_FILES + SPARE):
                 return
@@ -351,12 +355,12 @@ class SharedContext:
         check_room(_SOCKET_FILES, what)
 
     def take_waker(self) -> Waker:
-        """A waker for a thread that begins to wait. Raises `TooManyFilesError`."""
+        """Return a waker for a waiting thread. Raises `TooManyFilesError`."""
         with self._lock:
             return self._idle_wakers.pop() if self._idle_wakers else Waker()
 
     def give_waker(self, waker: Waker) -> None:
-        """It waits no more; the waker is kept for the next."""
+        """Return a waker to the pool."""
         waker.clear()
         with self._lock:
             if not self._is_over and len(self._idle_wakers) < _IDLE_WAKERS:
@@ -365,12 +369,15 @@ class SharedContext:
         waker.close()
 
     def join(self) -> None:
-        """Count one more user of a context that has one: it is not terminated before `leave`."""
+        """Add a user, so that the context isn't terminated before the matching `leave`."""
         with _lock:
             self.users += 1
 
     def leave(self) -> None:
-        """Whoever joined has closed all its sockets. The last one ends thread and context."""
+        """Remove a user that has closed all its sockets.
+
+        The last one stops the thread and terminates the context.
+        """
         with _lock:
             self.users -= 1
             if self.users:
@@ -394,11 +401,11 @@ _shared: SharedContext | None = None
 _inherited: list[SharedContext] = []
 
 
-"""Those of the processes that this one was forked from: kept, because nothing of them may be touched."""
+"""Contexts inherited by a forked child. They are kept because destroying them would affect the parent."""
 
 
 def shared_context() -> SharedContext:
-    """The context of this process, made when there is none. Raises `TooManyFilesError`."""
+    """Return the context of this process; create it if needed. Raises `TooManyFilesError`."""
     global _shared  # noqa: PLW0603 - there is one a process
     with _lock:
         if _shared is None:
@@ -419,7 +426,7 @@ def _forked() -> None:
     if _shared is not None:
         _inherited.append(_shared)
         _shared = None
-    # pyzmq makes its thread for what is sent without a copy under this lock: a fork just then leaves it held.
+    # pyzmq starts its garbage-collection thread under this lock; a fork at that moment leaves it locked.
     garbage.gc._lock = threading.Lock()  # noqa: SLF001
 
 

@@ -1,8 +1,8 @@
-"""Direct connections: no master, one address that one side binds; the frames of the original NEP.
+"""Direct connections on the original wire: one fixed address without a master.
 
-Such a frame says one datum in one part. Up to 0.5.4.5 (generation A) the topic stands in front
-(`topic {"a":1}`), from 0.5.4.8 on (B) it does not, but for `dictionary`; `image` always has it, `images`,
-`bytes` and `msgpack` never. Pictures are base64.
+A frame is one part with one payload. Up to 0.5.4.5 (generation A) the topic precedes it (`topic {"a":1}`);
+from 0.5.4.8 on (B) only for `dictionary`. `image` always has the prefix; `images`, `bytes` and `msgpack`
+never. Images are base64.
 """
 
 from __future__ import annotations
@@ -53,28 +53,31 @@ _JSON_BEGINS = frozenset(b'{["-0123456789tfnNI')
 
 _MARKS = {"image": 64, "bytes": 1000}
 _MARK = 10_000
-"""How many messages libzmq queues for each connection. For what is small these are fewer bytes than it may
-hold for all of them together, so that one subscriber that reads nothing takes nothing from the others."""
+"""High-water mark in messages per connection.
+
+For small messages this stays below the byte limit of all connections together, so that one subscriber that
+doesn't read can't use up the others' room.
+"""
 _logger = logging.getLogger("nep")
 _TOLD_MS = 100
-"""How soon after its linger libzmq says that a socket is closed."""
+"""Time that libzmq may need after the linger period to report a socket as closed."""
 
 
 def has_prefix(generation: str, msg_type: str) -> bool:
-    """Whether a program of this generation writes the topic in front."""
+    """Return True if programs of this generation send the topic as a prefix."""
     return msg_type in _ALWAYS or (generation == "A" and msg_type not in _NEVER)
 
 
 def to_frame(topic: str, generation: str, msg_type: str, codec: str, data: bytes | memoryview) -> bytes:
-    """The frame that says `data`, which are bytes of the native codec."""
+    """Encode a payload, given in its native encoding, as a frame."""
     body = base64.b64encode(data) if codec == "image" else bytes(data)
     return topic.encode() + b" " + body if has_prefix(generation, msg_type) else body
 
 
 def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | None:
-    """The datum in `frame`, of either generation; None when it belongs to another topic of the same port.
+    """Decode a frame of either generation; return None if it belongs to another topic of the same port.
 
-    Raises `WireError` for a picture that is not base64.
+    Raises `WireError` for an image that is not valid base64.
     """
     prefix = topic.encode() + b" "
     if msg_type in _NEVER and codec != "image":
@@ -94,9 +97,9 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
-    """Bind or connect as the mode says; the endpoint. Raises `AddressInUseError`."""
+    """Bind or connect according to the mode; return the endpoint. Raises `AddressInUseError`."""
     if direct.mode == "many2many":
-        # Both connect, to the two ports of a proxy of the original NEP.
+        # both sides connect, to the two ports of the original NEP's proxy
         return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
     binds = is_publisher == (direct.mode == "one2many")
     address = f"{direct.ip}:{direct.port}"
@@ -104,7 +107,10 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
 
 
 class OriginalPublisher:
-    """Owns `socket`, an XPUB that looks to the originals like their PUB."""
+    """Publisher on the original wire.
+
+    Owns `socket`, an XPUB that looks like a PUB to the original programs.
+    """
 
     def __init__(
         self,
@@ -126,9 +132,10 @@ class OriginalPublisher:
         socket.setsockopt(zmq.SNDHWM, _MARKS.get(spec.codec.name, _MARK))
         self._deadline = 0.0
         self._changed = threading.Condition(threading.Lock())
-        socket.setsockopt(zmq.XPUB_VERBOSER, 1)  # so that filters can be counted: one a subscriber
+        # report every unsubscribe, so that filters can be counted: one per subscriber
+        socket.setsockopt(zmq.XPUB_VERBOSER, 1)
         self.fd = int(socket.getsockopt(zmq.FD))
-        # libzmq tells there when it has sent everything and has let go of the socket.
+        # libzmq reports here when everything is sent and the socket is closed
         place = f"inproc://ended-{spec.id:x}"
         socket.monitor(place, zmq.EVENT_MONITOR_STOPPED)
         self._end: Socket = socket.context.socket(zmq.PAIR)
@@ -137,28 +144,28 @@ class OriginalPublisher:
 
     @property
     def is_heard(self) -> bool:
-        """Whether there are any filters."""
+        """True if there are any filters."""
         return self._filters > 0
 
     @property
     def subscribers(self) -> int:
-        """How many filters there are now; a proxy in between counts as one."""
+        """Number of filters; a proxy in between counts as one."""
         return self._filters
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait until somebody listens."""
+        """Wait until a subscriber connects, for up to `timeout_s` seconds."""
         with self._changed:
             wait_until(self._changed, lambda: self._filters > 0, timeout_s)
 
     def report(self, problem: str) -> None:
-        """There is no graph that could show it."""
+        """Ignore the problem: there is no graph to show it."""
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: the original wire has no shared memory."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._changed:
             self.count += 1
 
@@ -185,34 +192,40 @@ class OriginalPublisher:
         self._backlog.sent(tracked.tracker, self._untracked_bytes)
         self._untracked_bytes = 0
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
-        """Read filters."""
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - nothing to schedule
+        """Process subscriptions."""
         with self._changed:
             self._read_filters()
         return Rest()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        """Unregister, flush and close the socket. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Nothing is published any more."""
+        """Stop accepting messages."""
         with self._changed:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """The original wire has no way to ask: closing lingers until `deadline`, see `release`."""
+        """Set the deadline for flushing.
+
+        The original wire has no acknowledgement; `release` lingers instead.
+        """
         self._deadline = deadline
 
     def flush(self, deadline: float) -> None:
-        """Close the socket; libzmq goes on sending until `deadline`. The node's thread has let go of it."""
+        """Close the socket; libzmq keeps sending until `deadline`.
+
+        The I/O thread must not serve it any more.
+        """
         with self._changed:
             self._is_closed = True
             self._deadline = deadline
             self._socket.close(self._left_ms())
 
     def release(self) -> None:
-        """Close the socket and wait until libzmq has sent everything; log it when it could not in time."""
+        """Close the socket and wait until libzmq has sent everything; log a warning at the deadline."""
         if not self._socket.closed:
             self.flush(self._deadline)
         with self._changed:
@@ -239,7 +252,7 @@ class OriginalPublisher:
 
 
 class OriginalSubSocket(ReadOneByOne):
-    """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
+    """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -256,11 +269,11 @@ class OriginalSubSocket(ReadOneByOne):
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read."""
+        """True if a message can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
-        """The next message of this topic."""
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+        """Return the next message of this topic, or None."""
         while True:
             try:
                 parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)
@@ -283,7 +296,7 @@ class OriginalSubSocket(ReadOneByOne):
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
 
     def dropped(self, count: int) -> None:
-        """Dropped here for lack of room: the only losses that can be known."""
+        """Count messages dropped here for lack of room: the only losses that can be known."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

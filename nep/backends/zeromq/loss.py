@@ -1,4 +1,4 @@
-"""The publishers that a subscriber hears, and how many of their messages were lost. No sockets."""
+"""Sequence numbers of a subscriber's publishers, and the count of lost messages. No sockets."""
 
 from __future__ import annotations
 
@@ -17,57 +17,58 @@ from nep.system.computer import computer_id
 __all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
 
 FAREWELL_S = 3.0
-"""So long after a publisher has unregistered its last messages may still come."""
+"""Time in seconds after a publisher has unregistered in which its last messages may still arrive."""
 EARLY_S = 5.0
 GAP_MAX = 2**32
-"""More messages than these nobody misses at once: an hour of a million a second."""
+"""Largest accepted gap in sequence numbers: an hour at a million messages per second."""
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
 UNLISTED_MAX = 1000
-"""So many publishers are remembered that no master lists: whoever sends on a topic may call itself any."""
+"""Maximum number of remembered publishers that aren't listed by the master: any sender can invent ids."""
 _UNKNOWN = kind_of("", "", "")
 
 
 @dataclass
 class HeardPublisher:
-    """One publisher.
+    """State of one publisher.
 
-    `last` is the number of its newest message that was received or counted as lost; None while unknown, 0 if
-    all of its messages are still to come.
+    `last` is the sequence number of its newest message received or counted as lost; None while unknown, 0 if
+    all of its messages are expected.
 
-    `form` is that of the header of its last message, and `kind` goes with it; 0 when there was none.
+    `form` is the header form of its last message, to which `kind` belongs; 0 if there is none.
     """
 
     form: int = 0
     shared_form: int = 0
-    """The same of its last message in shared memory."""
+    """Header form of its last message in shared memory."""
     kind: MessageKind = _UNKNOWN
     clock: PublisherClock = field(default_factory=PublisherClock)
-    """That of its computer; its messages ask it."""
+    """Clock of the publisher's computer, used by its messages."""
     remote: RemotePublisher | None = None
     endpoint: str = ""
     refused: str = ""
-    """The endpoint to which it could not be connected, and `problem` why."""
+    """Endpoint that couldn't be connected; `problem` has the reason."""
     problem: str = ""
     early_until: float | None = None
-    """Until then at most, what comes before the echo is left out: see `HeardPublishers.is_early`."""
+    """Time until which messages before the echo are skipped, see `HeardPublishers.is_early`."""
     last: int | None = None
     is_heard: bool = False
-    """Whether a message, an echo or a bye has been received."""
+    """True once a message, echo or bye was received."""
     is_connected: bool = False
-    """The same, since the socket was connected to `endpoint`."""
+    """True once one was received since the socket was connected to `endpoint`."""
     reconnect_s: float = MIN_RECONNECT_S
     reconnect_at: float = math.inf
     has_echoed: bool = False
     is_lapsed: bool = False
     ends_at: float | None = None
     promised: int = 0
-    """The newest message that the master, or its last word of it, has told of."""
+    """Newest sequence number reported by the master or by the publisher's unregistration."""
     late_from: int = 0
     late_to: int = 0
-    """These were counted as lost because they were promised, and may still come: as long as `late_to` is the
-    last, because what follows it overtook them."""
+    """First of the promised messages counted as lost that may still arrive. They can only do so while
+    `late_to` equals `last`: a later message would have been sent after them.
+    """
     leapt_to: int = 0
-    """The number of a message that was refused because too many would be missing before it; else 0."""
+    """Sequence number of a message that was rejected because the gap before it is too large; otherwise 0."""
 
     def connecting(self, endpoint: str) -> None:
         """Forget the previous connection; the next one is about to be made, over the same socket."""
@@ -80,19 +81,19 @@ class HeardPublisher:
 
 
 class HeardPublishers:
-    """Counts `received` and `lost`, from sequence numbers without gaps."""
+    """Counts `received` and `lost` by gaps in the sequence numbers."""
 
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
         self.by_id: dict[int, HeardPublisher] = {}
-        """All of them. Only to be looked at."""
+        """All publishers by id. Read-only for others."""
         self._clocks: Mapping[str, ClockDifference] = {}
         self._unlisted: dict[int, None] = {}
-        """Those that no master lists, the oldest first."""
+        """Ids of publishers that the master doesn't list, oldest first."""
 
     def get(self, publisher: int) -> HeardPublisher:
-        """The source of this id, made when it is new; the oldest that no master lists may go for it."""
+        """Return a publisher's state; create it if needed, which may evict the oldest unlisted one."""
         source = self.by_id.get(publisher)
         if source is None:
             source = self.by_id[publisher] = HeardPublisher()
@@ -102,13 +103,13 @@ class HeardPublishers:
         return source
 
     def expect_all_of(self, publisher: int) -> None:
-        """Count losses from the first message of a new publisher. Has no effect once it was heard."""
+        """Count losses from the first message of a new publisher. No effect once a message was received."""
         source = self.get(publisher)
         if source.last is None:
             source.last = 0
 
     def listed(self, remote: RemotePublisher) -> HeardPublisher:
-        """The source of a publisher that the master lists, made when it is new."""
+        """Return the state of a publisher that the master lists; create it if needed."""
         source = self.get(remote.publisher.id)
         source.remote = remote
         source.clock.difference = self._difference(remote)
@@ -116,7 +117,7 @@ class HeardPublishers:
         return source
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """By node, how the clocks of other computers differ from this one's: no others are known."""
+        """Set the clock differences of other computers, by node id."""
         self._clocks = clocks
         for source in self.by_id.values():
             if source.remote is not None:
@@ -126,28 +127,29 @@ class HeardPublishers:
         return SAME_CLOCK if _is_here(remote) else self._clocks.get(remote.node_id)
 
     def find(self, publisher: int) -> HeardPublisher | None:
-        """The source of this id, if there is one."""
+        """Return a publisher's state, or None."""
         return self.by_id.get(publisher)
 
     def pop(self, publisher: int) -> HeardPublisher | None:
-        """Forget a source."""
+        """Remove and return a publisher's state."""
         self._unlisted.pop(publisher, None)
         return self.by_id.pop(publisher, None)
 
     def items(self) -> list[tuple[int, HeardPublisher]]:
-        """All of them, by id."""
+        """Return all publishers and their states."""
         return list(self.by_id.items())
 
     @property
     def echoing(self) -> int:
-        """How many publishers have said that they see this subscriber."""
+        """Number of publishers that have confirmed this subscriber with an echo."""
         return sum(source.has_echoed for source in self.by_id.values())
 
     def arrived(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
-        """A message arrived; False when it was heard already: it came for this subscriber alone (latched).
+        """Count a message; return False for a duplicate.
 
-        Raises `WireError` when more than `GAP_MAX` would be missing before it. A publisher that goes on from
-        there counts anew: nobody knows then how many are missing.
+        Duplicates are possible with messages sent to this subscriber alone (latched). Raises `WireError` if
+        the gap before it exceeds `GAP_MAX`. If the publisher continues from there, counting restarts with an
+        unknown number of losses.
         """
         source = self.get(publisher)
         source.is_heard = source.is_connected = True
@@ -172,11 +174,11 @@ class HeardPublishers:
         return True
 
     def is_early(self, publisher: int) -> bool:
-        """Whether a message, not for this subscriber alone, is one that comes again before the echo.
+        """Return True if a message to all subscribers will be sent again before the echo.
 
-        Between a publisher's first look at a filter and at the hello behind it, messages go out to a new
-        subscriber: newer ones than those of its history, which follows with all of them. For a publisher that
-        does not greet that is over in a moment.
+        A publisher with a history may read this subscriber's filter before its hello. Messages sent in
+        between are newer than those of the history, which follows with all of them. Publishers that send no
+        echo are accepted after `EARLY_S`.
         """
         source = self.by_id.get(publisher)
         if source is None or source.has_echoed or source.is_heard or source.remote is None:
@@ -189,9 +191,9 @@ class HeardPublishers:
         return now < source.early_until
 
     def reached(self, publisher: int, seq: int) -> bool:
-        """An echo or a bye: messages up to `seq` were sent before it, on the same connection.
+        """Process an echo or bye: all messages up to `seq` were sent before it on the same connection.
 
-        False when that cannot be, because more than `GAP_MAX` would be missing: nothing is counted then.
+        Returns False, and counts nothing, if the gap exceeds `GAP_MAX`.
         """
         source = self.get(publisher)
         source.is_heard = source.is_connected = True
@@ -204,11 +206,11 @@ class HeardPublishers:
         return True
 
     def promised(self, publisher: int, seq: int) -> None:
-        """The master says that `seq` was sent. Nothing waits in the socket.
+        """Process the master's report that `seq` was sent. Call only when the socket is empty.
 
-        What was promised one renewal ago and has not come since is lost. Should it come after all, it is
-        taken off again. Also of publishers that are not listed any more: they may have ended while this
-        computer was cut off.
+        Messages reported one renewal ago and not received since are counted as lost; if they arrive after
+        all, they are subtracted again. Also applies to unlisted publishers, which may have ended while this
+        computer was disconnected.
         """
         source = self.by_id.get(publisher)
         if source is None or source.last is None or seq - source.last > GAP_MAX:
@@ -221,34 +223,34 @@ class HeardPublishers:
         source.promised = seq
 
     def dropped(self, count: int) -> None:
-        """So many messages that had been received were dropped for lack of room."""
+        """Count received messages that were dropped for lack of room."""
         self.received -= count
         self.lost += count
 
     def closing(self, publisher: int, final: int, now: float) -> None:
-        """A publisher has unregistered, or was replaced; its last message was `final`, if that is known."""
+        """Note that a publisher unregistered or was replaced; `final` is its last message, 0 if unknown."""
         source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
             source.ends_at = now + FAREWELL_S
             source.promised = max(source.promised, final)
 
     def lapsed(self, publisher: int, final: int) -> None:
-        """A publisher is not listed any more; `final` is the newest message that the master knew of."""
+        """Note that a publisher is no longer listed; `final` is the newest message known to the master."""
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_lapsed = True
             source.promised = max(source.promised, final)
 
     def settle(self, publisher: int) -> None:
-        """It is about to be left: what has not come of what was promised is lost for good."""
+        """Count the missing messages of a publisher that is about to be removed as lost."""
         source = self.by_id.get(publisher)
         if source is not None and source.last is not None:
             self.reached(publisher, source.promised)
 
     def ended(self, now: float) -> list[int]:
-        """Publishers to leave: they unregistered long ago and their bye has not come.
+        """Return publishers to remove.
 
-        Beside them the oldest of more than `UNLISTED_MAX` that fell silent and were not replaced.
+        These are unregistered ones whose bye is overdue, and the oldest silent ones beyond `UNLISTED_MAX`.
         """
         all_ = self.by_id.items()
         silent = [each for each, source in all_ if source.is_lapsed and source.ends_at is None]
@@ -264,7 +266,7 @@ class HeardPublishers:
         ]
 
     def replaced_by(self, remote: RemotePublisher) -> list[int]:
-        """Silent publishers whose program has been started again, as `remote`."""
+        """Return silent publishers that `remote` replaces: its program was restarted."""
         return [
             each
             for each, source in self.by_id.items()
@@ -276,10 +278,7 @@ class HeardPublishers:
 
 
 def _is_here(remote: RemotePublisher) -> bool:
-    """Whether a publisher is on this very computer.
-
-    Older programs do not say where they are: then how they are reached tells.
-    """
+    # Older versions don't send a computer id; the endpoint decides then.
     own = computer_id()
     if own and remote.computer:
         return own == remote.computer

@@ -1,7 +1,7 @@
-"""MasterSession: what a node has registered with one master: renews it when due, hears of publishers.
+"""MasterSession: a node's registrations at one master, renewed periodically.
 
-It keeps everything that is registered, so that a master that was started again learns all of it at once.
-`Pace` tells when to renew.
+Keeps everything that is registered, so that a restarted master receives it again at once. `Pace` schedules
+renewals.
 """
 
 from __future__ import annotations
@@ -64,60 +64,62 @@ from nep.system.cpu import CpuLoad
 __all__ = ["MasterSession", "Pace", "SessionPublisher", "SessionSubscriber"]
 
 _RENEW_LONGEST_S = 30.0
-"""A master cannot make a node wait for longer."""
+"""Upper bound for the renewal interval that a master may request."""
 
 _logger = logging.getLogger("nep")
 
 _FOLLOW_S = 1.0
-"""How often a node looks whether its publishers have to move."""
+"""Interval at which a node checks whether its publishers have to move to other addresses."""
 _JOIN_AGAIN_S = 0.5
 _CONNECT_AGAIN_S, _CONNECT_AGAIN_FAR_S = 2.0, 2 * CONNECT_MS / 1000
-"""libzmq gives a connection up after a failed handshake, as with a PUB socket at the master's address."""
+"""Reconnection interval. libzmq gives up after a failed handshake, as with a PUB socket at the master's
+address.
+"""
 
 
 class SessionPublisher(Protocol):
-    """A publisher as its session needs it."""
+    """Publisher as its session uses it."""
 
     @property
     def is_local(self) -> bool:
-        """Whether programs of this computer reach it without TCP, too: see `bindings`."""
+        """True if programs of this computer can connect without TCP, see `bindings`."""
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Be reached at these addresses of this computer from now on; the endpoints."""
+        """Bind at these addresses of this computer; return the endpoints."""
 
     def leave_local(self) -> None:
-        """Be reached by TCP only from now on."""
+        """Accept TCP connections only from now on."""
 
 
 class SessionSubscriber(Protocol):
-    """A subscriber as its session needs it."""
+    """Subscriber as its session uses it."""
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These publishers are there, too."""
+        """Connect to further publishers."""
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """A publisher is not listed any more."""
+        """Process the removal of a publisher."""
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These are all publishers that are there."""
+        """Replace the list of publishers."""
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """The newest messages of publishers that the master knows."""
+        """Process the newest sequence numbers known to the master."""
 
     def connect_again(self) -> None:
-        """This computer has another address: connect to those on others anew."""
+        """Reconnect to other computers, after the address of this one has changed."""
 
 
 class Pace:
-    """When a node renews what it has registered: every second, unless the master says otherwise.
+    """Renewal schedule: every second, unless the master requests another interval.
 
-    `due_at` is by the node's own clock.
+    `due_at` is a time of the node's own clock (`time.monotonic`).
     """
 
     def __init__(self) -> None:
@@ -125,19 +127,19 @@ class Pace:
         self._renew_s = RENEW_S
 
     def renews(self, now: float) -> None:
-        """It renews now; what follows if the master does not answer."""
+        """Note a renewal at `now`; schedules the next one in case the master doesn't reply."""
         self.due_at = now + self._renew_s
 
     def told(self, renew_s: float, now: float) -> None:
-        """Renew so soon; and so often while no answer comes."""
+        """Set the interval requested by the master."""
         self._renew_s = min(_RENEW_LONGEST_S, max(RENEW_S, renew_s))
         self.due_at = now + self._renew_s
 
 
 class MasterSession:
-    """The link of `node` to the master at `address`, over `socket` (a DEALER). `io` serves it.
+    """Registrations of `node` at the master at `address`, over `socket` (a DEALER) served by `io`.
 
-    `look_up` tells the address behind a name.
+    `look_up` resolves host names.
     """
 
     def __init__(
@@ -183,15 +185,15 @@ class MasterSession:
 
     @property
     def endpoint(self) -> str:
-        """Where it is connected."""
+        """Endpoint of the connection; "" before the master's address is resolved."""
         return self._calls.endpoint
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """The addresses of this computer at which publishers are to be reached.
+        """Addresses of this computer at which publishers bind.
 
-        On the master's computer these are the loopback address and those at which the master serves others;
-        elsewhere it is the one from which the way to the master begins.
+        On the master's computer these are the loopback address and those at which the master serves other
+        computers; elsewhere it is the address of the interface towards the master.
         """
         return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
 
@@ -199,17 +201,16 @@ class MasterSession:
 
     @property
     def is_idle(self) -> bool:
-        """Whether nothing is registered by it, and nobody waits for an answer."""
+        """True if nothing is registered and no request is pending."""
         with self._lock:
             return not self._publishers and not self._subscribers and not self._calls.is_asked
 
     def wait_for_name(self, wait_s: float | None) -> None:
-        """Wait until the master's address is known. Raises `MasterUnreachable`, None waits for ever."""
+        """Wait until the master's address is resolved; None waits forever. Raises `MasterUnreachable`."""
         if not self._name.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
 
     def _found(self, known: str) -> None:
-        """The master's address is another one than before."""
         if not self._is_near:
             self._own_host = host_towards(known) or self._own_host
         self._calls.lead_to(known)
@@ -217,7 +218,7 @@ class MasterSession:
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
     ) -> Added:
-        """Register; the subscribers to expect. Raises as `RpcClient.ask` does."""
+        """Register a publisher; return the subscribers to expect. Raises as `RpcClient.ask` does."""
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
@@ -228,7 +229,7 @@ class MasterSession:
         with self._lock:
             self._confirmed.add(record.id)
         added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
-        self._served = added.hosts  # a node's first publisher tells it whom the master serves
+        self._served = added.hosts  # the first registration returns the addresses that the master serves
         endpoints = publisher.move(self.hosts)
         if endpoints == record.endpoints or not endpoints:
             return added
@@ -241,7 +242,7 @@ class MasterSession:
         subscriber: SessionSubscriber | PatternSubscriber,
         wait_s: float | None,
     ) -> Found:
-        """Register; the publishers to connect to. Raises as `RpcClient.ask` does."""
+        """Register a subscriber; return the publishers to connect to. Raises as `RpcClient.ask` does."""
         with self._lock:
             self._subscribers[record.id] = (record, subscriber)
         try:
@@ -256,7 +257,7 @@ class MasterSession:
         return replace(reply, publishers=self._in_reach(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
-        """Unregister; does not wait."""
+        """Unregister a publisher; doesn't wait."""
         with self._lock:
             known = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
@@ -264,7 +265,7 @@ class MasterSession:
             self._calls.tell(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
-        """Unregister; does not wait."""
+        """Unregister a subscriber; doesn't wait."""
         with self._lock:
             known = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
@@ -272,11 +273,11 @@ class MasterSession:
             self._calls.tell(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
-        """Tell the master who did not answer."""
+        """Report subscribers that didn't complete the handshake."""
         self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def look(self, timeout_s: float) -> GraphView:
-        """The graph. Raises as `RpcClient.ask` does."""
+        """Return the graph. Raises as `RpcClient.ask` does."""
         self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)
         if not isinstance(reply, Seen):
@@ -286,13 +287,13 @@ class MasterSession:
         return reply.view
 
     def begin_leave(self) -> None:
-        """Unregister the node with all that it has, if there is a master. Does not wait."""
+        """Unregister the node, if the master is connected. Doesn't wait."""
         with self._lock:
             if self._is_closed:
                 return
-            self._is_closed = True  # nothing is joined from now on
+            self._is_closed = True  # no more joins from now on
         if self._calls.is_connected:
-            self._renew()  # subscribers that do not hear the bye learn from the master what was sent last
+            self._renew()  # subscribers that miss the bye learn the last sequence numbers from the master
         with self._lock:
             self._publishers.clear()
             self._subscribers.clear()
@@ -302,7 +303,7 @@ class MasterSession:
             self._left_at = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
-        """Wait until the master has heard it: `timeout_s` at most since the node began to leave."""
+        """Wait for the reply to `begin_leave`, for up to `timeout_s` seconds since it was sent."""
         if self._leaving is None:
             return
         left = timeout_s + self._left_at - time.monotonic()
@@ -317,10 +318,10 @@ class MasterSession:
         self._io.remove(self)
         self._calls.release()
 
-    # ---- in the node's thread
+    # ---- in the I/O thread
 
     def serve(self, now: float) -> Rest:
-        """Read answers; renew when it is time, and at once when a master has come back."""
+        """Process replies; renew when due, and at once after a reconnection."""
         answers = self._calls.read()
         self._read_at = self._clock.now() if answers else self._read_at
         for answer in answers:
@@ -354,7 +355,7 @@ class MasterSession:
             self._calls.connect_again()
 
     def _follow_addresses(self) -> None:
-        """Move publishers when this computer or the master has another address, or files are short."""
+        # Publishers move when an address of this computer or the master changes, or descriptors run out.
         if not self._is_near and self._name.known:
             self._own_host = host_towards(self._name.known) or self._own_host
             self._connect_from(self._own_host)
@@ -369,7 +370,7 @@ class MasterSession:
                 try:
                     moved = replace(record, endpoints=publisher.move(self.hosts), local=publisher.is_local)
                 except (AddressInUseError, TooManyFilesError):
-                    self._moved_to = ()  # tried again with the next renewal
+                    self._moved_to = ()  # try again at the next renewal
                     continue
                 if moved != record and moved.endpoints:
                     self._publishers[id] = (moved, publisher)
@@ -377,9 +378,9 @@ class MasterSession:
                         self._calls.tell(AddPublisher(self._node, moved))
 
     def _connect_from(self, host: str) -> None:
-        """Leave connections that begin at another address: they would be silent for many seconds."""
+        # Connections from the old address would stay silent for many seconds.
         before, self._connected_from = self._connected_from, host
-        if before in {host, LOOPBACK}:  # LOOPBACK: nobody knew yet
+        if before in {host, LOOPBACK}:  # `LOOPBACK`: not known before
             return
         self._calls.connect_again()
         self._was_connected = False
@@ -387,7 +388,6 @@ class MasterSession:
             subscriber.connect_again()
 
     def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
-        """Publishers, each with the one endpoint that this node can reach."""
         return tuple(in_reach(remote, self._name.known or self.address) for remote in remotes)
 
     def _obey(self, answer: Reply | Push, now: float) -> None:
@@ -426,7 +426,7 @@ class MasterSession:
             return
         offset = self._clock.offset()
         if offset is None:
-            self._correct({})  # also when this computer's clock was set just now
+            self._correct({})  # also after this computer's clock was set
         with self._lock:
             publishers = [
                 publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed
@@ -446,14 +446,14 @@ class MasterSession:
             self._calls.tell(request, then=partial(self._timed, self._clock.now()))
 
     def _timed(self, sent: Moment, answer: Reply) -> None:
-        """A renewal that was sent at `sent` is answered: compare this computer's clock with the master's."""
+        # Compares this computer's clock with the master's by the times of a renewal and its reply.
         if not isinstance(answer, Renewed) or answer.epoch != self._epoch or not answer.times:
             return
         was_known = self._clock.offset() is not None
         if len(answer.times) != 2:
             self._calls.refusals.add(_("the times of a renewal are two"))
         elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
-            self._pace.due_at = self._read_at.steady_ns / 1e9  # others wait for it
+            self._pace.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
     def _renewed(self, answer: Renewed, now: float) -> None:
         if answer.again:
@@ -480,21 +480,21 @@ class MasterSession:
         return found
 
     def _correct(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Tell subscribers how other computers' clocks differ, when there is anything to tell."""
         if clocks or self._clocks:
             self._clocks = clocks
             for _record, each in self._all_subscribers():
-                if isinstance(each, NativeSubscriber | PatternSubscriber):  # answers of servers have no times
+                # replies of servers have no time stamps
+                if isinstance(each, NativeSubscriber | PatternSubscriber):
                     each.correct(clocks)
 
     def _join(self, now: float) -> None:
-        """Register everything again, once at a time."""
-        self._pace.told(RENEW_S, now)  # this master has not said anything else yet
+        # Registers everything again, at most once per `_JOIN_AGAIN_S`.
+        self._pace.told(RENEW_S, now)  # the new master hasn't requested an interval yet
         if now < self._join_again_at:
             return
         self._join_again_at = now + _JOIN_AGAIN_S
         with self._lock:
-            if self._is_closed:  # a master that hears this after the leave would list it again
+            if self._is_closed:  # a join after the leave would register the node again
                 return
             publishers = tuple(record for record, _ in self._publishers.values())
             subscribers = tuple(record for record, _ in self._subscribers.values())
@@ -506,7 +506,7 @@ class MasterSession:
         if not isinstance(reply, Found):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
-        self._clock.forget()  # the master may be on another computer now
+        self._clock.forget()  # the master may run on another computer now
         self._join_again_at = 0.0
         with self._lock:
             self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
@@ -523,7 +523,7 @@ class MasterSession:
                 subscriber.reconcile(by_topic.get(record.topic, ()))
 
     def _subscribers_of(self, topic: str, *, is_wanted: bool = True) -> list[SessionSubscriber]:
-        """Who hears this topic; with wildcards those that do so already, unless it `is_wanted` for them."""
+        # Pattern subscribers create a member for a new topic only with `is_wanted`.
         found: list[SessionSubscriber] = []
         for record, subscriber in self._all_subscribers():
             if isinstance(subscriber, PatternSubscriber):

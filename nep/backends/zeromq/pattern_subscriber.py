@@ -1,8 +1,8 @@
-"""PatternSubscriber: one subscriber for all topics that its wildcards match.
+"""PatternSubscriber: one subscriber for all topics that match its pattern.
 
-It has a member for each topic that is published, a subscriber with a socket of its own that says hello with
-the same id. The master knows one subscriber, and tells its node of every publisher that matches; so a
-publisher waits for it as for any other, and its first message is not lost.
+It creates a member for each published topic: a subscriber with its own socket that says hello with the same
+id. The master knows one subscriber and reports every matching publisher to its node, so publishers wait for
+it as for any other and its first message isn't lost.
 """
 
 from __future__ import annotations
@@ -30,13 +30,17 @@ __all__ = ["PatternSubscriber"]
 
 _logger = logging.getLogger("nep")
 _MEMBERS_MAX = 2_000
-"""So many topics one subscriber hears: whoever reaches the master can publish any number."""
+"""Maximum number of topics per subscriber: any program at the master could publish any number."""
 
 
 class PatternSubscriber(WakingSubscriber):
-    """See the module. `new_readable` makes a member's socket, `io` serves it, `on_close` unregisters.
+    """Subscriber with wildcards; see the module.
 
-    The methods for publishers are called by the link to the master.
+    Args:
+        new_readable: Creates the socket of a member.
+        io: Thread that serves the members.
+        spec: Settings; `topic` is the pattern.
+        on_close: Unregisters the subscriber.
     """
 
     def __init__(
@@ -55,7 +59,7 @@ class PatternSubscriber(WakingSubscriber):
         self._on_close = on_close
         self._members: dict[str, NativeSubscriber] = {}
         self._closed_early: set[int] | None = set()
-        """Publishers that closed before `begin`; None since."""
+        """Ids of publishers that closed before `begin`; None afterwards."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._gone = _Totals()
         self._dropped = 0
@@ -63,26 +67,26 @@ class PatternSubscriber(WakingSubscriber):
         self._failures = 0
         self._making = threading.RLock()
 
-    # ---- what the reader sees
+    # ---- reading
 
     def poll(self) -> Message | None:
-        """The next message if one is there."""
+        """Return the next message, or None."""
         with self._changed:
             return None if self.is_closed else self._inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message; waits at most `timeout_s` seconds."""
+        """Return the next message; wait up to `timeout_s` seconds."""
         with self._changed:
             self._changed.wait_for(lambda: self.is_closed or len(self._inbox), timeout_s)
             return None if self.is_closed else self._inbox.take()
 
     @property
     def has_input(self) -> bool:
-        """See `WakingSubscriber.has_input`."""
+        """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self._inbox) > 0
 
     def _came(self, messages: Sequence[Message]) -> None:
-        """In the thread that serves members."""
+        # Runs in the thread that serves the members.
         if self.spec.sink is not None:
             self.spec.sink(messages)
             return
@@ -91,37 +95,37 @@ class PatternSubscriber(WakingSubscriber):
                 self._dropped += sum(map(self._inbox.put, messages))
                 self.tell_waiting()
 
-    # ---- what it tells
+    # ---- statistics
 
     @property
     def received(self) -> int:
-        """Messages that arrived, on all topics."""
+        """Number of messages received on all topics."""
         with self._making:
             return self._gone.received + sum(each.received for each in self._members.values()) - self._dropped
 
     @property
     def lost(self) -> int:
-        """Messages that did not arrive, or were dropped here for lack of room."""
+        """Number of messages lost or dropped here for lack of room."""
         with self._making:
             return self._gone.lost + sum(each.lost or 0 for each in self._members.values()) + self._dropped
 
     @property
     def refused(self) -> int:
-        """What came and was no message at all."""
+        """Number of inputs rejected because they aren't valid messages."""
         with self._making:
             return self._gone.refused + sum(each.refused for each in self._members.values())
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is connected."""
+        """Endpoints of all connections."""
         return tuple(endpoint for each in list(self._members.values()) for endpoint in each.endpoints)
 
     def report(self, problem: str) -> None:
-        """The reader's trouble with a message, for the next renewal."""
+        """Set the reader's problem, which is sent with the next renewal."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         with self._making:
             problems = (each.counts().problem for each in self._members.values())
             problem = self._problem or self._lack or next(filter(None, problems), "")
@@ -130,7 +134,10 @@ class PatternSubscriber(WakingSubscriber):
     # ---- publishers
 
     def of_topic(self, topic: str, *, is_wanted: bool = True) -> NativeSubscriber | None:
-        """The member for a topic, made when it `is_wanted`; None when there is none, or no room for one."""
+        """Return the member for a topic, or None.
+
+        With `is_wanted` a missing member is created, unless there is no room.
+        """
         with self._making:
             member = self._members.get(topic)
             if member is not None or not is_wanted or self.is_closed:
@@ -164,7 +171,7 @@ class PatternSubscriber(WakingSubscriber):
         return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
 
     def begin(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers that there were when it was registered, and have not closed since."""
+        """Connect to the publishers known at registration, except those closed since."""
         with self._making:
             closed, self._closed_early = self._closed_early or set(), None
             members = list(self._members.values())
@@ -177,13 +184,13 @@ class PatternSubscriber(WakingSubscriber):
                     found.connect((remote,))
 
     def closed_early(self, publisher: int) -> None:
-        """A publisher has closed; it may be one of those that `begin` is about to be told of."""
+        """Note that a publisher closed, in case the reply to the registration still lists it."""
         with self._making:
             if self._closed_early is not None:
                 self._closed_early.add(publisher)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait until these publishers have echoed; see `NativeSubscriber.wait_for`."""
+        """Wait until these publishers have sent their echo; see `NativeSubscriber.wait_for`."""
         wanted = tuple(publishers)
         deadline = time.monotonic() + timeout_s
         members = list(self._members.values())
@@ -191,16 +198,16 @@ class PatternSubscriber(WakingSubscriber):
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Those that it has a member for."""
+        """Topics that have a member."""
         return tuple(self._members)
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """How the clocks of other computers differ from this one's, by node."""
+        """Set the clock differences of other computers, by node id."""
         for member in list(self._members.values()):
             member.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Once a second: see `NativeSubscriber.tick`. A topic that nobody publishes any more is left."""
+        """Process a renewal, see `NativeSubscriber.tick`; remove members without publishers."""
         seqs = tuple(last_seqs)
         for topic, member in list(self._members.items()):
             member.tick(now, seqs)
@@ -211,14 +218,14 @@ class PatternSubscriber(WakingSubscriber):
                 member.close()
 
     def connect_again(self) -> None:
-        """See `NativeSubscriber.connect_again`."""
+        """Reconnect to publishers on other computers."""
         for member in list(self._members.values()):
             member.connect_again()
 
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
         with self._making, self._changed:
             if self.is_closed:
                 return
@@ -231,20 +238,19 @@ class PatternSubscriber(WakingSubscriber):
             member.close()
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         for member in list(self._members.values()):
             member.forked()
 
 
 class _Totals:
-    """What members counted that are not there any more."""
+    """Statistics of removed members."""
 
     def __init__(self) -> None:
         self.received = self.lost = self.refused = 0
 
     def add(self, member: NativeSubscriber) -> None:
-        """This one goes."""
         self.received += member.received
         self.lost += member.lost or 0
         self.refused += member.refused

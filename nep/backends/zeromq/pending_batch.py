@@ -1,7 +1,7 @@
-"""PendingBatch: the newest messages of a publisher, which are sent together in a moment. No sockets.
+"""PendingBatch: messages published in quick succession, to be sent in one part. No sockets.
 
-A message goes out at once unless the one before was published less than `SOON_NS` ago. Then it waits for
-those that follow: until there are `MOST`, or `WAIT_NS` are over. See docs/adr/0009-one-part.md.
+A message is sent at once unless the previous one was published less than `SOON_NS` ago. Otherwise it waits
+for more, until there are `MOST` or `WAIT_NS` have passed. See docs/adr/0009-one-part.md.
 """
 
 from __future__ import annotations
@@ -22,70 +22,79 @@ SOON_NS = 20_000
 WAIT_NS = 100_000
 MOST = 64
 FULL_BYTES = 65_536
-"""A batch of about so many bytes goes out, too: copying more at once takes longer than sending it costs."""
+"""Size at which a batch is sent: copying more at once takes longer than a separate send."""
 SMALL_BYTES = 16_384
-"""Only smaller messages are sent together: copying larger ones costs more than it saves."""
+"""Upper size limit of messages in a batch: copying larger ones costs more than it saves."""
 _GOES_ON_S = 500e-6
-"""How often the node's thread looks while the publisher sends one batch after the other itself."""
+"""Interval at which the I/O thread checks while the publisher itself sends full batches."""
 
 
 _time_ns = time.time_ns
 
 
 class Way(Protocol):
-    """What a publisher's messages are sent through."""
+    """Sending end of a publisher."""
 
     is_heard: bool
-    """Whether anybody reads."""
+    """True if any subscriber is connected."""
     problem: str
-    """What is wrong with the newest payload; empty when nothing is."""
+    """Problem of the newest payload; empty if none."""
 
     def send_now(self, data: bytes) -> None:
-        """Send it, and what waits before it."""
+        """Send pending messages, then `data`."""
 
     def flush(self) -> None:
-        """Send what waits. With the lock held."""
+        """Send pending messages. Call with the lock held."""
 
     def flush_soon(self) -> None:
-        """Let what waits be sent soon. With the lock held."""
+        """Have the I/O thread send pending messages soon. Call with the lock held."""
 
 
 class PendingBatch:
-    """It lives under its publisher's lock, but for `waiting`. `may_wait`: its messages may wait at all."""
+    """Pending messages of one publisher; guarded by its lock, except `waiting`.
+
+    `may_wait` is False to disable batches.
+    """
 
     def __init__(self, *, may_wait: bool) -> None:
         self.waiting: list[tuple[bytes, int]] = []
-        """The payloads that wait, and when each was published. Any thread may append without the lock, which
-        takes as long as all the rest of a message's way; who does then looks at `is_looked_after`."""
+        """Pending payloads and their time stamps. Any thread may append without the lock, which would cost as
+        much as the rest of publishing; it then checks `is_looked_after`.
+        """
         self.until_ns = 0
-        """A message that is published before this waits for more."""
+        """Time before which a new message is batched."""
         self.ends_ns = 0
-        """Until then at most those wait that wait now."""
+        """Time by which the pending messages must be sent."""
         self.is_allowed = False
-        """Whether all who read now take several messages in one part."""
+        """True if all current subscribers accept batches."""
         self.is_looked_after = False
-        """Whether the node's thread comes to send what waits."""
+        """True if the I/O thread is scheduled to send the pending messages."""
         self.is_leaving = False
-        """Whether its messages are being sent."""
+        """True while pending messages are being sent."""
         self.has_gone_full = False
-        """Whether the publisher sent one that was full since the node's thread looked."""
+        """True if the publisher has sent a full batch since the I/O thread's last check."""
         self._may_wait = may_wait
 
     def allow(self, *, reads_batches: bool) -> None:
-        """Whether all who read now take batches."""
+        """Set whether all current subscribers accept batches."""
         self.is_allowed = self._may_wait and reads_batches
         if not self.is_allowed:
             self.until_ns = 0
 
     def begin_after(self, stamp_ns: int) -> None:
-        """A message of this stamp is sent alone: the next may wait if it comes soon."""
+        """Open the batching window after a message with this time stamp was sent alone."""
         if self.is_allowed:
             self.until_ns = stamp_ns + SOON_NS
 
     def publishing(self, asked: QuickPublish, way: Way, lock: threading.Lock) -> Callable[..., None]:
-        """What `Publisher.publish` is: most of a small message's way is in here, so all of it is one closure.
+        """Return the function that implements `Publisher.publish`.
 
-        `way` sends; `lock` is its lock.
+        It is one closure because nearly all of the time for a small message is spent here.
+
+        Args:
+            asked: Functions for encoding and for the slow path.
+            way: Sending end.
+            lock: Lock of `way`.
         """
         owner, kind, ordinary, look, slowly = asked
         batch, waiting, put, send_now = self, self.waiting, self.waiting.append, way.send_now
@@ -100,7 +109,7 @@ class PendingBatch:
                 return
             try:
                 data: Any = payload if type(payload) is kind else ordinary(payload)
-            except Exception:  # noqa: BLE001 - a payload may be of any class; `slowly` takes it or tells why not
+            except Exception:  # noqa: BLE001 - a payload may be of any class; `slowly` sends or reports it
                 slowly(payload)
                 return
             if look is not None and data.rfind(NULL) >= 0:
@@ -126,25 +135,31 @@ class PendingBatch:
         return publish
 
     def take(self) -> list[tuple[bytes, int]]:
-        """`BATCH_MAX` of those that wait at most, the oldest first; see `waiting`. There are some."""
+        """Remove and return up to `BATCH_MAX` pending messages, oldest first.
+
+        Must not be called without any.
+        """
         taken = self.waiting[:BATCH_MAX]
-        del self.waiting[: len(taken)]  # others may have come since
+        del self.waiting[: len(taken)]  # more may have been appended meanwhile
         self.until_ns = taken[-1][1] + SOON_NS if self.is_allowed else 0
         return taken
 
     def look_again_s(self, now_ns: int) -> float:
-        """For the node's thread: when it has to come again; 0: send what waits, if anything does, now."""
+        """Return seconds until the I/O thread must check again; 0 to send pending messages now.
+
+        For the I/O thread.
+        """
         has_gone, self.has_gone_full = self.has_gone_full, False
-        # Before looking: who appends after that asks to be looked after.
+        # Before reading: a thread that appends afterwards requests a check itself.
         self.is_looked_after = has_gone
         waiting = self.waiting[:1]
         left_ns = waiting[0][1] + WAIT_NS - now_ns if waiting else 0
-        if 0 < left_ns <= WAIT_NS:  # more: somebody has set the clock
+        if 0 < left_ns <= WAIT_NS:  # larger values mean that the clock was set
             self.is_looked_after = True
             return _GOES_ON_S if has_gone else left_ns / 1e9
         return 0.0
 
     @property
     def goes_on_s(self) -> float:
-        """After that: when to come again although nothing waits; 0 when the publisher has ended its burst."""
+        """Seconds until the next check with no pending messages; 0 after the end of a burst."""
         return _GOES_ON_S if self.is_looked_after else 0.0

@@ -1,7 +1,8 @@
-"""NativePublisher: a publisher's XPUB socket, and who reads there.
+"""NativePublisher: a publisher's XPUB socket and its subscribers.
 
-Sends happen in the publisher's thread; subscriptions are read by whoever uses the socket next, the publisher
-or the node's thread. A subscriber counts as connected when its hello has been read: see `docs/wire.md`.
+Messages are sent in the publishing thread. Subscriptions are read by whichever thread uses the socket next,
+the publisher's or the I/O thread. A subscriber counts as connected once its hello was read, see
+`docs/wire.md`.
 """
 
 from __future__ import annotations
@@ -46,16 +47,17 @@ from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
 __all__ = ["NativePublisher"]
 
 _logger = logging.getLogger("nep")
-_SNDMORE = int(zmq.SNDMORE)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
+_SNDMORE = int(zmq.SNDMORE)  # plain ints: looking up pyzmq's enum members costs as much as the call
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 _NO_COPY_BYTES = 65_536
 _ONE_PART_BYTES = SMALL_BYTES
-"""Smaller messages go out in one part where all who subscribe read that: see docs/adr/0009-one-part.md."""
+"""Size limit for messages sent in one part, if all subscribers accept it: see docs/adr/0009-one-part.md."""
 _LOOK_NS = 500_000
-"""Whoever publishes more often than this looks for subscriptions only this often; the node's thread looks
-after it, because sending may have swallowed the descriptor's signal."""
+"""Interval at which a busy publishing thread reads subscriptions. The I/O thread checks afterwards, because
+sending may have consumed the edge of ZMQ_FD.
+"""
 _SERVE_S = 0.02
 _BYE_AGAIN_S = 0.05
 
@@ -65,35 +67,35 @@ def _only_bytes(payload: object) -> NoReturn:
 
 
 class GreetedPublisher:
-    """A publisher to which those subscribers say hello that the master lists; `changed` guards all of it."""
+    """Publisher that waits for the hello of listed subscribers; `changed` guards its state."""
 
     def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
-        """`seen`: who has said hello, and how many messages there had been then."""
+        """Initialize; `seen` has the message count at the hello of each connected subscriber."""
         self._changed, self._seen = changed, seen
         self._names: dict[int, str] = {}
         self._waited: set[int] = set()
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
-        """Ids of the subscribers that have said hello and have not gone."""
+        """Ids of the connected subscribers."""
         with self._changed:
             return frozenset(self._seen)
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of nodes that were expected and have not said hello."""
+        """Names of nodes whose subscribers are registered but not connected."""
         with self._changed:
             return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
 
     def expect(self, expected: Iterable[Expected]) -> None:
-        """These subscribers are registered and will connect."""
+        """Note registered subscribers that will connect."""
         with self._changed:
             for each in expected:
                 self._waited.add(each.id)
                 self._names[each.id] = each.node_name
 
     def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait until these have said hello; the ids of those that did not in time."""
+        """Wait for the hello of these subscribers; return the ids of those still missing."""
         wanted = {each.id for each in expected}
         with self._changed:
             wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
@@ -101,11 +103,11 @@ class GreetedPublisher:
 
 
 class NativePublisher(GreetedPublisher):
-    """Owns `socket`, an XPUB that is bound or connected already."""
+    """Publisher on the native wire. Owns `socket`, an XPUB that is already bound or connected."""
 
     is_closed = False
     is_heard = False
-    """Whether anybody reads, with or without a hello."""
+    """True if any subscriber is connected, with or without a hello."""
 
     def __init__(
         self,
@@ -116,9 +118,9 @@ class NativePublisher(GreetedPublisher):
     ) -> None:
         self.spec = spec
         self._count = 0
-        """Messages that were sent or skipped."""
+        """Number of messages sent or skipped."""
         self.subscribers = 0
-        """How many said hello and have not gone."""
+        """Number of subscribers that have said hello and not left."""
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
@@ -126,16 +128,16 @@ class NativePublisher(GreetedPublisher):
         self._bindings = Bindings(
             socket, may_be_local=spec.codec.name in SMALL, is_watched=FarConnection.can_tell
         )
-        # Without pyzmq's layer for routing ids and groups, which takes half of the time.
+        # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
         self._bytes = self._settled_bytes = 0
-        """So many of them are counted in the windows of those who read."""
+        """Value of `_bytes` up to which the send windows are accounted."""
         self._settle_at = 0
-        """From so many on a message is not simply sent to all."""
+        """Value of `_bytes` from which a message needs the full path with flow control."""
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
         self.problem = ""
-        """What is wrong with the newest payload; empty when nothing is."""
+        """Problem of the newest payload; empty if none."""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
         if can_share() and not spec.history:
             self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
@@ -149,7 +151,7 @@ class NativePublisher(GreetedPublisher):
         self._codec = spec.codec.number
         self._flags = LATCHED if spec.is_latched else 0
         self._form = form_of(self._codec, self._flags)
-        # `with` is three times faster on the lock itself than on the condition over it.
+        # `with` is three times faster on the lock than on the condition
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -158,18 +160,21 @@ class NativePublisher(GreetedPublisher):
 
     @property
     def count(self) -> int:
-        """Messages published so far."""
+        """Number of messages published."""
         return self._count + len(self._batch.waiting)
 
-    # ---- who listens
+    # ---- subscribers
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait until somebody has said hello."""
+        """Wait for the hello of any subscriber, for up to `timeout_s` seconds."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._seen), timeout_s)
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal: once a second, so silent connections are looked for, too."""
+        """Return the statistics for a renewal.
+
+        Called once a second, so silent connections are ended here, too.
+        """
         with self._changed:
             self._subscriptions.end_silent()
             return PublisherCount(
@@ -177,14 +182,14 @@ class NativePublisher(GreetedPublisher):
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Be reached at these addresses of this computer from now on; the endpoints. See `Bindings.move`."""
+        """Bind at these addresses of this computer; return the endpoints. See `Bindings.move`."""
         with self._lock:
             endpoints = () if self._socket.closed else self._bindings.move(hosts)
-            self._read_subscriptions()  # binding may have swallowed the descriptor's signal
+            self._read_subscriptions()  # binding may have consumed the edge of ZMQ_FD
             return endpoints
 
     def leave_local(self) -> None:
-        """Be reached by TCP only from now on."""
+        """Accept TCP connections only from now on."""
         with self._lock:
             if not self._socket.closed and self._bindings.is_local:
                 self._bindings.leave_local()
@@ -192,36 +197,36 @@ class NativePublisher(GreetedPublisher):
 
     @property
     def refusals(self) -> Refusals:
-        """What was sent to it and is no subscription."""
+        """Rejected subscriptions."""
         return self._subscriptions.refusals
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """All that its socket is bound to by `move`."""
+        """All endpoints bound by `move`."""
         return self._bindings.endpoints
 
     @property
     def is_local(self) -> bool:
-        """Whether programs of this computer reach it without TCP: see `bindings`."""
+        """True if programs of this computer can connect without TCP, see `bindings`."""
         return self._bindings.is_local
 
     # ---- sending
 
     def report(self, problem: str) -> None:
-        """The publisher's trouble with a payload, for the next renewal."""
+        """Set the problem of a payload, which is sent with the next renewal."""
         self.problem = problem
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._lock:
             self.flush()
             self._count += 1
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish. `data` of 64 kB and more is sent without copying it, unless it can still be changed.
+        """Publish a message. Immutable data of 64 kB and more is sent without a copy.
 
-        Raises `WireError` for an extension that has no form on the wire.
+        Raises `WireError` for an extension that can't be encoded.
         """
         data, beside = encoded
         if beside is None and type(data) is bytes:
@@ -230,15 +235,14 @@ class NativePublisher(GreetedPublisher):
             self._send_now(data, beside)
 
     def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
-        """See `nep.backends.base.PublishesQuickly`."""
+        """Return the fast publish function, see `nep.backends.base.PublishesQuickly`."""
         return self._batch.publishing(asked, self, self._lock)
 
     def send_now(self, data: bytes) -> None:
-        """Send it, and what waits before it."""
+        """Send pending messages, then `data`."""
         self._send_now(data, None)
 
     def _send_now(self, given: bytes | memoryview, beside: Mapping[str, object] | None) -> None:
-        """Send it, and what waits before it."""
         data: Part = given
         extension = None
         if (given.nbytes if type(given) is memoryview else len(given)) >= SHARED_BYTES:
@@ -268,17 +272,15 @@ class NativePublisher(GreetedPublisher):
             self._look(stamp_ns)
 
     def _greet_before(self, size: int) -> None:
-        """Before a message is counted that is kept: who is greeted now gets it like all others, and once.
-
-        With a history the sooner the better; else only if `_send_all` would look for subscriptions.
-        """
+        # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
+        # order. Without a history only if `_send_all` would read them.
         if self.spec.history > 1 or self._bytes + size >= self._settle_at:
             self._read_subscriptions()
 
     def _send_large(self, given: bytes | memoryview, extension: bytes | None) -> None:
-        """Through shared memory to those who read that; the payload is copied at most once."""
+        # The payload is copied at most once.
         shared = self._subscriptions.shared
-        # Before the lock: it takes a moment for the first time.
+        # before taking the lock: loading the library is slow
         opened = begin_sharing() if shared is not None and self._seen and not shared.readers else None
         if shared is not None and opened is None and not shared.readers:
             shared = None
@@ -304,24 +306,25 @@ class NativePublisher(GreetedPublisher):
                 and not (extension or self._flags)
             ):
                 head = pack_quickly(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
-                self._send(b"".join((self._topic, head, number)))  # whoever shares reads one part
+                # subscribers with shared memory accept one part
+                self._send(b"".join((self._topic, head, number)))
             else:
                 self._send_all(b"" if data is None else data, extension, size, number)
             self._look(stamp_ns)
 
     def lend(self, size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`."""
+        """Return writable shared memory for a payload, or None."""
         shared = self._subscriptions.shared
         with self._lock:
             return None if shared is None or self.is_closed else shared.lend(size_bytes)
 
     def _offer(self, subscriber: int, generation: int) -> None:
-        """Let a subscriber open the shared memory of this generation. With the lock held."""
+        # Call with the lock held.
         notice = pack_quickly(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
         self._send_parts(self._subscriptions.hellos[subscriber], (notice,))
 
     def _look(self, stamp_ns: int) -> None:
-        """Read subscriptions, now and then; the node's thread looks after that."""
+        # Reads subscriptions at most every `_LOOK_NS`; the I/O thread checks afterwards.
         if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
             self._looked_ns = stamp_ns
             self._read_subscriptions()
@@ -330,24 +333,24 @@ class NativePublisher(GreetedPublisher):
             self._serve_soon(self)
 
     def _send_apart(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
-        """In three parts, with the lock held."""
+        # Sends three parts. Call with the lock held.
         send = self._send
         send(self._topic, _SNDMORE)
         send(pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
         send(data, 0, size < _NO_COPY_BYTES)
 
     def flush_soon(self) -> None:
-        """Let the node's thread send what waits then. With the lock held."""
+        """Have the I/O thread send pending messages soon. Call with the lock held."""
         if not self._batch.is_looked_after:
             self._batch.is_looked_after = self._io_comes = True
             self._serve_soon(self)
 
     def flush(self) -> None:
-        """Send the messages that wait, with the lock held. They count from now on."""
+        """Send pending messages and count them. Call with the lock held."""
         batch = self._batch
         if batch.is_leaving or not batch.waiting:
             return
-        batch.is_leaving = True  # what comes meanwhile does not overtake what is being sent
+        batch.is_leaving = True  # a nested flush must not overtake the messages being sent
         try:
             self._send_batches(batch)
         finally:
@@ -369,7 +372,7 @@ class NativePublisher(GreetedPublisher):
             self._look(stamp_ns)
 
     def _send_each(self, taken: Iterable[tuple[bytes, int]]) -> None:
-        """Those that waited, one by one. With the lock held."""
+        # Call with the lock held.
         for data, stamp_ns in taken:
             self._last_stamp_ns = stamp_ns
             self._count += 1
@@ -377,10 +380,8 @@ class NativePublisher(GreetedPublisher):
             self._send_all(data, None, len(data))
 
     def _send_all(self, data: Part, extension: bytes | None, size: int, number: bytes | None = None) -> None:
-        """Send what has flags, or when it is time to see what was read, with the lock held.
-
-        `number` is what those get instead of `data` who read it in shared memory.
-        """
+        # Full path for messages with flags, and for flow control. Call with the lock held. `number` replaces
+        # `data` for subscribers that read shared memory.
         self.flush()
         tail = self._tail(data, extension, size, 0)
         shared = None if number is None else self._tail(number, extension, len(number), SHARED)
@@ -393,20 +394,19 @@ class NativePublisher(GreetedPublisher):
             self._send_to_those_with_room(tail, shared, size)
 
     def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
-        """What follows a message's first part."""
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
         told = size if size <= SIZE_MAX else 0
         header = pack_quickly(form, told, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
     def _send_to_all(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
-        """With the lock held: `shared` to those who share memory, `tail` to everybody else."""
+        # Call with the lock held. `shared` goes to subscribers with shared memory, `tail` to the others.
         if shared is None:
             self._send_parts(self._topic, tail)
             return
         readers = self._shared_readers()
         if readers >= self._seen.keys():
-            if len(shared) == 2:  # whoever shares reads messages of one part
+            if len(shared) == 2:  # subscribers with shared memory accept one part
                 self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared))))
             else:
                 self._send_parts(self._topic, shared)
@@ -421,7 +421,8 @@ class NativePublisher(GreetedPublisher):
     def _send_to_those_with_room(
         self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None, size: int
     ) -> None:
-        """To all at once; while somebody has no room, to everybody else alone. With the lock held."""
+        # Call with the lock held. While a subscriber has no room, the message is sent to each of the others
+        # alone.
         windows = self._subscriptions.windows
         since = self._bytes - size - self._settled_bytes  # sent to all
         if since:
@@ -438,7 +439,7 @@ class NativePublisher(GreetedPublisher):
             self._settle_at = self._bytes + (STEP_BYTES if is_told else BACKLOG_STEP_BYTES)
             taking = windows
         else:
-            self._settle_at = 0  # each message is looked at until all have room again
+            self._settle_at = 0  # check each message until all have room again
             taking = {each: window for each, window in windows.items() if has_room[each]}
             for each, window in windows.items():
                 if each in taking:
@@ -455,14 +456,14 @@ class NativePublisher(GreetedPublisher):
                 self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
-        """Send to all, and note until when libzmq holds it, with all of `size` bytes since the last one."""
+        # `size` is the number of bytes since the last tracked message, including this one.
         data = tail[1].buffer if isinstance(tail[1], zmq.Frame) else tail[1]
         frame = zmq.Frame(data, track=True, copy=False, copy_threshold=0)
         self._send_parts(self._topic, (tail[0], frame, *tail[2:]))
         self._backlog.sent(frame.tracker, size)
 
     def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
-        """Send with the lock held. XPUB never blocks: it drops for subscribers whose queue is full."""
+        # Call with the lock held. XPUB never blocks: it drops messages for subscribers whose queue is full.
         self.flush()
         send = self._send
         send(first, _SNDMORE)
@@ -473,7 +474,7 @@ class NativePublisher(GreetedPublisher):
     # ---- subscriptions
 
     def serve(self, now: float) -> Rest:
-        """Send what waits long enough, and read subscriptions."""
+        """Send pending messages when due, and read subscriptions."""
         with self._lock:
             if not self.is_closed or self._seen:
                 self._read_subscriptions()
@@ -484,18 +485,19 @@ class NativePublisher(GreetedPublisher):
             if again_s:
                 return Rest(due=now + again_s)
             count, self._served = self._served, self._count
-            # As long as somebody publishes without looking, this thread looks again and again.
+            # While another thread publishes without reading subscriptions, this thread keeps checking.
             self._io_comes = self._io_comes and count != self._count and not self.is_closed
             return Rest(due=now + _SERVE_S) if self._io_comes else Rest()
 
     def _read_subscriptions(self) -> None:
-        """With the lock held: until the socket has nothing more."""
+        # Call with the lock held. Reads until the socket is empty.
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             event = self._socket.recv(zmq.DONTWAIT, copy=False)
             own = self._subscriptions.note(event.bytes, self._count, partial(FarConnection.of, event))
-            # First: whoever gets the echo may rely on being counted.
+            # Before the echo: a subscriber that received it must already be counted.
             self.subscribers = len(self._seen)
-            self._waited.difference_update(self._seen)  # whoever has connected may leave again
+            # a connected subscriber may leave without being reported as missing
+            self._waited.difference_update(self._seen)
             self.is_heard = self._subscriptions.is_there
             self._batch.allow(reads_batches=self._subscriptions.reads_batches)
             if own is not None:
@@ -510,7 +512,7 @@ class NativePublisher(GreetedPublisher):
                 self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _greet(self, own: bytes) -> None:
-        """What was latched, then the echo: from here on the subscriber counts."""
+        # The history, then the echo: from here on the subscriber counts losses.
         for kept in self._history:
             self._send_parts(own, kept)
         if self._history:
@@ -526,25 +528,25 @@ class NativePublisher(GreetedPublisher):
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, deliver what is on its way, and close the socket. Once; called by its publisher."""
+        """Unregister, flush and close the socket. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Nothing is published any more; every subscriber disconnects when it has read everything."""
+        """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
         with self._changed:
             self.is_closed = True
             self.flush()
             self._bye()
 
     def finish(self, deadline: float) -> None:
-        """Wait until all have disconnected; log what was not delivered at `deadline`, and to how many."""
+        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
-                    self._bye()  # a full queue drops it like anything else
+                    self._bye()  # a full queue drops the bye like any message
             if self._seen:
                 owed = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
-                if any(owed):  # else only the bye was not taken
+                if any(owed):  # otherwise only the bye is missing
                     _logger.warning(
                         "'%s' is closed before %d subscriber(s) took everything: "
                         "up to %d messages not delivered",
@@ -556,7 +558,7 @@ class NativePublisher(GreetedPublisher):
                 self.subscribers = 0
 
     def release(self) -> None:
-        """Close the socket; the node's thread has let go of it."""
+        """Close the socket. The I/O thread must not serve it any more."""
         with self._changed:
             self.is_closed = True
             if self._subscriptions.shared is not None:

@@ -1,4 +1,4 @@
-"""RpcClient: requests to a master and its answers, over one DEALER socket that any thread may use."""
+"""RpcClient: requests to a master over one DEALER socket. Thread-safe."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ __all__ = ["PendingCall", "ReceivedAnswer", "RpcClient", "Then"]
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 50
-"""So many answers are read in one go, then the node's other sockets have their turn."""
+"""Maximum number of replies read at once, before other sockets are served."""
 _AGAIN_S = 0.5
-"""A request without an answer is sent again after this: it may have gone to a master that ended just then."""
+"""Interval to resend a request without a reply: it may have gone to a master that was just ending."""
 _MOST_CALLS = 256
 
 Then = Callable[[Reply], None]
@@ -34,7 +34,7 @@ Then = Callable[[Reply], None]
 
 @dataclass
 class PendingCall:
-    """A request that is under way."""
+    """Request in flight."""
 
     body: bytes
     is_waited: bool
@@ -42,18 +42,21 @@ class PendingCall:
     reply: Reply | None = None
     is_sent: bool = False
     view: bytes | None = None
-    """The body of its answer, when that is a graph: who waits for it decodes it."""
+    """Body of a reply with a graph; the waiting thread decodes it."""
 
 
 class ReceivedAnswer(NamedTuple):
-    """What came from the master, and what to do with it if it answers a request that said so."""
+    """Message from the master, and the callback of the request that it answers."""
 
     what: Reply | Push
     then: Then | None
 
 
 class RpcClient:
-    """`after_use` is called when the socket may have input that its descriptor no longer tells of."""
+    """Client for requests to the master at `address`.
+
+    `after_use` is called when the socket may have input for which its descriptor no longer signals.
+    """
 
     def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
         self.address = address
@@ -64,30 +67,30 @@ class RpcClient:
         self._is_closed = False
         self.refusals = Refusals()
         self.has_more = False
-        """Whether there was more than `read` returned."""
+        """True if `read` left messages unread."""
         self.is_connected = False
-        """Whether a master was there when the socket was read last."""
+        """True if a master was connected at the last `read`."""
         self._changed = threading.Condition(threading.Lock())
         socket.setsockopt(zmq.LINGER, 0)
-        socket.setsockopt(zmq.IMMEDIATE, 1)  # nothing is queued for a master that is not there
+        socket.setsockopt(zmq.IMMEDIATE, 1)  # queue nothing while no master is connected
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 400)
-        if not is_loopback(address):  # a computer that vanishes does not close its connections
+        if not is_loopback(address):  # a computer that loses power doesn't close its connections
             socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
             socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS)
         self.endpoint = ""
-        """Where it is connected; "" before `lead_to`."""
+        """Endpoint of the connection; "" before `lead_to`."""
         self.fd = int(socket.getsockopt(zmq.FD))
 
     @property
     def is_asked(self) -> bool:
-        """Whether somebody waits for an answer."""
+        """True if a thread waits for a reply."""
         with self._changed:
             return any(call.is_waited for call in self._calls.values())
 
     def lead_to(self, address: str) -> None:
-        """Connect there, and no more to where the master was before. From any thread."""
+        """Connect to `address` instead of the previous one. Callable from any thread."""
         with self._changed:
             if self._is_closed or self.endpoint == endpoint_of(address):
                 return
@@ -98,7 +101,7 @@ class RpcClient:
         self._after_use()
 
     def connect_again(self) -> None:
-        """Replace the connection: it begins at an address this computer left, or its handshake failed."""
+        """Reconnect, because the local address has changed or the handshake failed."""
         with self._changed:
             if self._is_closed or not self.endpoint:
                 return
@@ -107,18 +110,25 @@ class RpcClient:
             self.is_connected = False
 
     def ask(self, request: Request, timeout_s: float | None) -> Reply:
-        """The reply; `timeout_s` None waits for ever.
+        """Send a request and return the reply.
 
-        Raises `MasterUnreachable` in the end, `RequestRefusedError`, and `ClosedError` when closed meanwhile.
+        Args:
+            request: Request to the master.
+            timeout_s: Seconds to wait; None waits forever.
+
+        Raises:
+            MasterUnreachable: No reply within `timeout_s`.
+            RequestRefusedError: The master rejected the request.
+            ClosedError: The client was closed meanwhile.
         """
         return self.wait(self.begin(request), timeout_s)
 
     def begin(self, request: Request) -> PendingCall:
-        """Send a request whose answer will be waited for."""
+        """Send a request; pass the result to `wait`."""
         return self._send(request, is_waited=True, then=None)
 
     def wait(self, call: PendingCall, timeout_s: float | None) -> Reply:
-        """The reply. Raises as `ask` does."""
+        """Wait for the reply. Raises as `ask` does."""
         started = time.monotonic()
         with self._changed:
             while not wait_until(
@@ -129,7 +139,7 @@ class RpcClient:
                 if timeout_s is not None and time.monotonic() - started >= timeout_s:
                     self._calls = {number: each for number, each in self._calls.items() if each is not call}
                     raise MasterUnreachable(self.address, timeout_s)
-                call.is_sent = False  # asking twice does no harm
+                call.is_sent = False  # requests are idempotent, so they may be resent
                 self._flush()
                 self._after_use()
         if call.view is not None:
@@ -141,7 +151,7 @@ class RpcClient:
         return call.reply
 
     def _decoded(self, view: bytes) -> Reply:
-        """The reply in a body, in the thread of who asked: a graph of thousands of topics takes its time."""
+        # Runs in the calling thread: decoding a graph of thousands of topics takes long.
         try:
             reply = decode_answer(view)[1]
         except WireError as error:
@@ -154,11 +164,14 @@ class RpcClient:
         return reply
 
     def tell(self, request: Request, then: Then | None = None) -> None:
-        """Send and do not wait; `then` gets the reply, in the node's thread. Lost when there is no master."""
+        """Send a request without waiting; dropped if no master is connected.
+
+        `then` is called with the reply in the I/O thread.
+        """
         self._send(request, is_waited=False, then=then)
 
     def read(self) -> list[ReceivedAnswer]:
-        """What came, `_READ_MAX` at most; also sends what is still to be sent. For the node's thread."""
+        """Return up to `_READ_MAX` received messages, and send pending requests. For the I/O thread."""
         answers: list[ReceivedAnswer] = []
         events = 0
         with self._changed:
@@ -168,20 +181,20 @@ class RpcClient:
                     answer = self._read_one()
                     if answer is not None:
                         answers.append(answer)
-                elif not self._flush():  # sending may take in what came meanwhile
+                elif not self._flush():  # zmq_send may consume input
                     break
             self.has_more = many
             self.is_connected = bool(events & zmq.POLLOUT)
         return answers
 
     def stop(self) -> None:
-        """Whoever waits gets `ClosedError`; nothing is sent any more."""
+        """Fail waiting threads with `ClosedError`; send nothing from now on."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()
 
     def release(self) -> None:
-        """Close the socket; nobody polls it any more."""
+        """Close the socket. The I/O thread must not serve it any more."""
         with self._changed:
             self._is_closed = True
             self._socket.close(0)
@@ -198,23 +211,21 @@ class RpcClient:
             self._flush()
             events = self._events()
             if events & zmq.POLLOUT and not call.is_sent:
-                self._flush()  # it was connected just now, and that was the only signal of it
+                self._flush()  # it connected just now, and this was the only signal
                 events = self._events()
         if events & zmq.POLLIN:
             self._after_use()
         return call
 
     def _drop_oldest(self) -> None:
-        """With the lock held: a master that hangs answers nothing, and nobody waits for most of it."""
+        # Call with the lock held. A master that hangs would let requests without a waiting thread pile up.
         oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
         if oldest is not None:
             del self._calls[oldest]
 
     def _flush(self) -> bool:
-        """With the lock held: send what is not sent; what nobody waits for is not kept for later.
-
-        Whether anything was sent.
-        """
+        # Call with the lock held. Requests without a waiting thread are dropped if they can't be sent.
+        # Returns True if anything was sent.
         has_sent = False
         for number, call in list(self._calls.items()):
             if call.is_sent or self._is_closed:
@@ -232,7 +243,7 @@ class RpcClient:
         asked = call_of_view(body)
         if asked is not None:
             looking = self._calls.pop(asked, None)
-            if looking is not None:  # else nobody waits for it any more
+            if looking is not None:  # otherwise its request has timed out
                 looking.view = body
                 self._changed.notify_all()
             return None

@@ -1,4 +1,4 @@
-"""What all native sockets need: marks, free ports, addresses, waits in slices, counts of what was refused."""
+"""Helpers of native sockets: high-water marks, ports, keep-alive, waits, rejected input."""
 
 from __future__ import annotations
 
@@ -51,32 +51,34 @@ Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
 LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
-"""How long a reader may wait in a subscriber's socket, holding its lock. A shorter time is not quicker: a
-timer that ends before the kernel's next tick costs more than the wait."""
+"""Maximum time in seconds that a reader waits in a socket while holding its lock. Shorter waits are no
+faster: a timer that ends before the kernel's next tick costs more than the wait.
+"""
 _SLICE_S = 0.1
 _HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
-"""What binding an own address may fail with."""
+"""Errors of bind that mean that the address exists but is in use."""
 _MOST = 50_000
 _LEAST = 32
 _PORT_FILES = 2
 SILENT_MS = 15_000
-"""When another computer has taken nothing for so long of what was sent there, the connection ends."""
+"""Milliseconds without an acknowledgement of sent data after which a connection to another computer is
+closed.
+"""
 CONNECT_MS = 3000
-"""For an attempt to connect to another computer; the system alone would try ever more rarely."""
+"""Timeout of connection attempts to other computers. Without it the system retries at growing intervals."""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
-"""Ports that programs of the original NEP expect to find something else on."""
+"""Ports on which programs of the original NEP expect something else."""
 
 _TcpInfo = struct.Struct("=2xBB52xI")
-"""Of Linux's `tcp_info`: how often it was sent again, how often asked for room, and when it last answered."""
+"""Fields of Linux's `tcp_info`: retransmissions, window probes, and milliseconds since the last
+acknowledgement.
+"""
 _TRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
 class Refusals:
-    """What came on a port and could not be understood: counted, and named for some seconds.
-
-    Not thread-safe: it lives under its socket's lock.
-    """
+    """Count of rejected inputs, with the newest reason. Not thread-safe: guarded by the owner."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -84,39 +86,42 @@ class Refusals:
         self._last_at = 0.0
 
     def add(self, reason: str) -> bool:
-        """One more, and why. Whether to log it: the first, the tenth, the hundredth, ..."""
+        """Count a rejected input; return True if it should be logged (the 1st, 10th, 100th, ...)."""
         self.count += 1
         self._reason = reason
         self._last_at = time.monotonic()
         return is_logged(self.count)
 
     def told(self) -> str:
-        """The newest reason and how many there were; empty when there was none in the last seconds."""
+        """Return the newest reason and the count, or "" if nothing was rejected in the last seconds."""
         if not self.count or time.monotonic() - self._last_at > _TOLD_S:
             return ""
         return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
 
 def send_mark(owner: Socket) -> None:
-    """Let libzmq queue so many messages for each connection. Their bytes are bounded by `byte_window`.
+    """Set the high-water mark for sending. Call before bind: libzmq ignores changes for open connections.
 
-    Before it is bound: libzmq does not stand another mark while there are connections.
+    The bytes are bounded by `byte_window`.
     """
     owner.setsockopt(zmq.SNDHWM, _MOST)
 
 
 def receive_mark(codec: str) -> int:
-    """The high-water mark of a subscriber. The node's thread empties its socket, so a small one will do."""
+    """Return the high-water mark for receiving. A small one suffices: the I/O thread empties the socket."""
     return _LEAST if codec == "image" else 1000
 
 
 def wait_shortly(owner: Socket) -> None:
-    """Let receiving without DONTWAIT wait for `SHORT_WAIT_S` seconds."""
+    """Let a blocking receive time out after `SHORT_WAIT_S` seconds."""
     owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
 
 
 def bind_free_port(owner: Socket, host: str) -> str:
-    """Bind to a free port of `host`, none of the original NEP's; the endpoint. Raises `AddressInUseError`."""
+    """Bind to a free port of `host`, except those of the original NEP; return the endpoint.
+
+    Raises `AddressInUseError`.
+    """
     for _port in range(100):
         endpoint = bind(owner, f"{host}:*")
         if int(endpoint.rpartition(":")[2]) not in ORIGINAL_PORTS:
@@ -126,7 +131,7 @@ def bind_free_port(owner: Socket, host: str) -> str:
 
 
 def bind(owner: Socket, address: str) -> str:
-    """Bind to an address; the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    """Bind to an address; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
     check_room(_PORT_FILES, f"a port of '{host_of(address)}'")
     try:
         owner.bind(endpoint_of(address))
@@ -136,7 +141,7 @@ def bind(owner: Socket, address: str) -> str:
 
 
 def connect(owner: Socket, address: str) -> str:
-    """Connect to an address, whether something is there yet or not; the endpoint. Raises `NepError`."""
+    """Connect to an address, whether it is bound yet or not; return the endpoint. Raises `NepError`."""
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
         raise NepError(
@@ -150,31 +155,30 @@ def connect(owner: Socket, address: str) -> str:
 
 
 def host_towards(address: str) -> str | None:
-    """The address of this computer under which a master at `address` sees it; None without a way to it."""
+    """Return the local address used to reach a master at `address`, or None without a route."""
     if is_loopback(address):
         return LOOPBACK
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect((host_of(address), 9))  # sends nothing: it only chooses the way
+            probe.connect((host_of(address), 9))  # sends nothing: only selects the route
             return str(probe.getsockname()[0])
     except OSError:
         return None
 
 
 def is_far(endpoint: str) -> bool:
-    """Whether it is on another computer, or may be reached from there."""
+    """Return True if the endpoint is on another computer, or may be reached from one."""
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
 def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
-    """Notice within a dozen seconds when a computer behind the connections of the next endpoint has vanished.
+    """Detect within a dozen seconds that the computer behind the next endpoint's connections has vanished.
 
-    The endpoint may be one to connect to or one to bind; "*" is any port. While nothing is under way the
-    kernel asks the other one's, which answers for a program that a debugger holds; a heartbeat of ZeroMQ
-    would cut it off. What is under way it sends again and again, for a quarter of an hour and ever more
-    rarely: hence a limit. A held program to which a lot is sent would reach that as well, so whoever sends a
-    lot looks himself (`is_watched`, see `FarConnection`), where he can. Only for other computers: on this one
-    the kernel tells of every end.
+    Call before connecting or binding; a port of "*" is any. TCP keep-alive probes idle connections. The
+    kernel answers them for a program stopped in a debugger, which a ZeroMQ heartbeat would disconnect.
+    Unacknowledged data is resent for a quarter of an hour, hence the limit (TCP_MAXRT). A stopped program
+    could exceed that as well, so publishers check it themselves where supported (`is_watched`, see
+    `FarConnection`). Needed only for other computers: on the same one the kernel reports every end.
     """
     far = is_far(endpoint)
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
@@ -187,7 +191,7 @@ def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> Non
 
 
 def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait, holding `changed`, until `is_met()`; whether it is. In slices, for Ctrl+C on Windows."""
+    """Wait until `is_met()`, holding `changed`; return False on timeout. In slices, for Ctrl+C on Windows."""
     deadline = time.monotonic() + timeout_s
     while not is_met():
         left = deadline - time.monotonic()
@@ -198,7 +202,7 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
 
 
 def sendable(data: bytes | memoryview) -> Part:
-    """What can be sent as it lies: a received message itself; of what can still change a copy."""
+    """Return an object that can be sent without a copy: received messages as is, mutable data as a copy."""
     if isinstance(data, bytes):
         return data
     if not (data.readonly and data.c_contiguous):
@@ -211,38 +215,37 @@ def sendable(data: bytes | memoryview) -> Part:
 
 @dataclass(frozen=True)
 class FarConnection:
-    """The connection over which a subscriber on another computer said hello.
+    """Connection over which a subscriber on another computer said hello.
 
-    Its number in this process, which the next one may get, and the other end, which tells them apart.
+    Identified by its descriptor, which may be reused, and its peer address.
 
-    A computer that gets another address, or wakes up in another network, connects anew, and its old
-    connection says nothing of its end. What libzmq sends to the new one it would queue there, too, until the
-    system gives up.
+    When a computer changes its address or network, it reconnects, but its old connection isn't closed.
+    Messages would be queued for both until the system gives up.
     """
 
     fd: int
     peer: tuple[str, int]
 
     can_tell: ClassVar[bool] = sys.platform == "linux"
-    """Whether `is_silent` can tell."""
+    """True if this system supports `is_silent`."""
 
     @classmethod
     def of(cls, received: zmq.Frame) -> FarConnection | None:
-        """The one over which this came; None where that is on this computer, or cannot be told."""
+        """Return the connection over which `received` came, or None for this computer or if unknown."""
         try:
             host = str(received.get("Peer-Address"))
             if os.name != "posix" or not host or host.startswith("127."):
                 return None
             fd = int(received.get(_SRCFD))
             peer = _peer_of(fd)
-        except (zmq.ZMQError, OSError):  # it has ended already
+        except (zmq.ZMQError, OSError):  # closed already
             return None
         return None if peer is None else cls(fd, peer)
 
     def is_silent(self) -> bool:
-        """Whether its other end has answered nothing for long, though it was asked again and again.
+        """Return True if the peer hasn't acknowledged anything for long, in spite of several retries.
 
-        The kernel answers for a program that a debugger holds: that it takes nothing more now.
+        The kernel acknowledges probes for a program stopped in a debugger, as its receive window is full.
         """
         if not self.can_tell:
             return False
@@ -257,7 +260,7 @@ class FarConnection:
         return bool(max(resent, asked) >= _TRIES and last_answer_ms >= SILENT_MS)
 
     def end(self) -> None:
-        """End it, if it is still there: libzmq notices and lets go of what it holds for it."""
+        """Close the connection, if it still exists; libzmq then releases its queue."""
         try:
             with _same(self.fd) as connection:
                 if connection.getpeername() == self.peer:
@@ -273,10 +276,10 @@ def _peer_of(fd: int) -> tuple[str, int] | None:
 
 
 def _same(fd: int) -> socket.socket:
-    """The same connection by a number of our own: libzmq may close its number at any moment."""
+    # Duplicates the descriptor, because libzmq may close the original at any moment.
     own = os.dup(fd)
     try:
         return socket.socket(fileno=own)
-    except OSError:  # it is none
+    except OSError:  # not a socket
         os.close(own)
         raise

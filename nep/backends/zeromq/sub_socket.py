@@ -1,7 +1,7 @@
-"""SubSocket: a SUB socket with its publishers: reads parts, tells messages from notices, counts losses.
+"""SubSocket: a SUB socket and its publishers. Parses messages and notices and counts losses.
 
-It has no lock: it lives under its subscriber's. Nearly every message is just the next one of its publisher:
-that is read on the quick way, and everything else by `CarefulParser`.
+Guarded by its subscriber's lock. Nearly every message directly follows the previous one of its publisher:
+those take a fast path, and everything else goes through `CarefulParser`.
 """
 
 from __future__ import annotations
@@ -52,17 +52,19 @@ from nep.system.addresses import is_endpoint
 __all__ = ["CarefulParser", "Into", "SubSocket"]
 
 Into = list[Message] | deque[Message]
-"""Where messages are put."""
+"""Containers to which messages are appended."""
 
 _NO_COPY_BYTES = 8_192
-"""Larger ones libzmq receives into memory of their own: a kept view of one keeps nothing else alive."""
+"""Size from which libzmq receives into separate memory: keeping a view of it keeps nothing else alive."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
 _Run = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
-"""The messages whose payloads were read: of which kind, whose, the number of the first, stamps and bytes."""
+"""Messages whose payloads were decoded: kind, publisher id, first sequence number, time stamps and encoded
+payloads.
+"""
 
 _logger = logging.getLogger("nep")
-_DONTWAIT = int(zmq.DONTWAIT)  # plain numbers: pyzmq's enumerations cost as much as what they ask for
+_DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members costs as much as the call
 _EVENTS = int(zmq.EVENTS)
 _RCVMORE = int(zmq.RCVMORE)
 _POLLIN = int(zmq.POLLIN)
@@ -70,12 +72,15 @@ _TOO_SHORT = lazy("a message has 3 or 4 parts, this one ends earlier")
 
 
 class CarefulParser:
-    """What parts mean that are not just the next message of a publisher. No sockets.
+    """Parser for everything that doesn't take the fast path. No sockets.
 
-    For the subscriber that says `hello`. Notes what it learns in `sources`.
-
-    `leave(publisher)` ends a connection, `tell(publisher, seq)` answers an echo. `shared` is where
-    payloads are read that lie in shared memory.
+    Args:
+        spec: Settings of the subscriber.
+        hello: Its hello filter.
+        sources: Publishers; updated by the parser.
+        leave: Ends the connection to a publisher.
+        tell: Acknowledges messages up to a sequence number to a publisher.
+        shared: Readers of shared memory, or None.
     """
 
     def __init__(
@@ -97,7 +102,7 @@ class CarefulParser:
         self._shared = shared
 
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
-        """The message in these parts; None for a notice and for what was heard before. Raises `WireError`."""
+        """Return the message in these parts; None for notices and duplicates. Raises `WireError`."""
         is_alone = first == self._hello
         is_one_part = not rest and first.startswith(self._topic)
         if is_one_part:
@@ -110,7 +115,7 @@ class CarefulParser:
         return self._message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
-        """The messages of a batch. Raises `WireError` when it is none."""
+        """Return the messages of a batch. Raises `WireError`."""
         topic, head, body = apart(first)
         if topic != self._topic:
             raise _other_topic()
@@ -129,7 +134,6 @@ class CarefulParser:
         return [each for each in read if each is not None]
 
     def _notice(self, header: Header) -> None:
-        """An echo, or the last word of a publisher that closes."""
         source = self._sources.get(header.publisher)
         last = source.last
         is_possible = self._sources.reached(header.publisher, header.seq)
@@ -177,7 +181,7 @@ class CarefulParser:
             is_latched=bool(header.flags & LATCHED),
             clock=source.clock,
         )
-        # `kind` goes with both forms: what has another codec is read carefully again.
+        # `kind` depends on both forms: a message with another codec takes the careful path again
         plain = 0 if header.flags & EXTENSION else form_of(header.codec, header.flags & ~SHARED)
         if header.flags & SHARED:
             source.shared_form = plain and plain | SHARED_FORM
@@ -187,7 +191,7 @@ class CarefulParser:
             source.shared_form = source.shared_form if source.shared_form == plain | SHARED_FORM else 0
         if shared is not None:
             return arrived(source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension)
-        # A small view must not keep a large receive buffer alive.
+        # a small view must not keep a large receive buffer alive
         is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
         return arrived(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
@@ -198,7 +202,10 @@ def _other_topic() -> WireError:
 
 
 class SubSocket:
-    """Sets the filters at once, before anything is connected or bound: the hello must follow the topic."""
+    """SUB socket on the native wire.
+
+    Sets its filters before anything is connected or bound, because the hello must follow the topic.
+    """
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.sources = HeardPublishers()
@@ -218,36 +225,36 @@ class SubSocket:
         self.wants_payloads = False
         self._run: _Run | None = None
         self._body = self._cut + HEADER_BYTES
-        """Where header and payload of a message in one part begin."""
-        # Nothing is told of the size, or what is as long may be the first part of the next message.
+        """Offset of the payload in a message of one part."""
+        # sizes at which a payload can't be told apart from the first part of the next message
         self._doubtful = frozenset({0, len(self._topic), len(self._hello)})
         wait_shortly(socket)
         socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
-        socket.setsockopt(zmq.SNDHWM, 0)  # libzmq silently drops filters beyond 1000 otherwise
+        socket.setsockopt(zmq.SNDHWM, 0)  # libzmq otherwise drops filters beyond 1000 silently
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
         return self.sources.received
 
     @property
     def lost(self) -> int:
-        """Messages that did not."""
+        """Number of messages lost."""
         return self.sources.lost
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read. Also takes note of connections that came and went."""
+        """True if a message can be read. Also processes connects and disconnects."""
         return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher; twice is once. Silent ones that it replaces are left, in a while."""
+        """Connect to a publisher (idempotent). Silent publishers that it replaces are removed later."""
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         self._replace(remote, endpoint)
         source = self.sources.listed(remote)
-        source.form = 0  # its next message is looked at: the type may be another one
+        source.form = 0  # its message type may have changed
         source.is_lapsed = False
         source.ends_at = None
         if endpoint and endpoint not in (source.endpoint, source.refused):
@@ -259,7 +266,7 @@ class SubSocket:
                 self._refuse(source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none"))
 
     def _replace(self, remote: RemotePublisher, endpoint: str) -> None:
-        """Leave silent publishers when what they sent last was read; at once where it has their port."""
+        # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
         for old in self.sources.replaced_by(remote):
             self.sources.closing(old, 0, time.monotonic())
         known = self.sources.find(remote.publisher.id)
@@ -271,7 +278,7 @@ class SubSocket:
                 self.leave(old)
 
     def _connect(self, source: HeardPublisher, endpoint: str) -> None:
-        if source.endpoint:  # its computer has another address now, or its master listens anew
+        if source.endpoint:  # its computer has a new address, or its master has restarted
             self._disconnect(source.endpoint)
         source.connecting(endpoint)
         try:
@@ -283,7 +290,7 @@ class SubSocket:
             source.endpoint = endpoint
 
     def connect_again(self) -> None:
-        """Connect anew to the publishers on other computers. What was not read of them is dropped."""
+        """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
         for source in self.sources.by_id.values():
             if is_far(source.endpoint):
                 self._connect(source, source.endpoint)
@@ -294,7 +301,7 @@ class SubSocket:
         self._connect(source, source.endpoint)
 
     def _refuse(self, source: HeardPublisher, endpoint: str, why: str) -> None:
-        """Whoever tells the master nonsense keeps nobody from hearing the others: it is named, not raised."""
+        # An invalid endpoint is reported, not raised: it must not affect other publishers.
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
         source.refused = endpoint
@@ -306,19 +313,19 @@ class SubSocket:
 
     @property
     def problem(self) -> str:
-        """What is wrong with a publisher that the master lists; empty when nothing is."""
+        """Problem of a listed publisher; empty if none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
         return next((each.problem for each in listed), "")
 
     def leave(self, publisher: int) -> None:
-        """Disconnect from a publisher and forget it."""
+        """Disconnect from a publisher and remove it."""
         source = self.sources.pop(publisher)
         self._shared.leave(publisher)
         if source is not None and source.endpoint:
             self._disconnect(source.endpoint)
 
     def _tell(self, publisher: int, seq: int) -> None:
-        """Tell a publisher that everything up to `seq` was read, and what share of the room is for it."""
+        # Acknowledges `seq` to a publisher, and assigns it a share of the receive window.
         bound = WINDOW_BYTES // max(1, self.sources.echoing)
         self._say(read_part(Read(self._id, publisher, seq, bound)))
 
@@ -326,7 +333,7 @@ class SubSocket:
         self._say(shares_part(shares))
 
     def _say(self, said: bytes) -> None:
-        """To all publishers: a filter that is taken back at once."""
+        # Reaches all publishers, as a filter that is set and removed at once.
         self._socket.setsockopt(zmq.SUBSCRIBE, said)
         self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
 
@@ -337,17 +344,23 @@ class SubSocket:
         try:
             self._socket.disconnect(endpoint)
         except zmq.ZMQError as error:
-            if error.errno != errno.ENOENT:  # it was not connected any more
+            if error.errno != errno.ENOENT:  # not connected any more
                 raise
 
     def read_into(
         self, into: Into, most: int, room: int, *, may_wait: bool = False, first: bytes | None = None
     ) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
+        """Read messages until the socket is empty or a limit is reached; return their number.
 
-        A batch is taken whole. With `may_wait` the first is waited for; `first` is what was read of it
-        already. Notices are dealt with on the way. Nearly every message is just the next one of its
-        publisher, has the form of the one before and comes in one part: that is read here.
+        Batches are read whole; notices are processed on the way. The fast path for messages of one part is
+        inlined here.
+
+        Args:
+            into: Container to append to.
+            most: Maximum number of messages.
+            room: Maximum number of bytes.
+            may_wait: True to wait for the first message.
+            first: First part, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
         cut, body = self._cut, self._body
@@ -356,7 +369,7 @@ class SubSocket:
             while count < most and room > 0:
                 if first is None:
                     first = recv(flags)
-                    flags = _DONTWAIT  # all parts of a message are there when its first is
+                    flags = _DONTWAIT  # all parts of a message are available with its first one
                 if len(first) >= body and first.startswith(topic):
                     form, size, seq, stamp_ns, publisher = unpack_at(first, cut)
                     source = find(publisher)
@@ -379,7 +392,7 @@ class SubSocket:
                         continue
                     if form & BATCH_FORM:
                         got, new = self._read_batch(first, into)
-                        # A rejected batch takes no room: who gets nothing waits as for an empty socket.
+                        # a rejected batch returns 0, so the caller waits as for an empty socket
                         count, others, room, first = (
                             count + got,
                             others + got - new,
@@ -397,12 +410,12 @@ class SubSocket:
                     others += 1
                     room -= other.size_bytes
         except zmq.Again:
-            pass  # nothing more
+            pass  # the socket is empty
         self.sources.received += count - others
         return count
 
     def _read_batch(self, first: bytes, into: Into) -> tuple[int, int]:
-        """The messages of a batch: how many, and how many of them are not counted yet."""
+        # Returns the number of messages, and how many of them aren't counted yet.
         body = self._body
         form, size, seq, _stamp_ns, publisher = unpack_at(first, self._cut)
         source = self.sources.by_id.get(publisher)
@@ -445,7 +458,7 @@ class SubSocket:
         raws: Sequence[bytes],
         into: Into,
     ) -> bool:
-        """The first message of a batch, and the payloads of all others; False when one cannot be decoded."""
+        # Decodes all but the first message of a batch. Returns False if one can't be decoded.
         kind = source.kind
         decode = kind.decode
         try:
@@ -458,14 +471,14 @@ class SubSocket:
         return True
 
     def restore(self, into: deque[Message]) -> None:
-        """Put messages of the payloads that nobody took before all others."""
+        """Convert the remaining payloads back to messages and put them first into `into`."""
         if self._run is None:
             return
         kind, publisher, first, stamps_ns, raws = self._run
         number = len(raws)
         while True:
             try:
-                payload = self.payloads.pop()  # from the right: others may take from the left meanwhile
+                payload = self.payloads.pop()  # from the right: other threads take from the left
             except IndexError:
                 return
             number -= 1
@@ -474,7 +487,7 @@ class SubSocket:
             into.appendleft(message)
 
     def _read_shared(self, first: bytes) -> Message | None:
-        """The usual message in shared memory: the next one of its publisher. None: look carefully."""
+        # Fast path for shared memory. Returns None to continue on the careful path.
         form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
         source = self.sources.by_id.get(publisher)
         if (
@@ -492,7 +505,6 @@ class SubSocket:
         return arrived(source.kind, data, stamp_ns, seq, publisher)
 
     def _read_batch_carefully(self, first: bytes, into: Into) -> tuple[int, int]:
-        """The messages of any batch."""
         if self._has_more():
             self._carefully(first)
             return 0, 0
@@ -505,13 +517,13 @@ class SubSocket:
         return len(messages), 0
 
     def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
-        """The next message, waited for with `may_wait`; None when there is nothing more.
+        """Return the next message, or None if the socket is empty; wait with `may_wait`.
 
-        Others that came with it go into `rest`. The usual message is read here as in `read_into`: calling
-        that takes a third longer, and a program that reads one message after the other does this for each.
+        Other messages of its batch are appended to `rest`. Repeats the fast path of `read_into`, because the
+        call would take a third longer in programs that read single messages.
         """
         if not may_wait and not int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
-            return None  # most often: an error that says so costs ten times as much
+            return None  # the common case: raising `zmq.Again` is ten times slower
         try:
             first = self._recv(0 if may_wait else _DONTWAIT)
         except zmq.Again:
@@ -537,11 +549,8 @@ class SubSocket:
         return message
 
     def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
-        """A message that begins with `first`: what comes behind it, if that was read too, and the message.
-
-        Telling whether a part is the last takes pyzmq longer than receiving it, so nobody asks: see
-        `_carefully`.
-        """
+        # Asking pyzmq whether a part is the last takes longer than receiving it, so this assumes three parts,
+        # see `_carefully`.
         if first != self._topic:
             return self._carefully(first)
         recv, data = self._recv, None
@@ -563,11 +572,8 @@ class SubSocket:
         return self._carefully(first, head, data)
 
     def _carefully(self, first: bytes, *got: bytes | zmq.Frame | None) -> tuple[bytes | None, Message | None]:
-        """What the parts mean that begin with `first` and go on with `got`, and perhaps with more.
-
-        What was taken for the second or third part may be the next message's first, when somebody sends
-        less than three: it then begins as no header does, with the topic or the hello. That is returned.
-        """
+        # If a message has fewer than three parts, the last part in `got` is already the first of the next
+        # message. It then begins with the topic or the hello, unlike a header, and is returned.
         read = [each for each in got if each is not None]
         rest: list[_Part] = [each.buffer if isinstance(each, zmq.Frame) else each for each in read]
         if rest and bytes(rest[-1][: len(self._hello)]).startswith((self._topic, self._hello)):
@@ -588,7 +594,7 @@ class SubSocket:
             return None, None
 
     def dropped(self, count: int) -> None:
-        """So many messages that had been received were dropped for lack of room."""
+        """Count received messages that were dropped for lack of room."""
         self.sources.dropped(count)
 
     def close(self) -> None:

@@ -1,16 +1,15 @@
-"""A subscriber's socket with its lock, its inbox and its readers.
+"""A subscriber's socket with its lock, inbox and readers.
 
-`SocketSubscriber` reads from any `Readable`, a socket that turns parts into messages; `NativeSubscriber` is
-the one of the native wire, which connects to publishers as they come.
+`SocketSubscriber` reads from any `Readable`, a socket that returns messages. `NativeSubscriber` is for the
+native wire and connects to publishers as they register.
 
-Whoever reads takes a lease on the socket for a moment, and the node's thread leaves it alone as long: a loop
-of `listen` gets its messages straight from the socket, in its own thread. When nobody reads, the node's
-thread moves messages into the inbox, which is bounded in bytes.
+A reader leases the socket for a moment, and the I/O thread doesn't read meanwhile: a `listen` loop gets its
+messages directly from the socket in its own thread. Without a reader the I/O thread moves messages into the
+inbox, which is bounded in bytes.
 
-A reader that gets one message after the other waits for the next one in the socket itself: a round trip of
-small messages is a fifth to a third shorter than with polling the descriptor. It holds the lock then, for
-`SHORT_WAIT_S` at most, and does not begin while somebody else wants the socket. After that it polls the
-descriptor, without the lock.
+A reader that receives in quick succession waits in the socket itself, which shortens the round trip of small
+messages by a fifth to a third compared to polling the descriptor. It holds the lock for up to `SHORT_WAIT_S`,
+and doesn't start while another thread wants the socket. After that it polls the descriptor without the lock.
 """
 
 from __future__ import annotations
@@ -46,68 +45,71 @@ _POLLIN = int(zmq.POLLIN)
 _NEVER = math.inf
 LEASE_S = 0.02
 _WAITING_S = 0.1
-"""How often the node's thread looks whether a reader still waits."""
+"""Interval at which the I/O thread checks whether a reader still waits."""
 _LATE_S = _WAITING_S + LEASE_S
-"""The node's thread is called when it would come later than this after a read: not for each message of a
-reader that always waits again."""
+"""A read wakes the I/O thread only if that would come later than this: not for every message."""
 _BATCH_S = 0.005
-"""Sinks and inboxes are filled 200 times a second at most."""
+"""Sinks and inboxes are filled at most 200 times a second."""
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
 _FEW = 50
 
 
 class Readable(Protocol):
-    """A socket that turns what comes into messages. It is used under the subscriber's lock only."""
+    """Socket that returns messages. Guarded by the subscriber's lock."""
 
     fd: int
     refusals: Refusals
-    """Messages that could not be understood."""
+    """Rejected messages."""
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
 
     @property
     def lost(self) -> int | None:
-        """Messages that did not; None when nobody can know."""
+        """Number of messages lost; None if unknown."""
 
     @property
     def problem(self) -> str:
-        """What is wrong as long as nothing changes; empty when nothing is."""
+        """Persistent problem; empty if none."""
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read. Also takes note of connections that came and went."""
+        """True if a message can be read. Also processes connects and disconnects."""
 
     def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were.
+        """Read messages until the socket is empty or a limit is reached; return their number.
 
-        With `may_wait` the first is waited for, `SHORT_WAIT_S` at most.
+        Args:
+            into: Container to append to.
+            most: Maximum number of messages.
+            room: Maximum number of bytes.
+            may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
     def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
-        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`.
+        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`.
 
-        Others that came with it go into `rest`.
+        Other messages of its batch are appended to `rest`.
         """
 
     def dropped(self, count: int) -> None:
-        """So many messages that had been received were dropped for lack of room."""
+        """Count received messages that were dropped for lack of room."""
 
     def close(self) -> None:
         """Close the socket."""
 
 
 class ReadOneByOne:
-    """The batches of a `Readable` whose library has none."""
+    """Implements `Readable.read_into` for libraries without batches."""
 
     def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
-        """The next message; see `Readable`."""
+        """Return the next message, see `Readable.read`."""
         raise NotImplementedError
 
     def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
-        """Read until there is nothing more, `most` are read, or `room` bytes are full; how many were."""
+        """Read messages one by one, see `Readable.read_into`."""
         count = 0
         while count < most and room > 0:
             message = self.read(into, may_wait=may_wait and not count)
@@ -120,19 +122,19 @@ class ReadOneByOne:
 
 
 class NativeReadable(Readable, Protocol):
-    """One that is connected to the publishers that the master lists."""
+    """Socket connected to the publishers that the master lists."""
 
     sources: HeardPublishers
-    """Those that it hears."""
+    """Publishers of the topic."""
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher; twice is once."""
+        """Connect to a publisher (idempotent)."""
 
     def leave(self, publisher: int) -> None:
-        """Disconnect from a publisher and forget it."""
+        """Disconnect from a publisher and remove it."""
 
     def connect_again(self) -> None:
-        """Connect anew to the publishers on other computers. What was not read of them is dropped."""
+        """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
 
     def reconnect(self, publisher: int) -> None:
         """Connect anew to a publisher that was connected to."""
@@ -142,7 +144,7 @@ R = TypeVar("R", bound=Readable)
 
 
 class SocketSubscriber(Generic[R]):
-    """Reads from `readable`. `on_close` unregisters; it is called once, without the lock."""
+    """Subscriber that reads from `readable`. `on_close` unregisters it; called once, without the lock."""
 
     def __init__(
         self, readable: R, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
@@ -157,14 +159,14 @@ class SocketSubscriber(Generic[R]):
         self._read_into = readable.read_into
         self._keeps_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
-        """What was read ahead, in front of the inbox; anybody may take from its left without the lock."""
+        """Messages read ahead, before those of the inbox. Pop from the left, without the lock."""
         self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
         self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
         """See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._ahead = ReadAhead(spec.max_messages)
         self._moves = spec.max_messages >= 10 * AHEAD_MOST
-        """Whether a few messages more than that may wait for the reader."""
+        """True if the queue is large enough to exceed its bound by a few messages."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
@@ -175,21 +177,21 @@ class SocketSubscriber(Generic[R]):
         self._waker: Waker | None = None
         self._woken: set[Wakes] = set()
         self._problem = ""
-        # `with` is three times faster on the lock itself than on the condition over it.
+        # `with` is three times faster on the lock than on the condition
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
 
-    # ---- what the reader sees
+    # ---- reading
 
     def poll(self) -> Message | None:
-        """The next message if one is there, read in the caller's thread."""
+        """Return the next message, or None. Reads in the calling thread."""
         self._wanted.append(None)
         with self._lock:
             self._wanted.pop()
             return None if self.is_closed else self._next()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message, read in the caller's thread; waits at most `timeout_s` seconds."""
+        """Return the next message; wait up to `timeout_s` seconds. Reads in the calling thread."""
         with self._lock:
             if self.is_closed:
                 return None
@@ -199,7 +201,7 @@ class SocketSubscriber(Generic[R]):
                 self._is_brisk = True
                 return message
             self._is_brisk = False
-            # Under the same lock: the socket was empty, so its descriptor tells of what comes next.
+            # Under the same lock: the socket is empty, so its descriptor signals the next message.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
         began = time.monotonic()
@@ -223,33 +225,33 @@ class SocketSubscriber(Generic[R]):
                 self._changed.notify_all()
                 return None
             message = self._next()
-            # Who waits longer than that would only wait twice for each message.
+            # after a longer wait the short one would only delay each message
             self._is_brisk = message is not None and time.monotonic() - began < SHORT_WAIT_S
             return message
 
-    # ---- what it tells
+    # ---- statistics
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
         return self._readable.received
 
     @property
     def lost(self) -> int | None:
-        """Messages that did not arrive, or were dropped here for lack of room."""
+        """Number of messages lost or dropped here for lack of room."""
         return self._readable.lost
 
     @property
     def refused(self) -> int:
-        """What came and was no message at all."""
+        """Number of inputs rejected because they aren't valid messages."""
         return self._readable.refusals.count
 
     def report(self, problem: str) -> None:
-        """The reader's trouble with a message, for the next renewal."""
+        """Set the reader's problem, which is sent with the next renewal."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         problem = self._problem or self._readable.refusals.told() or self._readable.problem
         lost = None if self.lost is None else as_count(self.lost)
         return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)
@@ -257,8 +259,8 @@ class SocketSubscriber(Generic[R]):
     # ---- waiting
 
     def enter_wait(self, waker: Wakes) -> bool:
-        """Before its descriptor is polled: False when there is something to read already."""
-        self._wanted.append(None)  # as in `_turn`, which takes longer than all of this
+        """Prepare to poll the descriptor; return False if a message is available."""
+        self._wanted.append(None)  # as `_turn` does, but faster
         try:
             with self._lock:
                 if (
@@ -275,16 +277,16 @@ class SocketSubscriber(Generic[R]):
             self._wanted.pop()
 
     def leave_wait(self, waker: Wakes) -> None:
-        """After its descriptor was polled."""
+        """End a wait that `enter_wait` began."""
         with self._lock:
             self._waiters.remove(waker)
             if waker in self._woken:
                 self._woken.discard(waker)
-            if self.is_closed:  # who closes waits for this
+            if self.is_closed:  # `close` waits for this
                 self._changed.notify_all()
 
     def read_until(self, is_met: Callable[[], bool], timeout_s: float, waker: Waker) -> bool:
-        """Read into the inbox, in the caller's thread, until `is_met()`; whether it is."""
+        """Read into the inbox until `is_met()`, in the calling thread; return False on timeout."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._waiters.append(waker)
@@ -296,7 +298,7 @@ class SocketSubscriber(Generic[R]):
                     if is_met() or left <= 0.0 or self.is_closed:
                         return is_met()
                 if count == _FEW:
-                    continue  # what it waits for comes behind what somebody publishes all the time
+                    continue  # the awaited notice is behind the messages of a busy publisher
                 polled = [(self.fd, _POLLIN), (waker.fd, _POLLIN)]
                 zmq.zmq_poll(polled, int(min(left, 0.1) * 1000) + 1)
                 waker.clear()
@@ -304,20 +306,20 @@ class SocketSubscriber(Generic[R]):
             self.leave_wait(waker)
             self._io.serve_soon(self)
 
-    # ---- in the node's thread
+    # ---- in the I/O thread
 
     def serve(self, now: float) -> Rest:
-        """Move what is there into the inbox or the sink, unless somebody reads."""
+        """Move available messages into the inbox or the sink, unless a reader holds the lease."""
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
-            # Without the lock, which the reader may hold for a short wait; it may only be read too early.
+            # without the lock, which a waiting reader holds; a stale value is harmless
             self._io_comes_at = due = now + _WAITING_S if self._waiters else self._leased_until
             return Rest(is_quiet=True, due=due)
         with self._turn():
             if self.is_closed:
                 return Rest(is_quiet=True)
             if self._waiters or now < self._leased_until:
-                # Whoever waits for long is not looked after as often as a reader who may stop any moment.
+                # a reader in a long wait needs fewer checks than one that may stop at any moment
                 self._io_comes_at = max(self._leased_until, now + LEASE_S)
                 if self._waiters and now >= self._leased_until:
                     self._io_comes_at = now + _WAITING_S
@@ -333,16 +335,14 @@ class SocketSubscriber(Generic[R]):
         if sink is not None and batch:
             try:
                 sink(batch)
-            except (
-                BaseException
-            ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
+            except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
         return Rest(is_quiet=True, due=now + _BATCH_S) if count or batch else Rest()
 
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
         with self._turn():
             if self.is_closed:
                 return
@@ -354,21 +354,21 @@ class SocketSubscriber(Generic[R]):
         self._on_close(self.spec.id)
         self._io.remove(self)
         with self._lock:
-            wait_until(self._changed, lambda: not self._waiters, 1.0)  # they poll its descriptor
+            wait_until(self._changed, lambda: not self._waiters, 1.0)  # readers poll its descriptor
             self._readable.close()
             if self._waker is not None:
                 self._waker.close()
                 self._waker = None
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed and empty in a forked child."""
         self.is_closed = True
         self.payloads.clear()
         self.ready.clear()
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """The lock, for everybody but a reader: while somebody wants it, no reader waits with it."""
+        # Takes the lock for all but readers; no reader waits in the socket while the lock is wanted.
         self._wanted.append(None)
         try:
             with self._lock:
@@ -377,7 +377,7 @@ class SocketSubscriber(Generic[R]):
             self._wanted.pop()
 
     def restore(self) -> None:
-        """See `GivesPayloads`."""
+        """Convert the remaining payloads back to messages, see `GivesPayloads`."""
         if self._source is not None:
             with self._turn():
                 self._source.restore(self.ready)
@@ -393,14 +393,14 @@ class SocketSubscriber(Generic[R]):
             return self._next_message(may_wait=may_wait)
         finally:
             if self._source is not None:
-                self._source.wants_payloads = False  # it is only for who reads now
+                self._source.wants_payloads = False  # applies to the current reader only
 
     def _next_message(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_comes_at > now + _LATE_S:
-            # Reading one message and not the rest leaves the descriptor silent for those that follow:
-            # the node's thread has to look when the lease is over. It is asked once for many reads.
+            # After reading one message of several the descriptor may not signal the others, so the I/O thread
+            # must check when the lease ends. It is asked once for many reads.
             self._io_comes_at = self._leased_until
             self._io.serve_soon(self)
         if self._keeps_all and not self.ready and not self._inbox.messages:
@@ -423,7 +423,8 @@ class SocketSubscriber(Generic[R]):
         return self._inbox.take()
 
     def _bounded(self, message: Message | None) -> Message | None:
-        """The oldest that there is room for, of `message` and those that were read behind it."""
+        # Returns the oldest of `message` and those behind it for which there is room; counts the others as
+        # dropped.
         over = 0
         while message is not None and len(self.ready) >= self.spec.max_messages:
             message = self.ready.popleft()
@@ -433,7 +434,7 @@ class SocketSubscriber(Generic[R]):
         return message
 
     def _fill(self, most: int = _BATCH_MESSAGES) -> int:
-        """Read into the inbox until the socket has nothing more, or a batch is full; how many."""
+        # Reads into the inbox until the socket is empty or a batch is full; returns the number of messages.
         messages: list[Message] = []
         count = self._read_into(messages, most, _BATCH_BYTES)
         dropped = sum(map(self._inbox.put, messages))
@@ -442,7 +443,6 @@ class SocketSubscriber(Generic[R]):
         return count
 
     def _fill_batch(self, batch: list[Message]) -> int:
-        """Read a batch for the sink; how many messages came."""
         if self._keeps_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
             return self._read_into(batch, _BATCH_MESSAGES, _BATCH_BYTES)
         count = self._fill()
@@ -450,7 +450,7 @@ class SocketSubscriber(Generic[R]):
         return count
 
     def _after_use(self) -> None:
-        """The socket was used without emptying it, which may have swallowed the descriptor's signal."""
+        # Call after using the socket without emptying it, which may have consumed the edge of ZMQ_FD.
         if self._readable.has_input:
             self._wake_waiters()
             self._io.serve_soon(self)
@@ -462,25 +462,25 @@ class SocketSubscriber(Generic[R]):
 
 
 class NativeSubscriber(SocketSubscriber[NativeReadable]):
-    """See `SocketSubscriber`. The methods for publishers are called by the link to the master."""
+    """Subscriber on the native wire. The master session calls the methods for publishers."""
 
     def __init__(
         self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
         super().__init__(readable, io, spec, on_close)
         self._closed_early: set[int] | None = set()
-        """Publishers that closed before `begin`; None since."""
+        """Ids of publishers that closed before `begin`; None afterwards."""
 
     @property
     def has_publishers(self) -> bool:
-        """Whether it hears any, or remembers one that may only be silent."""
+        """True if it has any publishers, including silent ones."""
         with self._turn():
             return bool(self._readable.sources.by_id)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait until these publishers have echoed.
+        """Wait for the echo of these publishers; return False on timeout.
 
-        Who says bye meanwhile, or cannot be connected to, is not waited for.
+        Publishers that say bye meanwhile, or can't be connected, are skipped.
         """
         wanted = frozenset(publishers)
         sources = self._readable.sources
@@ -493,7 +493,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         )
 
     def wait_for_any(self, timeout_s: float, waker: Waker) -> bool:
-        """Wait until some publisher has echoed."""
+        """Wait for the echo of any publisher; return False on timeout."""
         sources = self._readable.sources
         return self.read_until(
             lambda: any(source.has_echoed for _each, source in sources.items()), timeout_s, waker
@@ -501,13 +501,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is connected."""
+        """Endpoints of all connections."""
         return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
 
     def begin(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers that there were when it was registered, and have not closed since.
+        """Connect to the publishers known at registration, except those closed since.
 
-        The master's word of that is read in another thread than its list, and may be known before.
+        The notification of a close is read in another thread than the reply and may be processed first.
         """
         with self._turn():
             closed, self._closed_early = self._closed_early or set(), None
@@ -521,19 +521,19 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.sources.expect_all_of(publisher)
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to these publishers; twice is once."""
+        """Connect to publishers (idempotent)."""
         with self._turn():
             self._connect(remotes)
 
     def _connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """With the lock held."""
+        # Call with the lock held.
         if not self.is_closed:
             for remote in remotes:
                 self._readable.connect(remote)
             self._after_use()
 
     def connect_again(self) -> None:
-        """This computer has another address: connect to publishers on others anew."""
+        """Reconnect to publishers on other computers, after the address of this one has changed."""
         with self._turn():
             if not self.is_closed:
                 self._fill()
@@ -542,7 +542,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._after_use()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These are all publishers of the topic: connect to new ones; others are silent."""
+        """Replace the list of publishers: connect to new ones; missing ones are marked as silent."""
         known = tuple(remotes)
         self.connect(known)
         listed = {remote.publisher.id for remote in known}
@@ -552,7 +552,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                     source.is_lapsed = True
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """A publisher is unlisted. Its connection stays until its bye comes, or it is replaced."""
+        """Process the removal of a publisher. Its connection stays until the bye, or until it is replaced."""
         with self._turn():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
@@ -562,14 +562,14 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.sources.lapsed(publisher, final)
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """By node, how the clocks of other computers differ from this one's: no others are known."""
+        """Set the clock differences of other computers, by node id."""
         with self._turn():
             self._readable.sources.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Once a second: leave publishers that have closed without a bye; reconcile losses.
+        """Process a renewal: remove publishers that closed without a bye, and update the losses.
 
-        `last_seqs` is the master's word on what publishers have sent.
+        `last_seqs` has the newest sequence numbers known to the master.
         """
         with self._turn():
             if self.is_closed:

@@ -1,4 +1,4 @@
-"""Subscriptions: who reads at a publisher's port."""
+"""Subscriptions: the subscribers connected to a publisher."""
 
 from __future__ import annotations
 
@@ -14,29 +14,28 @@ __all__ = ["MAX_SUBSCRIBERS", "Subscriptions"]
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
-"""Whoever says hello after so many is not greeted: it gets messages as one who says no hello."""
+"""Maximum number of greeted subscribers. Further ones receive messages like subscribers without a hello."""
 
 
 class Subscriptions:
-    """Who reads at a publisher's port, from the subscriptions that come in there. It has no sockets.
+    """Subscribers of a publisher, by the subscriptions that its socket receives. No sockets.
 
-    Those who said hello to this publisher of `topic`, and the filters of others.
-
-    It lives under its publisher's lock.
+    Tracks subscribers that said hello to this publisher of `topic`, and the plain filters of others. Guarded
+    by the publisher's lock.
     """
 
     def __init__(self, topic: str, publisher: int) -> None:
         self.seen: dict[int, int] = {}
-        """Subscribers that said hello and have not gone, and how many messages there had been then."""
+        """Message counts at the hello, by the id of connected subscribers."""
         self.hellos: dict[int, bytes] = {}
-        """Under which first part each of them is reached alone."""
+        """First part that addresses one subscriber alone, by its id."""
         self.apart: dict[bytes, int] = {}
-        """Filters by which somebody reads who did not say that it reads messages of one part; of how many."""
+        """Number of subscribers by plain filter, for those that don't accept messages of one part."""
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
-        """What is under way to those that tell what they have read."""
+        """Send windows of subscribers that acknowledge messages."""
         self._far: dict[int, FarConnection] = {}
-        """Over which connection those on other computers said hello."""
+        """Connections of subscribers on other computers."""
         self.shared: SharedPayloads | None = None
         self.refusals = Refusals()
         self._id = publisher
@@ -45,21 +44,21 @@ class Subscriptions:
 
     @property
     def is_there(self) -> bool:
-        """Whether anybody reads."""
+        """True if any subscriber is connected."""
         return bool(self.seen or self.apart)
 
     @property
     def reads_batches(self) -> bool:
-        """Whether all who read take several messages in one part."""
+        """True if all current subscribers accept batches."""
         return not self.apart and not self._without_batches
 
     @property
     def tells_all(self) -> bool:
-        """Whether all who read tell what they have read."""
+        """True if all current subscribers acknowledge messages."""
         return not self.apart and len(self.windows) == len(self.seen)
 
     def forget(self) -> None:
-        """Forget all who said hello."""
+        """Remove all subscribers that said hello."""
         self.seen.clear()
         self.hellos.clear()
         self.windows.clear()
@@ -69,9 +68,15 @@ class Subscriptions:
     def note(
         self, event: bytes, count: int, came_by: Callable[[], FarConnection | None] = lambda: None
     ) -> bytes | None:
-        """Somebody came or went, after `count` messages; the first part under which to greet a subscriber.
+        """Process a subscription event after `count` messages.
 
-        `came_by` tells over which connection, if that leads to another computer.
+        Args:
+            event: Event from the XPUB socket.
+            count: Number of messages published so far.
+            came_by: Returns the connection of the event if it comes from another computer.
+
+        Returns:
+            First part that addresses a subscriber to greet, or None.
         """
         is_wanted, what = event[:1] == b"\1", event[1:]
         hello = parse_hello(what)
@@ -80,7 +85,7 @@ class Subscriptions:
                 self._note_filter(what, is_wanted=is_wanted)
             return None
         if hello.topic != self._name:
-            return None  # a subscriber of whoever had this port before
+            return None  # a subscriber of this port's previous owner
         if is_wanted:
             own = self._note_hello(hello, what, count)
             if own is not None:
@@ -90,7 +95,7 @@ class Subscriptions:
         return None
 
     def _is_answer(self, what: bytes, *, is_wanted: bool) -> bool:
-        """Whether it answers an echo or an offer; noted when it does."""
+        # Returns True for acknowledgements and replies to offers, which it processes.
         read, shares = parse_read(what), parse_shares(what)
         if read is not None:
             if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
@@ -105,7 +110,7 @@ class Subscriptions:
         if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
             self._refuse(f"the hello of one more than {MAX_SUBSCRIBERS} subscribers")
             return None
-        if hello.one_part:  # its own filter came before
+        if hello.one_part:  # its plain filter was counted before
             left = self.apart.pop(self._topic, 0) - 1
             if left > 0:
                 self.apart[self._topic] = left
@@ -118,11 +123,11 @@ class Subscriptions:
         if not hello.batches:
             self._without_batches.add(hello.subscriber)
         if hello.tells:
-            self.windows[hello.subscriber] = SendWindow()  # a connection of its own: nothing is under way
+            self.windows[hello.subscriber] = SendWindow()  # a new connection: nothing is in flight
         return what
 
     def _note_connection(self, subscriber: int, connection: FarConnection | None) -> None:
-        """A subscriber has one: where it says hello over another one, nobody reads the first any more."""
+        # After a hello over a new connection the previous one is abandoned.
         before = self._far.pop(subscriber, None)
         if connection is not None:
             self._far[subscriber] = connection
@@ -130,7 +135,7 @@ class Subscriptions:
                 before.end()
 
     def end_silent(self) -> None:
-        """End the connections to computers that have vanished. Their subscribers are gone soon after."""
+        """End connections to computers that have vanished; their subscribers are removed soon after."""
         for connection in self._far.values():
             if connection.is_silent():
                 connection.end()
@@ -145,7 +150,7 @@ class Subscriptions:
             self.shared.forget(subscriber)
 
     def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
-        """Each filter that comes is told, and the last of its kind that goes."""
+        # XPUB_VERBOSE reports every subscribe, but only the last unsubscribe.
         if not self._topic.startswith(what):
             self._refuse(f"{len(what)} bytes that are no subscription of it")
             return

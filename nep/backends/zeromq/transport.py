@@ -1,4 +1,4 @@
-"""The back end `zeromq`: the native wire, and direct connections in the original one."""
+"""Transport of the back end `zeromq`: the native wire, and direct connections on the original wire."""
 
 from __future__ import annotations
 
@@ -50,51 +50,51 @@ from nep.system.wakeup import Waker
 __all__ = ["DIRECT_WAIT_S", "MasteredPublisher", "OwnedPublisher", "ZeromqTransport", "closed_on_error"]
 
 DIRECT_WAIT_S = 0.3
-"""Without a master nobody knows whether there is another side: it gets so long to connect."""
+"""Seconds to wait for a peer of a direct connection; without a master it is unknown whether there is one."""
 _LEAVE_S = 0.3
 _THREAD_FILES = 4
 _MOST_SESSIONS = 8
-"""So many masters' connections are kept though nothing is registered with them."""
+"""Maximum number of sessions kept without registrations."""
 _Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
 
 
 class OwnedPublisher(PublisherTransport, Served, Protocol):
-    """A publisher as its transport needs it, which serves and ends it."""
+    """Publisher as its transport uses it."""
 
     spec: PublisherSpec
 
     def say_bye(self) -> None:
-        """Nothing is published any more; say so."""
+        """Send the bye and stop accepting messages."""
 
     def finish(self, deadline: float) -> None:
-        """Wait until what was published is delivered, until `deadline` at most."""
+        """Wait until all messages are delivered, until `deadline` at the latest."""
 
     def release(self) -> None:
-        """Close what it has; the thread that served it has let go of it."""
+        """Release the socket. The I/O thread must not serve it any more."""
 
 
 class MasteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
-    """One that the master knows."""
+    """Publisher registered at a master."""
 
     def expect(self, expected: Iterable[Expected]) -> None:
-        """These subscribers are registered and will connect."""
+        """Note registered subscribers that will connect."""
 
     def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
-        """Wait until these have said hello; the ids of those that did not in time."""
+        """Wait for the hello of these subscribers; return the ids of those still missing."""
 
 
 class ThreadWait:
-    """What one thread waits by: its waker, and what it polled last. A wake that comes early is kept."""
+    """Waker and poller of one thread. An early wake is kept."""
 
     def __init__(self) -> None:
         self.waker = Waker()
         self.is_busy = False
-        """Whether its thread waits, or is about to."""
+        """True while its thread waits or is about to."""
         self._fds: list[int] | None = None
         self._poll: Callable[[int], Sequence[tuple[int, int]]]
 
     def wait(self, fds: list[int], timeout_s: float) -> None:
-        """Until one of these can be read, or the waker is woken."""
+        """Wait until one of `fds` is readable or the waker is woken."""
         if fds != self._fds:
             self._poll, self._fds = _poll_of((*fds, self.waker.fd)), fds
         for fd, _events in self._poll(int(timeout_s * 1000) + 1):
@@ -103,7 +103,7 @@ class ThreadWait:
 
 
 def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]:
-    """Polls these for reading, for so many milliseconds at most. One below 0 is none."""
+    # Negative descriptors are ignored.
     fds = tuple(fd for fd in fds if fd >= 0)
     if not hasattr(select, "poll"):  # Windows
         polled = [(fd, zmq.POLLIN) for fd in fds]
@@ -115,10 +115,10 @@ def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]
 
 
 class ZeromqTransport:
-    """One node's sessions and sockets, in the context and the thread of its process.
+    """Sockets and master sessions of one node, in the process-wide context and I/O thread.
 
-    Sinks are called in a thread of the node's own, so that they hold up nobody else, and may ask the master
-    and make publishers and subscribers.
+    Sinks run in a separate thread per node, so that they can't block other nodes and may send requests to the
+    master and create publishers and subscribers.
     """
 
     def __init__(self, node: NodeRecord) -> None:
@@ -137,13 +137,13 @@ class ZeromqTransport:
         self._is_over = False
         self._services = ZeromqServices(self._shared, self._session, node.name)
         self._attached: dict[int, str] = {}
-        """The endpoints of direct connections, by the id of their publisher or subscriber."""
+        """Endpoints of direct connections, by the id of their publisher or subscriber."""
         watch(self)
 
     # ---- publishers
 
     def publisher(self, spec: PublisherSpec) -> PublisherTransport:
-        """A new publisher. See `Transport.publisher`."""
+        """Create a publisher. See `Transport.publisher`."""
         with self._opening():
             if isinstance(spec.configuration, Direct):
                 return self._direct_publisher(spec, spec.configuration)
@@ -153,7 +153,7 @@ class ZeromqTransport:
         session = self._session(configuration.master)
         session.wait_for_name(spec.wait_s)
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
-        # Made before the socket is bound: what it sets applies to connections of later binds only.
+        # before bind: socket options apply to connections of later binds only
         publisher = self._mastered_publisher(spec, closer)
         with closed_on_error(publisher.release):
             endpoints = publisher.move(session.hosts)
@@ -175,7 +175,7 @@ class ZeromqTransport:
             absent = publisher.wait_for(reply.expected, HANDSHAKE_S)
             if absent:
                 session.report_missing(spec.id, absent)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             publisher.close(0.0)
             raise
         return publisher
@@ -206,8 +206,8 @@ class ZeromqTransport:
 
     def _xpub(self, spec: PublisherSpec) -> Socket:
         socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
-        socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a hello may come twice when a subscriber reconnects
-        socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # of what it receives
+        socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a reconnecting subscriber repeats its hello
+        socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # applies to received messages
         return socket
 
     def _hold(self, publisher: OwnedPublisher) -> None:
@@ -232,7 +232,7 @@ class ZeromqTransport:
     # ---- subscribers
 
     def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
-        """A new subscriber. See `Transport.subscriber`."""
+        """Create a subscriber. See `Transport.subscriber`."""
         with self._opening():
             if isinstance(spec.configuration, Direct):
                 return self._direct_subscriber(spec, spec.configuration)
@@ -303,7 +303,6 @@ class ZeromqTransport:
         return subscriber
 
     def _io_for(self, spec: SubscriberSpec) -> IoThread:
-        """The thread that serves a subscriber."""
         if spec.sink is None:
             return self._io
         with self._lock:
@@ -320,7 +319,7 @@ class ZeromqTransport:
             self._subscribers[subscriber.spec.id] = subscriber
 
     def _serve(self, io: IoThread, subscriber: SocketSubscriber[Any]) -> None:
-        """Serve a subscriber unless it was closed meanwhile. Raises `ClosedError`."""
+        # Raises `ClosedError` if the subscriber was closed meanwhile.
         with self._lock:
             if subscriber.spec.id not in self._subscribers:
                 raise ClosedError(f"node '{self._node.name}'")
@@ -328,10 +327,8 @@ class ZeromqTransport:
 
     @contextmanager
     def _opening(self) -> Iterator[None]:
-        """Keep the context while sockets are opened in it, also when `close` ends the last node meanwhile.
-
-        Raises `ClosedError`.
-        """
+        # Keeps the context while sockets are opened, also if `close` ends the last node meanwhile. Raises
+        # `ClosedError`.
         with self._lock:
             self._check_open()
             self._shared.join()
@@ -341,7 +338,7 @@ class ZeromqTransport:
             self._shared.leave()
 
     def _check_open(self) -> None:
-        """With the lock held. Raises `ClosedError`."""
+        # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
 
@@ -359,17 +356,17 @@ class ZeromqTransport:
     # ---- services
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """A new server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.server`."""
         with self._opening():
             return self._services.server(spec)
 
     def client(self, spec: ClientSpec) -> ClientTransport:
-        """A new client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.client`."""
         with self._opening():
             return self._services.client(spec)
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
-        """A new surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.survey`."""
         with self._opening():
             return self._services.survey(spec)
 
@@ -381,7 +378,7 @@ class ZeromqTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         waits = self._of_thread()
         entered: list[_Subscriber] = []
         entered_calls: list[CallQueue] = []
@@ -407,18 +404,17 @@ class ZeromqTransport:
             for queue in entered_calls:
                 queue.leave_wait(waits.waker.wake)
             waits.is_busy = False
-            if self._is_over:  # whoever closed it saw that this thread is busy
+            if self._is_over:  # `close` left a busy waker open
                 waits.waker.close()
 
     def _end_waits(self) -> None:
-        """With the lock held, and when it is known that all is over."""
+        # Call with the lock held, after setting `_is_over`.
         for waits in self._waiting:
             waits.waker.wake()
             if not waits.is_busy:
                 waits.waker.close()
 
     def _of_thread(self) -> ThreadWait:
-        """What this thread waits by, as long as it lives."""
         waits: ThreadWait | None = getattr(self._threads, "waits", None)
         if waits is None:
             waits = self._threads.waits = ThreadWait()
@@ -427,7 +423,7 @@ class ZeromqTransport:
         return waits
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         with self._lock:
             for waker in self._busy_wakers:
                 waker.wake()
@@ -436,7 +432,6 @@ class ZeromqTransport:
 
     @contextmanager
     def _waker(self) -> Iterator[Waker]:
-        """A waker of its own for each thread that waits."""
         waker = self._shared.take_waker()
         with self._lock:
             self._busy_wakers.append(waker)
@@ -447,17 +442,17 @@ class ZeromqTransport:
                 self._busy_wakers.remove(waker)
             self._shared.give_waker(waker)
 
-    # ---- the master, and the end
+    # ---- master and closing
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Who is there. See `Transport.graph`."""
+        """Return the current graph. See `Transport.graph`."""
         if isinstance(configuration, Direct):
             raise NepError(_("a direct connection has no master; ask with a hybrid one"))
         with self._opening():
             return self._session(configuration.master).look(timeout_s)
 
     def begin_close(self) -> None:
-        """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""
+        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
@@ -471,7 +466,7 @@ class ZeromqTransport:
             publisher.say_bye()
 
     def close(self, timeout_s: float) -> None:
-        """Close all. See `Transport.close`."""
+        """Close everything. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
@@ -485,7 +480,7 @@ class ZeromqTransport:
             sinks = self._sinks
         for publisher in publishers:
             if isinstance(publisher, OriginalPublisher):
-                # They flush while the others wait for their subscribers.
+                # flush while the others wait for their subscribers
                 self._io.remove(publisher)
                 publisher.flush(deadline)
         for session in sessions:
@@ -504,7 +499,7 @@ class ZeromqTransport:
         self._shared.leave()
 
     def _forget_sessions(self) -> None:
-        """With the lock held: close what leads to masters that nobody needs any more, when there are many."""
+        # Call with the lock held. Closes idle sessions when there are many.
         for address, session in list(self._sessions.items()):
             if len(self._sessions) < _MOST_SESSIONS:
                 return
@@ -514,7 +509,7 @@ class ZeromqTransport:
                 session.close()
 
     def forked(self) -> None:
-        """In a child: its ports and connections are the parent's. See `nep.system.forks`."""
+        """Close the descriptors of the parent's ports and connections, see `nep.system.forks`."""
         give_up(*self._attached.values())
         self._services.forked()
         for session in self._sessions.values():
@@ -539,7 +534,7 @@ class ZeromqTransport:
 
 @contextmanager
 def closed_on_error(close: Callable[[], object]) -> Iterator[None]:
-    """A socket that is left open would hold up the end of the program."""
+    """Call `close` if the body raises: a socket left open would block the end of the program."""
     try:
         yield
     except BaseException:

@@ -107,7 +107,7 @@ class ServiceChannel:
             if not kind.is_nep:
                 self._add_failures(rq)
 
-    # ---- what belongs to it. With the participant's lock held
+    # ---- owned objects; call with the participant's lock held
 
     def _add_failures(self, rq: str) -> None:
         name = f"nep_failures/{rq.removeprefix('rq/')}"
@@ -148,7 +148,7 @@ class ServiceChannel:
         ready = core.ReadCondition(made, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
         participant.watch(made, ready, lambda: read(made, ready))
 
-    # ---- what comes, in the participant's thread, under its lock
+    # ---- receiving, in the participant's thread, with its lock held
 
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         while samples := reader.take(_BATCH, ready):
@@ -195,7 +195,7 @@ class ServiceChannel:
                 if found is not None and self._is_wanted(CallId(guid, number)):
                     self._failed(CallId(guid, number), Reply(found, data[_FAILED.size :]))
 
-    # ---- what goes. Without the participant's lock
+    # ---- sending, without the participant's lock
 
     def send(self, call: CallId, cdr: bytes) -> None:
         """Write a request or an answer. Raises `WireError`, and `DDSException` when it is closed."""
@@ -215,7 +215,7 @@ class ServiceChannel:
         cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
         self._writers[1].write(sample_of(self._failure_class, cdr))
 
-    # ---- who is at the other side. With the participant's lock held
+    # ---- matched endpoints; call with the participant's lock held
 
     @property
     def known(self) -> list[DdsEndpoint]:
@@ -300,7 +300,7 @@ class ServiceChannel:
         word = client.told.get("clientid")
         return any(word is None or each.told.get("clientid") in {None, word} for each in there)
 
-    # ---- the end
+    # ---- closing
 
     def finish(self, timeout_s: float) -> None:
         """Wait until what was written is confirmed. Without the participant's lock."""

@@ -183,7 +183,7 @@ class Ros2Client(ClientCalls[_Call]):
                 reason = _("the call cannot be sent: {reason}").format(reason=error)
                 self._end(call, NepError(reason))
 
-    # ---- how it ends
+    # ---- closing
 
     def _heard(self, heard: HeardPart) -> None:
         """In the participant's thread: an answer."""
@@ -243,7 +243,7 @@ class Ros2Client(ClientCalls[_Call]):
         found = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
         return tuple(sorted({each for each in found if each is not None}))
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
         """Calls that are under way end. May be called twice."""

@@ -117,7 +117,7 @@ class Ros2Server:
                     return
                 self._participant.changed.wait(min(left, _LOOK_S))
 
-    # ---- the end
+    # ---- closing
 
     def begin_close(self) -> None:
         """Refuse the calls that wait and those that still come."""

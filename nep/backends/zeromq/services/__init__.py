@@ -1,1 +1,1 @@
-"""Services of the back end zeromq: a node's servers and clients, which meet through a master or directly."""
+"""Services of the back end `zeromq`: a node's servers, clients and surveyors."""

@@ -1,7 +1,7 @@
-"""SocketClient: a client's end. Calls out, answers in; it notices when its server ends.
+"""SocketClient: sends calls, receives replies, and detects when its server disappears.
 
-It is connected to one server at a time. When a connection has ended and its last answer was read, the calls
-that were sent over it are known to be lost.
+It is connected to one server at a time. When a connection has ended and its last reply was read, all
+remaining calls that were sent over it have failed.
 """
 
 from __future__ import annotations
@@ -39,9 +39,10 @@ _logger = logging.getLogger("nep")
 _READ_MAX = 100
 _FIRST_TRY_S, _LAST_TRY_S = 0.1, 2.0
 _WAITED_TRY_S = 0.8
-"""While somebody waits for a server it is tried at least so often."""
+"""Maximum retry interval while calls are pending."""
 _HAND_OVER_S = 2.0
-"""So long new calls wait for the last answers of a server that has closed, before they go to another one."""
+"""Seconds for which new calls wait for the last replies of a closing server before they go to the next one.
+"""
 
 Then = Callable[[Outcome], None]
 _Ended = list[tuple[Then, Outcome]]
@@ -49,8 +50,6 @@ _Ended = list[tuple[Then, Outcome]]
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way."""
-
     number: int
     data: bytes | memoryview
     timeout_s: float | None
@@ -64,41 +63,48 @@ class _Call:
 
 
 class Connection(Protocol):
-    """What a client needs of its connection to a server. It lives under the client's lock."""
+    """Connection to a server, as a client uses it. Guarded by the client's lock."""
 
     endpoint: str
     is_open: bool
     again_s: float
-    """How soon after its end it may be tried again."""
+    """Delay in seconds before reconnecting after it ended."""
 
     @property
     def is_over(self) -> bool:
-        """Whether it was open and has ended; what came before can be read."""
+        """True if the connection was open and has ended; earlier input can still be read."""
 
     @property
     def has_input(self) -> bool:
-        """Whether there is an answer of which no descriptor tells any more."""
+        """True if a reply is available that the descriptor no longer signals."""
 
     def look(self) -> None:
-        """Let `is_open` and `is_over` be true of now."""
+        """Update `is_open` and `is_over`."""
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
         """Send a call."""
 
     def receive(self) -> Sequence[bytes] | None:
-        """The parts of the next answer. Raises `WireError`."""
+        """Return the parts of the next reply, or None. Raises `WireError`."""
 
     def close(self) -> None:
-        """Close it; what was not read is dropped."""
+        """Close the connection and discard unread replies."""
 
     def forked(self) -> None:
-        """In a child that was forked."""
+        """Release the connection in a forked child."""
 
 
 class SocketClient:
-    """`connect_to` makes connections; `soon` asks the node's thread to look at it again, `closer` ends it.
+    """Client over sockets.
 
-    `known_services` asks the master; `endpoint` is a server's that no master tells of.
+    Args:
+        connect_to: Creates a connection to an endpoint.
+        spec: Settings.
+        framing: Wire format.
+        soon: Asks the I/O thread to serve this client.
+        closer: Closes this client.
+        known_services: Queries the master for the names of services; None without a master.
+        endpoint: Endpoint of the server, without a master.
     """
 
     def __init__(
@@ -117,7 +123,7 @@ class SocketClient:
         self._connection: Connection | None = None
         self._framing = self._usual_framing = framing
         self._originals: set[int] = set()
-        """Servers that are programs of the original NEP."""
+        """Ids of servers that are programs of the original NEP."""
         self._soon = soon
         self._closer = closer
         self._known_services = known_services
@@ -125,20 +131,22 @@ class SocketClient:
         self._numbers = itertools.count(1)
         self._calls: dict[int, _Call] = {}
         self._unanswered: dict[int, int] = {}
-        """The numbers and sizes of all that were sent over this connection, oldest first, also those that are
-        over: answers without a number come in this order, and a server that hangs is not sent ever more."""
+        """Sizes of the calls sent over this connection by number, oldest first, including canceled ones:
+        replies without a number come in this order, and it limits what is sent to a server that hangs.
+        """
         self._bytes = self._unanswered_bytes = 0
         self.place = endpoint
-        """Its server's endpoint, when no master tells of servers."""
+        """Endpoint of the server, without a master."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
         self._unlisted: int | None = None
-        """A server that is not listed any more and was kept, because there is no other and it may only be
-        suspended."""
+        """Id of a connected server that is no longer listed but kept, because it may only be suspended and
+        there is no other.
+        """
         self._place = ""
-        """To which of its endpoints there is a connection; another one when that is to be left."""
+        """Endpoint of the current connection; cleared to force a reconnection."""
         self._leave_at = math.inf
-        """When the connection to a server that is not listed any more is given up, if new calls wait."""
+        """Time at which the connection to an unlisted server is closed if new calls wait."""
         self._tries = 0
         self._try_at = 0.0
         self._refusals = Refusals()
@@ -149,38 +157,38 @@ class SocketClient:
 
     @property
     def is_connected(self) -> bool:
-        """Whether a server was there a moment ago."""
+        """True if a server is connected."""
         connection = self._connection
         return connection is not None and connection.is_open
 
     @property
     def fd(self) -> int:
-        """It has none: its connections are polled, and it is served when something is due."""
+        """-1: the connections are polled, and the client is served when something is due."""
         return -1
 
     @property
     def late(self) -> int:
-        """Answers that came when nobody waited for them any more."""
+        """Number of replies that arrived after their call had timed out or was canceled."""
         return self._late
 
     @property
     def is_busy(self) -> bool:
-        """Whether calls are under way."""
+        """True if calls are in flight."""
         return bool(self._calls)
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True after `close`, or after the node was closed."""
         return self._is_closed
 
     @property
     def endpoint(self) -> str:
-        """Where it is connected, or tries to be; "" when it knows no server."""
+        """Endpoint of the connection or connection attempt; "" without a known server."""
         connection = self._connection
         return "" if connection is None else connection.endpoint
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         call = _Call(number, data, timeout_s, deadline, then)
@@ -194,16 +202,16 @@ class SocketClient:
             if self._connection is not None:
                 self._connection.look()
                 self._send(call)
-        self._soon(self)  # it has a deadline, and the socket was used
+        self._soon(self)  # schedules the deadline, and the socket was used
         return call
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
+        """Cancel a call; its callback isn't called."""
         with self._lock:
             self._take(call.number)
 
     def known(self, timeout_s: float) -> tuple[str, ...]:
-        """The services that have a server now; none when that cannot be told."""
+        """Return the names of services that have a server; empty without a master."""
         if self._known_services is None:
             return ()
         try:
@@ -212,14 +220,14 @@ class SocketClient:
             return ()
 
     def _take(self, number: int) -> _Call | None:
-        """With the lock held: it is not under way any more."""
+        # Call with the lock held. Returns None if the call is no longer in flight.
         call = self._calls.pop(number, None)
         if call is not None:
             self._bytes -= call.size
         return call
 
     def _send(self, call: _Call) -> None:
-        """With the lock held: to a server that is connected, and has not said that it closes."""
+        # Call with the lock held. Calls go only to a connected server that hasn't announced its end.
         connection = self._connection
         if connection is None or not connection.is_open or self._current not in self._servers:
             return
@@ -229,10 +237,10 @@ class SocketClient:
         self._unanswered[call.number] = call.size
         self._unanswered_bytes += call.size
 
-    # ---- in the node's thread: what its session tells
+    # ---- in the I/O thread: updates from the session
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These servers are there, too."""
+        """Add further servers."""
         with self._lock:
             for remote in remotes:
                 if self._can_call(remote):
@@ -246,14 +254,14 @@ class SocketClient:
         self._soon(self)
 
     def _can_call(self, remote: RemotePublisher) -> bool:
-        """Whether a server is in reach and takes this client's codec. With the lock held."""
+        # Call with the lock held.
         if remote.publisher.codec == ORIGINAL_CODEC:
             self._originals.add(remote.publisher.id)
             return bool(remote.publisher.endpoints) and self.spec.codec.name == "json"
         return bool(remote.publisher.endpoints)
 
-    def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
-        """A server is not listed any more. Unless it said so itself, it may only be suspended."""
+    def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
+        """Process the removal of a server. Without `is_closed` it may only be suspended."""
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
@@ -263,14 +271,14 @@ class SocketClient:
         self._soon(self)
 
     def connect_again(self) -> None:
-        """This computer has another address: connect to a server on another one anew."""
+        """Reconnect to a server on another computer, after the address of this one has changed."""
         with self._lock:
             if is_far(self._place):
                 self._place = ""
         self._soon(self)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These are all servers that are there."""
+        """Replace the list of servers."""
         with self._lock:
             self._originals = {each for each in self._originals if each == self._current}
             listed = {
@@ -284,27 +292,24 @@ class SocketClient:
         self._soon(self)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Nothing: answers are not counted by those who send them."""
+        """Do nothing: replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         problem = self._refusals.told()
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed), problem)
 
-    # ---- in the node's thread: the socket
+    # ---- in the I/O thread: the socket
 
     def serve(self, now: float) -> Rest:
-        """See `Served`."""
+        """Process the connection and expired calls, see `Served.serve`."""
         return Rest(is_quiet=True, due=self._serve(now))
 
     def _serve_connection(self, now: float) -> Rest:
         return Rest(due=self._serve(now))
 
     def _serve(self, now: float) -> float | None:
-        """Read answers, notice a server's end, send what waits, end what waited too long.
-
-        When to do so again.
-        """
+        # Returns the time of the next call.
         ended: _Ended = []
         with self._lock:
             if self._is_closed:
@@ -312,19 +317,19 @@ class SocketClient:
             if self._connection is not None:
                 self._connection.look()
             has_more = self._read(ended)
-            if not has_more:  # what came before its end counts
+            if not has_more:  # replies received before its end are delivered
                 self._look_at_connection(now, ended)
             for call in [each for each in self._calls.values() if not each.is_sent]:
                 self._send(call)
             self._expire(now, ended)
             due = self._due()
-            # Sending may have taken in what came meanwhile, and its descriptor tells of that only once.
+            # zmq_send may consume input, and ZMQ_FD is edge-triggered: check again
             has_more = has_more or (self._connection is not None and self._connection.has_input)
         self._tell(ended)
         return now if has_more else due if due < math.inf else None
 
     def _read(self, ended: _Ended) -> bool:
-        """Whether there is more."""
+        # Returns True if there may be more replies.
         if self._connection is None:
             return False
         for _turn in range(_READ_MAX):
@@ -353,13 +358,13 @@ class SocketClient:
         return True
 
     def _look_at_connection(self, now: float, ended: _Ended) -> None:
-        """All that came was read."""
+        # Call when all replies are read.
         connection = self._connection
         if connection is not None and connection.is_over:
             self._lose(ended)
             self._tries, self._try_at = 0, now + connection.again_s
         elif connection is not None and self._has_moved():
-            self._leave(ended)  # it would be silent for long
+            self._leave(ended)  # the old connection would stay silent for long
         elif connection is not None and connection.is_open:
             self._tries = 0
             if self._current not in self._servers:
@@ -370,12 +375,12 @@ class SocketClient:
             self._try(now)
 
     def _has_moved(self) -> bool:
-        """Whether the connection begins or ends at an address that its computer has no more."""
+        # True if an endpoint of the connection has changed.
         known = None if self._current is None else self._servers.get(self._current)
         return known not in {None, self._place} and (not self._place or is_far(self._place))
 
     def _hand_over(self, now: float, ended: _Ended) -> None:
-        """The server has closed, or was replaced: take its last answers, then go to another one."""
+        # The server closed or was replaced: wait for its last replies, then connect to another one.
         is_waited_for = any(each.is_sent for each in self._calls.values())
         if is_waited_for and self._leave_at == math.inf:
             self._leave_at = now + _HAND_OVER_S
@@ -384,7 +389,7 @@ class SocketClient:
             self._leave(ended)
 
     def _lose(self, ended: _Ended) -> None:
-        """The connection has ended, and with it the calls that were sent."""
+        # The connection has ended: all calls sent over it fail.
         self._disconnect()
         self._leave_at = math.inf
         self._unanswered.clear()
@@ -400,7 +405,7 @@ class SocketClient:
         self._tries, self._try_at = 0, 0.0
 
     def _try(self, now: float) -> None:
-        """Connect to the next server, from the beginning again after the last."""
+        # Connects to the next server in turn.
         self._disconnect()
         known = list(self._servers)
         if not known:
@@ -421,7 +426,7 @@ class SocketClient:
         connection, self._connection = self._connection, None
         if connection is not None:
             connection.close()
-            self._soon(self)  # what was due with its sockets is not any more
+            self._soon(self)  # cancels scheduled calls for the closed sockets
 
     def _expire(self, now: float, ended: _Ended) -> None:
         for call in [each for each in self._calls.values() if each.deadline <= now]:
@@ -453,28 +458,28 @@ class SocketClient:
         for then, outcome in ended:
             try:
                 then(outcome)
-            except Exception:  # the others get theirs
+            except Exception:  # a failing callback must not affect other calls
                 _logger.exception("the end of a call of '%s' could not be told", self._name)
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls that are under way end with `ClosedError`. May be called twice."""
+        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
         self._closer(self)
 
     def release(self) -> None:
-        """End what is under way, and the connection. May be called twice."""
+        """Fail the calls in flight and close the connection. Idempotent."""
         with self._lock:
             self._is_closed = True
             left, self._calls = list(self._calls.values()), {}
             connection, self._connection = self._connection, None
-        if connection is not None:  # without the lock, for which the thread that polls it may wait
+        if connection is not None:  # without the lock: the thread that polls it may wait for that
             connection.close()
         what = _("client of '{service}'").format(service=self._name)
         self._tell([(each.then, ClosedError(what)) for each in left])
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         self._calls = {}

@@ -1,8 +1,8 @@
-"""ServerConnection: a client's connection to one server, which tells when it begins and when it ends.
+"""ServerConnection: connection to one server that reports when it opens and ends.
 
-What came before the end can still be read. With `IMMEDIATE` or `RECONNECT_IVL` -1 libzmq would throw it
-away as soon as a connection ends, and a socket that was connected again could not tell what ended. So every
-connection has a socket of its own, which libzmq does not connect again, and a monitor.
+Replies received before the end can still be read. With `IMMEDIATE` or `RECONNECT_IVL` -1 libzmq would discard
+them, and a reconnected socket couldn't report which connection ended. Therefore each connection has its own
+socket, which never reconnects, and a monitor.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 __all__ = ["CONNECTION_FILES", "ServerConnection"]
 
 CONNECTION_FILES = 4
-"""Descriptors that one needs, also those of libzmq."""
+"""File descriptors per connection, including those of libzmq."""
 
 _LARGE_BYTES = 65_536
-"""From here on calls are sent without a copy."""
+"""Size from which calls are sent without a copy."""
 _NEVER_MS = 24 * 3600 * 1000
 _EVENT = struct.Struct("=hi")
 _names = itertools.count(1)
 
 
 class ServerConnection:
-    """Connects at once. `serve` is called in the node's thread when there is something to see.
+    """Connection that starts to connect at once. Not thread-safe: guarded by the client's lock.
 
-    Not thread-safe: it lives under its client's lock.
+    `serve` is called in the I/O thread when there are events.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ServerConnection:
 
     def _connect(self, monitor: Socket) -> None:
         self._socket.setsockopt(zmq.RECONNECT_IVL, _NEVER_MS)
-        self._socket.setsockopt(zmq.SNDHWM, 0)  # a client bounds its calls
+        self._socket.setsockopt(zmq.SNDHWM, 0)  # the client limits its calls
         self._socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
         self._socket.copy_threshold = _LARGE_BYTES
         keep_alive(self._socket, self.endpoint)
@@ -69,7 +69,7 @@ class ServerConnection:
         self._socket.connect(self.endpoint)
 
     def look(self) -> None:
-        """Read what the monitor says, so that `is_open` and `is_over` are true of now."""
+        """Update `is_open` and `is_over` from the monitor's events."""
         while self._monitor is not None and _has_input(self._monitor):
             event, _value = _EVENT.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])
             self.is_over = self.is_over or event == zmq.EVENT_DISCONNECTED
@@ -77,7 +77,7 @@ class ServerConnection:
 
     @property
     def has_input(self) -> bool:
-        """Whether there is an answer to read."""
+        """True if a reply can be read."""
         return _has_input(self._socket)
 
     def send(self, parts: Sequence[Part]) -> None:
@@ -86,17 +86,17 @@ class ServerConnection:
         self._socket.send(parts[1], zmq.DONTWAIT, copy=len(parts[1]) < _LARGE_BYTES)
 
     def receive(self) -> list[bytes] | None:
-        """The parts of the next answer."""
+        """Return the parts of the next reply, or None."""
         try:
             return self._socket.recv_multipart(zmq.DONTWAIT)
         except zmq.Again:
             return None
 
     def forked(self) -> None:
-        """In a child that was forked: nothing is touched, see `nep.system.forks`."""
+        """Do nothing in a forked child: libzmq must not be touched, see `nep.system.forks`."""
 
     def close(self) -> None:
-        """Close it; what was not read is dropped."""
+        """Close the sockets and discard unread replies."""
         sides, self._sides = self._sides, ()
         for side in sides:
             self._io.remove(side)
@@ -110,14 +110,11 @@ class ServerConnection:
 
 
 class _Side:
-    """One of its two sockets, for the thread that polls."""
-
     def __init__(self, socket: Socket, serve: Callable[[float], Rest]) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
         self._serve = serve
 
     def serve(self, now: float) -> Rest:
-        """See `Served`."""
         return self._serve(now)
 
 

@@ -1,4 +1,4 @@
-"""ZeromqServices: one node's servers and clients, and how they end. Part of `ZeromqTransport`."""
+"""ZeromqServices: servers, clients and surveyors of one node. Part of `ZeromqTransport`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ __all__ = ["ZeromqServices"]
 
 
 class ZeromqServices:
-    """`session` gives the node's connection to a master; raises `ClosedError` when the node is closed."""
+    """Services of one node.
+
+    `session` returns the node's session with a master; raises `ClosedError` when the node is closed.
+    """
 
     def __init__(
         self, shared: SharedContext, session: Callable[[str], MasterSession], node_name: str
@@ -53,7 +56,7 @@ class ZeromqServices:
     # ---- servers
 
     def server(self, spec: ServerSpec) -> RouterServer | TcpServer:
-        """A new server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.server`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_server(spec, spec.configuration)
         session = self._session(spec.configuration.master)
@@ -67,7 +70,7 @@ class ZeromqServices:
         )
         try:
             session.add_publisher(record, server, spec.wait_s)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             server.close(0.0)
             raise
         return server
@@ -102,7 +105,7 @@ class ZeromqServices:
             server.begin_close()
             self._shared.io.remove(server)
             while server.serve(now := time.monotonic()).due is not None and now < deadline:
-                pass  # what came meanwhile is refused, too
+                pass  # calls received meanwhile are rejected, too
             server.release(deadline)
 
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
@@ -118,14 +121,14 @@ class ZeromqServices:
             self._shared.io.add(owner)  # before `close` can remove it, which takes this lock first
 
     def _check_open(self) -> None:
-        """With the lock held. Raises `ClosedError`."""
+        # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node_name}'")
 
     # ---- clients
 
     def client(self, spec: ClientSpec) -> SocketClient:
-        """A new client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.client`."""
         if isinstance(spec.configuration, Direct):
             return self._direct_client(spec, spec.configuration)
         session = self._session(spec.configuration.master)
@@ -145,7 +148,7 @@ class ZeromqServices:
         return client
 
     def survey(self, spec: ClientSpec) -> SurveyClient:
-        """A new surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.survey`."""
         if isinstance(spec.configuration, Direct):
             raise NepError(
                 _("over 'zeromq' a survey needs a master; leave out the configuration, or use 'nanomsg'")
@@ -221,10 +224,10 @@ class ZeromqServices:
             self._hold(client)
         return client
 
-    # ---- the end
+    # ---- closing
 
     def begin_close(self) -> None:
-        """Nothing is taken any more; who waits is told."""
+        """Stop accepting calls; waiting clients are notified."""
         with self._lock:
             self._is_closed = True
             servers = tuple(self._servers)
@@ -232,7 +235,7 @@ class ZeromqServices:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close all of them; answers are delivered within `timeout_s`."""
+        """Close all servers, clients and surveyors; replies are flushed within `timeout_s` seconds."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             surveys, clients, servers = tuple(self._surveys), tuple(self._clients), tuple(self._servers)
@@ -244,7 +247,7 @@ class ZeromqServices:
             server.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         for server in self._servers:
             give_up(*server.endpoints)
             server.forked()
@@ -263,7 +266,7 @@ def _framing(direct: Direct) -> Framing:
 
 @contextmanager
 def _released(owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
-    """A socket that is left open would hold up the end of the program."""
+    # A socket left open would block the end of the program.
     try:
         yield
     except BaseException:

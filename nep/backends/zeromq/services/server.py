@@ -1,7 +1,7 @@
-"""RouterServer: a server's socket. Calls in, answers out; the node's thread reads, any thread answers.
+"""RouterServer: a server's socket. The I/O thread reads calls; any thread replies.
 
-It is a ROUTER also where it serves programs of the original NEP: their REQ does not notice, and many can be
-answered at once.
+Clients of the original NEP connect to a ROUTER as well: their REQ doesn't notice, and it allows replies to
+several clients at once.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ __all__ = ["CallReader", "RouterServer"]
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 100
-"""So many calls are read in one go, then the node's other sockets have their turn."""
+"""Maximum number of calls read at once, before other sockets are served."""
 _LARGE_BYTES = 65_536
-"""From here on answers are sent without a copy, and counted while they are on their way."""
+"""Size from which replies are sent without a copy, and tracked until libzmq has sent them."""
 _UNREAD_MAX_BYTES = 256 * 2**20
 _SMALL_UNREAD = 1000
-"""So many answers are queued for a client that does not read them."""
+"""High-water mark: number of replies queued for a client that doesn't read them."""
 
 
 class CallReader:
-    """Reads calls; what is none is counted, and its reason is logged now and then.
+    """Parser of calls. Malformed ones are counted, and logged at increasing intervals.
 
-    Not thread-safe: it lives under its server's lock.
+    Not thread-safe: guarded by the server's lock.
     """
 
     def __init__(self, service: str, framing: Framing, tally: Tally) -> None:
@@ -54,7 +54,10 @@ class CallReader:
         now: float,
         answer: Callable[[int, Reply], bool],
     ) -> IncomingCall | None:
-        """The call that these parts are; None when they are none. `answer` takes its number."""
+        """Parse a call; return None if it is malformed.
+
+        `answer` is called with the call's number and the reply.
+        """
         try:
             header = self._framing.read_call(parts)
         except WireError as error:
@@ -64,7 +67,7 @@ class CallReader:
         return IncomingCall(header.data, header.codec, deadline, partial(answer, header.number))
 
     def refuse(self, error: WireError) -> None:
-        """Something came that is no call."""
+        """Count a malformed call."""
         self._tally.add_unreadable()
         if self._refusals.add(error.reason):
             _logger.warning(
@@ -75,14 +78,14 @@ class CallReader:
             )
 
     def told(self) -> str:
-        """See `Refusals.told`."""
+        """Return the newest problem, see `Refusals.told`."""
         return self._refusals.told()
 
 
 class RouterServer:
-    """`socket` is a ROUTER; `soon` asks the node's thread to look at it again, `closer` ends it.
+    """Server over a ROUTER socket.
 
-    `unregister` may be called twice.
+    `soon` asks the I/O thread to serve it, `closer` closes it, and `unregister` may be called twice.
     """
 
     is_local = False
@@ -100,7 +103,7 @@ class RouterServer:
         self.calls = CallQueue()
         self.tally = Tally()
         self.fixed: tuple[str, ...] = ()
-        """Where it is bound when no master says so."""
+        """Endpoint of a direct server."""
         self.socket = socket
         self._framing = framing
         self._soon = soon
@@ -110,7 +113,7 @@ class RouterServer:
         self._reader = CallReader(spec.service, framing, self.tally)
         self._unread: deque[tuple[zmq.MessageTracker, int]] = deque()
         self._is_closed = False
-        socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # an error instead of silence when a client is gone
+        socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # raise an error when a client has disconnected
         socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
         socket.setsockopt(zmq.SNDHWM, _SMALL_UNREAD)
         socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
@@ -118,36 +121,36 @@ class RouterServer:
         self._bindings = Bindings(socket, may_be_local=False)
         self.fd = int(socket.getsockopt(zmq.FD))
 
-    # ---- what its session needs
+    # ---- for the session
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """All that it is bound to."""
+        """All bound endpoints."""
         return self._bindings.endpoints or self.fixed
 
     @property
     def is_closed(self) -> bool:
-        """Whether it, or its node, was closed."""
+        """True after `close`, or after the node was closed."""
         return self._is_closed
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Be reached at these addresses of this computer from now on; the endpoints."""
+        """Bind at these addresses of this computer; return the endpoints."""
         with self._lock:
             return () if self._is_closed else self._bindings.move(hosts)
 
     def leave_local(self) -> None:
-        """It is reached by TCP only, always."""
+        """Do nothing: servers have no Unix socket names."""
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         tally = self.tally
         calls, problem = as_count(tally.calls), self._reader.told()
         return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
 
-    # ---- in the node's thread
+    # ---- in the I/O thread
 
     def serve(self, now: float) -> Rest:
-        """Read calls into the queue; those for which there is no room are refused at once."""
+        """Queue calls; reject those for which there is no room."""
         came: list[IncomingCall] = []
         with self._lock:
             if self._is_closed:
@@ -159,7 +162,7 @@ class RouterServer:
         return Rest(due=now if has_more else None)
 
     def _read(self, came: list[IncomingCall], now: float) -> bool:
-        """With the lock held. Whether there is more: its descriptor tells only once."""
+        # Call with the lock held. Returns True if there may be more: ZMQ_FD is edge-triggered.
         for _turn in range(_READ_MAX):
             try:
                 route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
@@ -170,7 +173,7 @@ class RouterServer:
                 came.append(call)
         return True
 
-    # ---- answering, in any thread
+    # ---- replying, in any thread
 
     def _answer(self, route: bytes, number: int, reply: Reply) -> bool:
         reply = fitting(reply)
@@ -188,7 +191,7 @@ class RouterServer:
         return is_sent
 
     def _send(self, route: bytes, parts: Sequence[bytes | memoryview]) -> bool:
-        """With the lock held. False when the client is gone, or does not read."""
+        # Call with the lock held. Returns False if the client has disconnected or doesn't read.
         try:
             self.socket.send(route, zmq.DONTWAIT | zmq.SNDMORE)
             self.socket.send(parts[0], zmq.DONTWAIT | zmq.SNDMORE)
@@ -197,7 +200,7 @@ class RouterServer:
             else:
                 tracker = self.socket.send(parts[1], zmq.DONTWAIT, copy=False, track=True)
                 self._unread.append((tracker, len(parts[1])))
-        except zmq.ZMQError:  # it is gone, or a thousand answers wait for it
+        except zmq.ZMQError:  # the client has disconnected, or its queue is full
             return False
         return True
 
@@ -206,14 +209,14 @@ class RouterServer:
             self._unread.popleft()
         return not self._unread or sum(each for _tracker, each in self._unread) + size <= _UNREAD_MAX_BYTES
 
-    # ---- the end
+    # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, refuse what waits, deliver what was answered. May be called twice."""
+        """Unregister, reject queued calls and flush replies. Idempotent."""
         self._closer(self, timeout_s)
 
     def begin_close(self) -> None:
-        """Unregister; nothing is carried out any more, and who waits is told. May be called twice."""
+        """Unregister; reject queued and new calls. Idempotent."""
         self._unregister()
         for call in self.calls.close():
             self._refuse(call)
@@ -222,14 +225,14 @@ class RouterServer:
         call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:
-        """Close the socket; nobody polls it any more. Answers may be on their way until `deadline`."""
+        """Close the socket; it lingers until `deadline`. The I/O thread must not serve it any more."""
         with self._lock:
             if not self._is_closed:
                 self._is_closed = True
                 self.socket.close(max(0, round((deadline - time.monotonic()) * 1000)))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         self.calls.forked()

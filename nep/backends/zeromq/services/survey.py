@@ -1,4 +1,4 @@
-"""SurveyClient: a surveyor's end. It has a client for each respondent that the master tells of."""
+"""SurveyClient: a surveyor with one client per respondent."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ Then = Callable[[Outcome], None]
 
 
 class _Asked(NamedTuple):
-    """A call that is under way, and the client whose it is."""
-
     client: SocketClient
     call: OpenCall
 
@@ -32,7 +30,7 @@ class _Asked(NamedTuple):
 
 
 class SurveyClient:
-    """`ask_at` makes a client for the respondent at an endpoint, `closer` ends the survey."""
+    """Surveyor. `ask_at` creates a client for the respondent at an endpoint; `closer` closes the surveyor."""
 
     def __init__(
         self, spec: ClientSpec, ask_at: Callable[[str], SocketClient], closer: Callable[[SurveyClient], None]
@@ -44,25 +42,25 @@ class SurveyClient:
         self._lock = threading.Lock()
         self._clients: dict[int, SocketClient] = {}
         self._leaving: list[SocketClient] = []
-        """Of respondents that are listed no more: their last answers count."""
+        """Clients of unlisted respondents, whose last replies are still accepted."""
         self._answered = self._failed = self._late = 0
-        """Of clients that are closed."""
+        """Statistics of closed clients."""
 
-    # ---- asking, in any thread
+    # ---- calling, in any thread
 
     @property
     def respondents(self) -> int:
-        """How many there are now."""
+        """Number of known respondents."""
         return len(self._clients)
 
     @property
     def late(self) -> int:
-        """Answers that came when nobody waited for them any more."""
+        """Number of replies that arrived after their call had timed out or was canceled."""
         with self._lock:
             return self._late + sum(each.late for each in self._all())
 
     def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
-        """See `SurveyTransport.begin_all`."""
+        """Send a request to all respondents. See `SurveyTransport.begin_all`."""
         self._end_leaving()
         with self._lock:
             if self.is_closed:
@@ -73,7 +71,7 @@ class SurveyClient:
             for client in clients:
                 try:
                     asked.append(_Asked(client, client.begin(data, timeout_s, then)))
-                except ClosedError:  # it has left meanwhile
+                except ClosedError:  # left meanwhile
                     continue
         except BaseException:
             self.forget_all(asked)
@@ -81,7 +79,7 @@ class SurveyClient:
         return asked
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Nobody waits for these any more."""
+        """Cancel these calls."""
         for asked in calls:
             if isinstance(asked, _Asked):
                 asked.client.forget(asked.call)
@@ -104,10 +102,10 @@ class SurveyClient:
                 self._failed += counts.lost or 0
                 self._late += client.late
 
-    # ---- in the node's thread: what its session tells
+    # ---- in the I/O thread: updates from the session
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These respondents are there, too."""
+        """Add further respondents."""
         with self._lock:
             for remote in remotes:
                 self._meet(remote.publisher.id, remote.publisher.endpoints)
@@ -134,32 +132,32 @@ class SurveyClient:
             self._leaving.append(client)
 
     def connect_again(self) -> None:
-        """This computer has another address: connect to those on others anew."""
+        """Reconnect to respondents on other computers, after the address of this one has changed."""
         with self._lock:
             for client in self._clients.values():
                 client.connect_again()
 
-    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - counts messages
-        """A respondent is not listed any more."""
+    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
+        """Process the removal of a respondent."""
         with self._lock:
             self._part(publisher)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """These are all respondents that are there."""
+        """Replace the list of respondents."""
         listed = {each.publisher.id: each.publisher.endpoints for each in remotes}
         with self._lock:
             if not listed and any(each.is_connected for each in self._clients.values()):
-                return  # the master was started again, and they have yet to come back
+                return  # the master was restarted, and respondents have yet to register
             for respondent in [each for each in self._clients if each not in listed]:
                 self._part(respondent)
             for respondent, endpoints in listed.items():
                 self._meet(respondent, endpoints)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Nothing: answers are not counted by those who send them."""
+        """Do nothing: replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         with self._lock:
             counts = [each.counts() for each in self._all()]
             answered = self._answered + sum(each.received or 0 for each in counts)
@@ -167,10 +165,10 @@ class SurveyClient:
         problem = next((each.problem for each in counts if each.problem), "")
         return SubscriberCount(self.spec.id, as_count(answered), as_count(failed), problem)
 
-    # ---- the end
+    # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls that are under way end with `ClosedError`. May be called twice."""
+        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
         self._closer(self)
 
     def release(self) -> None:
@@ -183,7 +181,7 @@ class SurveyClient:
         self._end(clients)
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self.is_closed = True
         self._lock = threading.Lock()
 

@@ -1,4 +1,4 @@
-"""TcpServer: a server that programs without ZeroMQ call over plain TCP, many of them at once."""
+"""TcpServer: a server over plain TCP for programs without ZeroMQ."""
 
 from __future__ import annotations
 
@@ -28,18 +28,21 @@ __all__ = ["TcpServer"]
 _logger = logging.getLogger("nep")
 
 _WAITING = 128
-"""So many connections wait to be accepted."""
+"""Backlog of connections to be accepted."""
 _PEERS_MAX = 1000
 _READ_MAX = 100
 _UNREAD_MAX_BYTES = 256 * 2**20
-"""Answers that clients do not take; with more, they are left out."""
+"""Maximum number of bytes queued per client; further replies are dropped."""
 _LISTENER_FILES = 2
 _FULL_S = 0.5
-"""So long nobody is accepted when there is no room."""
+"""Pause in seconds before accepting again when descriptors have run out."""
 
 
 class TcpServer:
-    """Binds `address`. `io` polls, `closer` ends it. Raises `AddressInUseError`, `TooManyFilesError`."""
+    """Server that listens at `address`. Raises `AddressInUseError`, `TooManyFilesError`.
+
+    `io` serves the sockets, and `closer` closes the server.
+    """
 
     def __init__(
         self, io: IoThread, spec: ServerSpec, address: str, closer: Callable[[TcpServer, float], None]
@@ -59,10 +62,10 @@ class TcpServer:
         host, port = self._listener.getsockname()[:2]
         self.endpoints = (f"tcp://{host}:{port}",)
 
-    # ---- in the node's thread
+    # ---- in the I/O thread
 
     def serve(self, now: float) -> Rest:
-        """Accept who comes. See `Served`."""
+        """Accept connections, see `Served.serve`."""
         for _turn in range(_READ_MAX):
             if self.is_closed:
                 return Rest()
@@ -70,7 +73,7 @@ class TcpServer:
                 connected, (host, port) = self._listener.accept()
             except (BlockingIOError, InterruptedError):
                 return Rest()
-            except OSError as error:  # it has gone already, or there are too many files
+            except OSError as error:  # the client has disconnected, or descriptors have run out
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
                     return Rest(is_quiet=True, due=now + _FULL_S)
                 continue
@@ -100,7 +103,7 @@ class TcpServer:
         self._io.add(peer)
 
     def serve_peer(self, peer: _Peer, now: float) -> Rest:
-        """Read its calls into the queue, and send what it has not taken yet."""
+        """Queue calls of a client, and send its pending replies."""
         came: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
@@ -109,9 +112,11 @@ class TcpServer:
             has_more = self._read(peer, came, now)
             is_over = peer.stream.is_over and not has_more
             if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
-                self._drop(peer)  # else it has said all, and takes its answers
+                # otherwise the client has only shut down its sending side and still reads replies
+                self._drop(peer)
             elif peer.is_last and not peer.stream.backlog:
-                peer.stream.end_sending()  # and it is read until it ends, else it may lose what is on its way
+                # keep reading until the client closes: closing first could discard data in flight
+                peer.stream.end_sending()
                 self._changed.notify_all()
         for call in came:
             if not self.calls.put(call):
@@ -119,13 +124,13 @@ class TcpServer:
         return Rest(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
 
     def _read(self, peer: _Peer, came: list[IncomingCall], now: float) -> bool:
-        """Whether there is more."""
+        # Returns True if there may be more.
         for turn in range(_READ_MAX):
             try:
                 parts = peer.stream.next()
                 if (
                     parts is None and not turn
-                ):  # once: others have their turn, and the descriptor tells of more
+                ):  # read once per turn; the level-triggered descriptor signals the rest
                     peer.stream.read()
                     parts = peer.stream.next()
                 if parts is None:
@@ -140,13 +145,13 @@ class TcpServer:
         return True
 
     def _drop(self, peer: _Peer) -> None:
-        """With the lock held, in the node's thread or after it let go of all."""
+        # Call with the lock held, in the I/O thread or after it has stopped serving all peers.
         self._peers.discard(peer)
         self._io.remove(peer)
         peer.stream.close()
         self._changed.notify_all()
 
-    # ---- answering, in any thread
+    # ---- replying, in any thread
 
     def _answer(self, peer: _Peer, number: int, reply: Reply) -> bool:
         reply = fitting(reply)
@@ -168,19 +173,19 @@ class TcpServer:
     def _refuse(self, call: IncomingCall) -> None:
         call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    # ---- the end
+    # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Refuse what waits, deliver what was answered, and end. May be called twice."""
+        """Reject queued calls, flush replies and close. Idempotent."""
         self._closer(self, timeout_s)
 
     def begin_close(self) -> None:
-        """Nothing is carried out any more, and who waits is told."""
+        """Reject queued and new calls."""
         for call in self.calls.close():
             self._refuse(call)
 
     def release(self, deadline: float) -> None:
-        """Accept nobody any more; clients may take their answers until `deadline`."""
+        """Stop listening; clients can read their replies until `deadline`."""
         self._io.remove(self)
         with self._changed:
             if self.is_closed:
@@ -201,7 +206,7 @@ class TcpServer:
             peer.stream.close()
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         self._listener.detach()
@@ -211,11 +216,8 @@ class TcpServer:
 
 
 class _Peer:
-    """A client's connection, for the thread that polls.
-
-    `waiting` of its calls have no answer yet; `is_last`: the server closes.
-    """
-
+    # Connection of a client. `waiting` counts its calls without a reply; `is_last` is True once the server
+    # closes.
     def __init__(self, connected: socket.socket, server: TcpServer) -> None:
         self.stream = TcpStream(connected)
         self.fd = self.stream.fd
@@ -224,7 +226,6 @@ class _Peer:
         self._server = server
 
     def serve(self, now: float) -> Rest:
-        """See `Served`."""
         return self._server.serve_peer(self, now)
 
 
@@ -233,7 +234,7 @@ def _bound(address: str, service: str) -> socket.socket:
     check_room(_LISTENER_FILES, f"a server of '{service}'")
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        if sys.platform == "win32":  # where another program could bind it as well
+        if sys.platform == "win32":  # without it another program could bind the same port
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         else:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

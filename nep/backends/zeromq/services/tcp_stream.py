@@ -1,6 +1,6 @@
-"""Calls and answers over plain TCP: a header and a payload behind their size, and a client's connection.
+"""Calls and replies over plain TCP: length-prefixed pairs of header and payload.
 
-For programs that have sockets and no ZeroMQ; the specification is `docs/services.md`.
+For programs with sockets but without ZeroMQ; docs/services.md has the specification.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ __all__ = ["TcpConnection", "TcpStream"]
 _SIZE = struct.Struct("<I")
 _CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
 _SMALL_BYTES = 65_536
-"""Below this a copy is cheaper than another call of the system."""
+"""Size below which a copy is cheaper than another system call."""
 _IDLE_S, _AGAIN_S, _TIMES = 4, 2, 4
 
 
 class TcpStream:
-    """Sends and receives pairs of parts over a socket that does not block.
+    """Sends and receives pairs of parts over a non-blocking socket.
 
-    Not thread-safe: it lives under its owner's lock.
+    Not thread-safe: guarded by its owner's lock.
     """
 
     def __init__(self, connected: socket.socket) -> None:
         self._socket = connected
         self.fd = connected.fileno()
         self.is_over = False
-        """Nothing comes but what was read already."""
+        """True if nothing more will be received."""
         self.is_broken = False
-        """Nothing can be sent any more."""
+        """True if nothing can be sent any more."""
         self._input = bytearray()
         self._start = 0
         self._output: deque[memoryview] = deque()
         self.backlog = 0
-        """Bytes that the other side has not taken."""
+        """Bytes that are not sent yet."""
         with suppress(OSError):  # it may have ended already
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     # ---- receiving
 
     def read(self) -> bool:
-        """Take in what has come, a bounded part of it; whether there was any."""
+        """Receive a limited amount of available data; return True if there was any."""
         was = len(self._input)
         while not self.is_over and len(self._input) - was < _TURN_BYTES:
             try:
@@ -66,9 +66,9 @@ class TcpStream:
         return len(self._input) > was
 
     def next(self) -> list[bytes] | None:
-        """The oldest pair that is whole; None when there is none.
+        """Return the oldest complete pair, or None.
 
-        Raises `WireError` for what cannot be one, and for half a pair at the end: nothing comes afterwards.
+        Raises `WireError` for an invalid size and for an incomplete pair at the end; the stream is over then.
         """
         there = len(self._input) - self._start
         if there < _SIZE.size:
@@ -110,7 +110,7 @@ class TcpStream:
     # ---- sending
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Send a pair, as much of it as the other side takes now; `flush` sends the rest."""
+        """Send a pair as far as the socket accepts it now; `flush` sends the rest."""
         if self.is_broken:
             return
         header, payload = parts
@@ -121,13 +121,13 @@ class TcpStream:
         self.flush()
 
     def flush(self) -> None:
-        """Send what the other side takes now."""
+        """Send pending data as far as the socket accepts it now."""
         while self._output:
             try:
                 sent = self._socket.send(self._output[0])
             except (BlockingIOError, InterruptedError):
                 return
-            except OSError:  # what the other side has sent before can still be read
+            except OSError:  # earlier input can still be read
                 self._break()
                 return
             self.backlog -= sent
@@ -141,29 +141,32 @@ class TcpStream:
         self._output.clear()
         self.backlog = 0
 
-    # ---- the end
+    # ---- closing
 
     def end_sending(self) -> None:
-        """Tell the other side that nothing comes any more."""
+        """Shut down the sending side."""
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
-        """Close the socket; nobody polls it any more."""
+        """Close the socket. The I/O thread must not serve it any more."""
         self.is_over = True
         self._break()
         self._socket.close()
 
     def forked(self) -> None:
-        """In a child that was forked: the descriptor is closed by its address, see `nep.system.forks`."""
+        """Release the socket in a forked child.
+
+        Its descriptor is closed by address, see `nep.system.forks`.
+        """
         self.is_over = self.is_broken = True
         self._socket.detach()
 
 
 class TcpConnection:
-    """A client's connection to `address`, as `ServerConnection` is one. Connects at once.
+    """TCP connection of a client to `address`; the counterpart of `ServerConnection`. Connects at once.
 
-    Not thread-safe: it lives under its client's lock.
+    Not thread-safe: guarded by the client's lock.
     """
 
     def __init__(self, io: IoThread, address: str, serve: Callable[[float], Rest]) -> None:
@@ -171,9 +174,9 @@ class TcpConnection:
         self._io = io
         self._serve = serve
         self._is_dead = False
-        """It could not be connected."""
+        """True if connecting failed."""
         self.is_open = False
-        # The system accepts connections for a program that is ending, until it has closed its port, too.
+        # the system accepts connections for an ending program until its port is closed
         self.again_s = 0.1
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
@@ -189,41 +192,41 @@ class TcpConnection:
 
     @property
     def is_over(self) -> bool:
-        """Whether it was open, and has ended."""
+        """True if the connection was open and has ended."""
         return self.is_open and self._stream.is_over
 
     @property
     def has_input(self) -> bool:
-        """Its descriptor tells."""
+        """False: the descriptor is level-triggered."""
         return False
 
     def look(self) -> None:
-        """Look whether it is connected by now."""
+        """Update `is_open`."""
         if self.is_open or self._is_dead:
             return
         if self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
             self._is_dead = True
             return
-        with suppress(OSError):  # not yet
+        with suppress(OSError):  # not connected yet
             other = self._socket.getpeername()
-            # A port that nobody listens on may be given to the one who asks for it: then it talks to itself.
+            # a TCP self-connection: the ephemeral source port equals an unused target port
             self._is_dead = other == self._socket.getsockname()
             self.is_open = not self._is_dead
 
     def serve(self, now: float) -> Rest:
-        """See `Served`."""
+        """Process the connection, see `Served.serve`."""
         rest = self._serve(now)
         is_quiet = self._is_dead or self._stream.is_over
         return Rest(is_quiet, rest.due, sends=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Send a call; what is not taken now is sent by the thread that polls."""
+        """Send a call; the I/O thread sends what the socket doesn't accept now."""
         self._stream.send(parts)
         if self._stream.backlog:
             self._io.serve_soon(self)
 
     def receive(self) -> list[bytes] | None:
-        """The parts of the next answer. Raises `WireError`."""
+        """Return the parts of the next reply, or None. Raises `WireError`."""
         if not self.is_open:
             return None
         self._stream.flush()
@@ -233,22 +236,22 @@ class TcpConnection:
         return pair
 
     def close(self) -> None:
-        """Close it; what was not read is dropped."""
+        """Close the connection and discard unread replies."""
         self._io.remove(self)
         self._is_dead = True
         self._stream.close()
 
     def forked(self) -> None:
-        """In a child that was forked."""
+        """Release the connection in a forked child."""
         self._stream.forked()
 
 
 def keep_alive(connected: socket.socket, address: str) -> None:
-    """Notice within a dozen seconds when the other end's computer has vanished; see `sockets.keep_alive`."""
+    """Detect within a dozen seconds that the peer's computer has vanished, see `sockets.keep_alive`."""
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):
         return
     for name, value in (("TCP_KEEPIDLE", _IDLE_S), ("TCP_KEEPINTVL", _AGAIN_S), ("TCP_KEEPCNT", _TIMES)):
-        option = getattr(socket, name, None)  # not every system has all of them
+        option = getattr(socket, name, None)  # not every system has all options
         if option is not None:
             connected.setsockopt(socket.IPPROTO_TCP, option, value)

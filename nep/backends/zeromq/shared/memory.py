@@ -1,11 +1,11 @@
-"""Payloads that programs of one computer and user exchange through shared memory, by iceoryx2.
+"""Shared memory for payloads between programs of one computer and user, by iceoryx2.
 
-The socket says that a payload lies there, so order, losses and waiting stay the wire's: see docs/wire.md. A
-publisher has one `SharedWriter` of some slots of one size; a subscriber has a `SharedReader` for each
-publisher. Whoever cannot share memory (another computer or user, no iceoryx2, no room) uses the socket alone.
-Chosen by measuring: docs/adr/0023-shared-memory.md.
+The socket still carries a message per payload, so order, losses and waiting are those of the wire: see
+docs/wire.md. A publisher has one `SharedWriter` with slots of one size; a subscriber has one `SharedReader`
+per publisher. Programs that can't share memory (another computer or user, iceoryx2 missing, memory full) use
+the socket alone. Measurements: docs/adr/0023-shared-memory.md.
 
-What a killed program leaves is taken away by iceoryx2 when the next program of the user begins to share.
+iceoryx2 removes the resources of killed programs when the next program of the user starts to share memory.
 """
 
 from __future__ import annotations
@@ -32,43 +32,40 @@ from nep.system.forks import in_child
 __all__ = ["SHARED_BYTES", "Loan", "SharedReader", "SharedWriter", "begin_sharing", "can_share", "room_bytes"]
 
 SHARED_BYTES = 32 * 2**10
-"""Smaller payloads are quicker through the socket."""
+"""Size from which shared memory is faster than the socket."""
 _LARGEST_BYTES = 64 * 2**20
 _SLOTS_BYTES = 320 * 2**20
-"""So much the slots of one publisher have together; at least `_FEWEST`."""
+"""Total size of a publisher's slots; at least `_FEWEST` slots."""
 _FEWEST, _MOST = 4, 256
 _SMALLEST_BYTES = 64 * 2**10
 _HELD_MOST = 12
-"""Payloads of a publisher that a reader keeps where they lie; more are copied, so that slots come back."""
+"""Payloads of a publisher that a reader keeps in their slots; further ones are copied to free the slots."""
 _HEAD = 64
-"""Bytes before a payload: its number and size, and what keeps the payload aligned."""
+"""Bytes before a payload: number, size, and padding for its alignment."""
 _NUMBERS = struct.Struct("=QQ")
 _COPIED_BYTES = 2**18
-"""Payloads up to here that are wanted as bytes are copied when they arrive: their slots come back at once."""
+"""Size up to which payloads requested as bytes are copied on arrival, which frees their slots at once."""
 _LOANS = 4
 _READERS = 64
 _SPARE_BYTES = 64 * 2**20
-"""What stays free where shared memory lives: a program that touches a page without room there is ended."""
+"""Space to keep free in the shared-memory file system: writing a page without space kills the program."""
 _ASK_S = 0.05
 _ASK_BYTES = _LARGEST_BYTES
-"""So long, or for so many bytes of a publisher, it is not asked again."""
-_MEMORY = "/dev/shm"  # noqa: S108 - it is asked for its room, and nothing is put there by name
+"""Validity of a free-space query, in time and in bytes written by one publisher."""
+_MEMORY = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
 _MODULE = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
 _forks = 0
-"""How many forks lie between this process and the one that loaded this module."""
+"""Number of forks between this process and the one that loaded this module."""
 
 
 class _Opened:
-    """The library and this program's node there; closed with the last publisher or subscriber that has it."""
-
     def __init__(self) -> None:
         self.library = importlib.import_module(_MODULE)
         self.node = _new_node(self.library, _own_folder())
 
     def service(self, publisher: int, generation: int) -> Any:  # noqa: ANN401 - iceoryx2 has no types
-        """How the memory of a publisher is made or found."""
         name = self.library.ServiceName.new(f"nep/{publisher:016x}/{generation}")
         return (
             self.node.service_builder(name)
@@ -82,10 +79,8 @@ class _Opened:
 
 
 class _Process:
-    """What this process has of iceoryx2."""
-
+    # State of this process. `is_refused` is True if shared memory is unavailable.
     is_refused = False
-    """Whether it cannot share memory at all."""
     opened: weakref.ref[_Opened] | None = None
 
 
@@ -93,14 +88,14 @@ _process = _Process()
 
 
 def can_share() -> bool:
-    """Whether this program may share memory, as far as is known without loading anything."""
+    """Return True if this program may share memory, as far as known without loading iceoryx2."""
     return not _process.is_refused and os.environ.get("NEP_SHARED_MEMORY", "") != "0"
 
 
 def begin_sharing() -> object:
-    """Load the library on first use, which takes a moment; None where this program cannot share memory.
+    """Load iceoryx2 if needed, which is slow the first time; return None if it is unavailable.
 
-    Keep what it gives as long as memory is shared.
+    Keep the returned object while memory is shared.
     """
     return _open()
 
@@ -112,7 +107,7 @@ def _open() -> _Opened | None:
             try:
                 opened = _Opened()
                 _process.opened = weakref.ref(opened)
-            except Exception as error:  # noqa: BLE001 - the socket does without: it must never end a program
+            except Exception as error:  # noqa: BLE001 - the socket works without it: this must never end a program
                 _process.is_refused = True
                 _logger.debug("no shared memory: %s", error)
         return opened
@@ -124,13 +119,13 @@ def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - it ha
     configuration.global_cfg.root_path = library.Path.new(str(folder))
     configuration.global_cfg.prefix = library.FileName.new("nep_")
     builder = library.NodeBuilder.new().config(configuration)
-    # Ctrl+C belongs to the program.
+    # Ctrl+C belongs to the program
     builder = builder.signal_handling_mode(library.SignalHandlingMode.Disabled)
     return builder.create(library.ServiceType.Ipc)
 
 
 def _own_folder() -> Path:
-    """Where programs of this user find each other's memory. Raises `OSError` when that is somebody else's."""
+    # Raises `OSError` if the folder belongs to another user.
     user = f"-{os.getuid()}" if sys.platform != "win32" else ""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     folder = Path(runtime) / "nep-shared" if runtime else Path(tempfile.gettempdir()) / f"nep-shared{user}"
@@ -142,13 +137,13 @@ def _own_folder() -> Path:
 
 
 def _keep_for_ever(*inherited: object) -> None:
-    """Never let these end in a child that was forked: they would give back what is the parent's."""
+    # Prevents finalizers in a forked child, which would release the parent's resources.
     for each in inherited:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
 
 
 def _forked() -> None:
-    """In a child, which begins anew."""
+    # Runs in the forked child, which starts over.
     global _lock, _forks
     _lock, _forks = threading.Lock(), _forks + 1
     opened = None if _process.opened is None else _process.opened()
@@ -160,13 +155,11 @@ in_child(_forked)
 
 
 class _Room:
-    """Whether there is room for more. Asked now and then: that takes as long as a small payload."""
-
+    # Free space, queried at intervals: a query takes as long as a small payload.
     _asked_at = float("-inf")
     _left_bytes = 0
 
     def has(self, size_bytes: int) -> bool:
-        """Whether so many bytes more may be written."""
         if sys.platform != "linux":
             return True
         now = time.monotonic()
@@ -180,8 +173,8 @@ class _Room:
 
 
 def room_bytes() -> int:
-    """How much room there is where shared memory lives; 0 when that is not known (Linux)."""
-    if sys.platform == "win32":  # whose Python knows no statvfs
+    """Return the free bytes of the shared-memory file system; 0 if unknown."""
+    if sys.platform == "win32":  # Python on Windows has no statvfs
         return 0
     try:
         found = os.statvfs(_MEMORY)
@@ -191,13 +184,12 @@ def room_bytes() -> int:
 
 
 class _Slots:
-    """Views of slots by their address: making one takes longer than to fill it. Valid as long as the port."""
-
+    # Cache of views by slot address: creating a view takes longer than filling it. Valid while the port
+    # exists.
     def __init__(self) -> None:
         self._views: dict[int, memoryview] = {}
 
     def view(self, address: int, size: int) -> memoryview:
-        """The first `size` bytes of the slot that begins there, or more."""
         found = self._views.get(address)
         if found is None or len(found) < size:
             found = memoryview((ctypes.c_uint8 * size).from_address(address)).cast("B")
@@ -206,24 +198,24 @@ class _Slots:
 
 
 class Loan:
-    """A slot that a payload is written into before it is sent. Given back when nobody has it any more."""
+    """Slot that a payload is written into before it is published. Released with its last reference."""
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 has no types
         self.size = size
         self._forks = _forks
-        self._port = port  # the memory lasts as long as the port that it is lent by
+        self._port = port  # the memory is valid while the port exists
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEAD
 
     @property
     def buffer(self) -> memoryview:
-        """Writable, of the payload's size. Whoever has it keeps the loan."""
+        """Writable buffer of the payload's size. It keeps the loan alive."""
         array = (ctypes.c_uint8 * self.size).from_address(self.address)
         array.loan = self  # type: ignore[attr-defined]
         return memoryview(array).cast("B")
 
     def send(self, number: int) -> None:
-        """Hand the payload to all readers. It must not be changed from now on."""
+        """Hand the payload to all readers. It must not be changed afterwards."""
         head = (ctypes.c_uint8 * _NUMBERS.size).from_address(self.address - _HEAD)
         _NUMBERS.pack_into(head, 0, number, self.size)
         sample, self._sample = self._sample, None
@@ -235,13 +227,13 @@ class Loan:
 
 
 class SharedWriter:
-    """The shared memory of one publisher, which guards it with its lock."""
+    """Shared memory of one publisher. Guarded by the publisher's lock."""
 
     def __init__(self, publisher: int) -> None:
         self.generation = 0
-        """Which memory readers are to open, counted from 1: a larger payload needs a larger one."""
+        """Number of the memory segment that readers must open, from 1. Larger payloads need a new segment."""
         self.number = 0
-        """Payloads sent."""
+        """Number of payloads sent."""
         self._publisher = publisher
         self._slot_bytes = 0
         self._room = _Room()
@@ -252,7 +244,10 @@ class SharedWriter:
         self._slots = _Slots()
 
     def prepare(self, size: int) -> bool:
-        """Have slots for payloads of this size; whether there are. A new `generation` means new memory."""
+        """Provide slots for payloads of `size` bytes; return False if impossible.
+
+        May start a new `generation`.
+        """
         if size <= self._slot_bytes:
             return self._port is not None
         opened = _open() if size <= _LARGEST_BYTES else None
@@ -275,15 +270,15 @@ class SharedWriter:
                 .create()
             )
             self._service = service
-        except Exception as error:  # noqa: BLE001 - the socket does without
+        except Exception as error:  # noqa: BLE001 - the socket works without it
             _logger.debug("no shared memory for a publisher: %s", error)
-            self._port = self._service = None  # of this size: it is not tried for each message
+            self._port = self._service = None  # don't retry for each message of this size
             return False
         _writers[id(self)] = self
         return True
 
     def loan(self, size: int) -> Loan | None:
-        """A slot; None when none is free: readers have not taken what is in them."""
+        """Return a free slot, or None if the readers hold all of them."""
         sample = self._sample(size)
         if sample is None:
             return None
@@ -296,11 +291,14 @@ class SharedWriter:
             return None
         try:
             return self._port.loan_slice_uninit(size + _HEAD)
-        except Exception:  # noqa: BLE001 - whatever it is, the payload goes through the socket
+        except Exception:  # noqa: BLE001 - on any error the payload goes through the socket
             return None
 
     def copy(self, data: bytes | memoryview, size: int) -> int | None:
-        """Copy a payload into a slot and hand it to the readers; its number, or None when no slot is free."""
+        """Copy a payload into a slot and hand it to the readers.
+
+        Returns the payload's number, or None without a free slot.
+        """
         sample = self._sample(size)
         if sample is None:
             return None
@@ -312,7 +310,7 @@ class SharedWriter:
         return number
 
     def lent(self, data: memoryview) -> Loan | None:
-        """The loan whose memory `data` is, so that it need not be copied."""
+        """Return the loan whose memory `data` is, or None."""
         if not self._loans or data.readonly or not data.c_contiguous:
             return None
         address = ctypes.addressof(ctypes.c_uint8.from_buffer(data))
@@ -320,28 +318,27 @@ class SharedWriter:
         return found if found is not None and found.size == data.nbytes else None
 
     def send(self, loan: Loan) -> int:
-        """Hand it to the readers; its number, by which they find it."""
+        """Hand a loan to the readers; return its number."""
         self.number += 1
         self._loans.pop(loan.address, None)
         loan.send(self.number)
         return self.number
 
     def tidy(self) -> None:
-        """Take slots back from readers that were killed."""
+        """Reclaim the slots of killed readers."""
         if self._opened is not None and self._port is not None:
             self._opened.node.try_cleanup_dead_nodes()
             self._port.update_connections()
 
     def close(self) -> None:
-        """Give it back. What readers hold stays as it is as long as they hold it."""
+        """Release the memory. Payloads held by readers stay valid."""
         self._port = self._service = self._opened = None
         self._slot_bytes = 0
         self._slots = _Slots()
 
 
 class _Held:
-    """Keeps a payload where it lies until nobody looks at it any more."""
-
+    # Keeps a payload in its slot until its last view is released.
     def __init__(self, sample: Any, returned: deque[None]) -> None:  # noqa: ANN401
         self._sample, self._returned = sample, returned
         self._forks = _forks
@@ -354,10 +351,10 @@ class _Held:
 
 
 class SharedReader:
-    """What a subscriber reads of one publisher's memory. Used under the subscriber's lock."""
+    """Shared memory of one publisher, as a subscriber reads it. Guarded by the subscriber's lock."""
 
     def __init__(self, publisher: int, generation: int) -> None:
-        """Raises `LookupError` where this program cannot read that memory."""
+        """Open the memory. Raises `LookupError` if this program can't."""
         self._opened = _open()
         if self._opened is None:
             raise LookupError
@@ -374,9 +371,9 @@ class SharedReader:
         _readers[id(self)] = self
 
     def take(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
-        """The payload of this number, read-only; None when it was overwritten before it was read.
+        """Return the payload with this number, read-only, or None if it was overwritten.
 
-        With `may_copy` small ones are copied out of their slot.
+        With `may_copy` small payloads are copied out of their slot.
         """
         while True:
             found, self._ahead = self._ahead or self._next(), None
@@ -389,10 +386,9 @@ class SharedReader:
                 return None
 
     def _next(self) -> tuple[int, int, Any] | None:
-        """The number of the next one, its size, and where it lies."""
         try:
             sample = self._port.receive()
-        except Exception as error:  # noqa: BLE001 - it counts as lost
+        except Exception as error:  # noqa: BLE001 - counts as lost
             _logger.debug("a payload in shared memory was not read: %s", error)
             return None
         if sample is None:

@@ -1,6 +1,6 @@
-"""Payloads in shared memory: which subscribers read a publisher's, and which publishers' a subscriber reads.
+"""Negotiation of shared memory: a publisher's readers, and the publishers that a subscriber reads from.
 
-Both live under the lock of their owner. What is said about it on the wire: docs/wire.md.
+Both classes are guarded by their owner's lock. docs/wire.md describes the notices.
 """
 
 from __future__ import annotations
@@ -17,36 +17,36 @@ __all__ = ["SharedPayloads", "SharedSources"]
 
 _NUMBER = struct.Struct("<Q")
 _OFFERS = 4
-"""So often a subscriber is offered the memory; whoever has not answered then cannot share it."""
+"""Maximum number of offers to a subscriber; without a reply it can't share memory."""
 _AGAIN_S = 0.5
 _TIDY_S = 1.0
 
 
 class SharedPayloads:
-    """`offer(subscriber, generation)` sends one of them the notice."""
+    """Shared-memory readers of one publisher. `offer(subscriber, generation)` sends an offer."""
 
     def __init__(self, publisher: int, offer: Callable[[int, int], None]) -> None:
         self.readers: set[int] = set()
-        """Who reads the memory there is now."""
+        """Ids of the subscribers that have opened the current memory."""
         self._offer = offer
         self._offered: dict[int, tuple[int, float]] = {}
         self._writer = SharedWriter(publisher)
         self._tidied_at = float("-inf")
 
     def note(self, shares: Shares) -> None:
-        """A subscriber has opened some memory."""
+        """Process a subscriber's confirmation that it has opened the memory."""
         if shares.generation == self._writer.generation:
             self.readers.add(shares.subscriber)
 
     def forget(self, subscriber: int) -> None:
-        """It says hello anew, or has gone."""
+        """Remove a subscriber that has left or says hello again."""
         self.readers.discard(subscriber)
         self._offered.pop(subscriber, None)
 
     def place(self, data: bytes | memoryview, seen: Mapping[int, int], now: float) -> bytes | None:
-        """Put a payload there, for those who read; what its part in the message is.
+        """Write a payload to shared memory; return the part of the message that refers to it.
 
-        None when it has to go through the socket to all: nobody shares, or no slot is free.
+        Returns None if it must go through the socket: no readers, or no free slot.
         """
         size = data.nbytes if isinstance(data, memoryview) else len(data)
         if not seen or not self._is_ready(size, seen, now):
@@ -61,7 +61,7 @@ class SharedPayloads:
         return _NUMBER.pack(number)
 
     def _has_slots(self, size: int) -> bool:
-        """Whether there are slots for payloads of this size. New memory nobody has opened yet."""
+        # No reader has opened a new segment yet.
         generation = self._writer.generation
         is_there = self._writer.prepare(size)
         if generation != self._writer.generation:
@@ -80,20 +80,20 @@ class SharedPayloads:
         return bool(self.readers)
 
     def lend(self, size: int) -> memoryview | None:
-        """Memory for a payload of this size, to be written, then published; None where nobody shares it."""
+        """Return writable memory for a payload of `size` bytes, or None if no reader shares it."""
         if not self.readers or size < SHARED_BYTES or not self._has_slots(size) or not self.readers:
             return None
         loan = self._writer.loan(size)
         return None if loan is None else loan.buffer
 
     def close(self) -> None:
-        """Nothing is put there any more."""
+        """Stop sharing."""
         self.readers.clear()
         self._writer.close()
 
 
 class SharedSources:
-    """Of the subscriber `subscriber`; `answer` tells a publisher that its memory is open."""
+    """Shared-memory readers of one subscriber; `answer` confirms an offer to the publisher."""
 
     def __init__(self, subscriber: int, answer: Callable[[Shares], None]) -> None:
         self._subscriber = subscriber
@@ -101,7 +101,7 @@ class SharedSources:
         self._readers: dict[int, SharedReader] = {}
 
     def open(self, publisher: int, generation: int) -> None:
-        """A publisher offers its memory. Where it cannot be opened nothing is said."""
+        """Open the memory that a publisher offers, and confirm it if that succeeded."""
         known = self._readers.get(publisher)
         if known is None or known.generation != generation:
             try:
@@ -113,9 +113,11 @@ class SharedSources:
     def take(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
     ) -> bytes | memoryview | None:
-        """The payload that a message's part names; None when it is there no more. Raises `WireError`.
+        """Return the payload that a message's part refers to, or None if it was overwritten.
 
-        With `may_copy` small ones are copied out of their slot.
+        Raises `WireError`.
+
+        With `may_copy` small payloads are copied out of their slot.
         """
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
@@ -123,9 +125,9 @@ class SharedSources:
         return None if reader is None else reader.take(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def leave(self, publisher: int) -> None:
-        """Close its memory; payloads that somebody looks at stay."""
+        """Close a publisher's memory; payloads in use stay valid."""
         self._readers.pop(publisher, None)
 
     def close(self) -> None:
-        """Close all."""
+        """Close the memory of all publishers."""
         self._readers.clear()
