@@ -1,7 +1,7 @@
-"""The back end `memory`: nodes of one process, without sockets. The template for other back ends.
+"""Back end `memory`: nodes of one process, without sockets. Reference implementation for other back ends.
 
-Nodes that name the same master meet; nothing listens there. A message is put straight into the inboxes, a
-call into its server's queue.
+Nodes with the same master name are connected; no server runs. A message goes directly to the inboxes of the
+subscribers, a call to the queue of its server.
 """
 
 from __future__ import annotations
@@ -44,36 +44,34 @@ __all__ = ["BACKEND"]
 _logger = logging.getLogger("nep")
 
 _BATCH_BYTES = 64 * 2**20
-"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
-_BATCH_S = 0.005  # sinks are called 200 times a second at most
+"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
+"""
+_BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 
 class _Hub(ServiceHub):
-    """Where the nodes of one master's name meet. Its lock guards everything of the back end but inboxes."""
-
+    # Nodes of one master name. Its lock guards all state of the back end except inboxes.
     def __init__(self) -> None:
         super().__init__()
         self.transports: dict[str, MemoryTransport] = {}
         self.publishers: dict[str, list[MemoryPublisher]] = {}
         self.subscribers: dict[str, tuple[MemorySubscriber, ...]] = {}
         self.patterns: tuple[MemorySubscriber, ...] = ()
-        """Those whose topic has wildcards."""
+        """Subscribers with wildcards."""
 
     def hearing(self, topic: str) -> tuple[MemorySubscriber, ...]:
-        """The subscribers that hear a topic."""
         found = self.subscribers.get(topic, ())
         if not self.patterns:
             return found
         return (*found, *(each for each in self.patterns if matches(each.spec.topic, topic)))
 
     def forget(self, node_id: str) -> None:
-        """A node leaves."""
         with self.lock:
             if self.transports.pop(node_id, None) is not None:
                 self.ask(requests.Leave(node_id))
 
     def view(self) -> GraphView:
-        """The graph with everybody's statistics of this moment."""
+        # Collects the current statistics of all nodes first.
         with self.lock:
             for transport in self.transports.values():
                 self.ask(transport.renewal(self))
@@ -85,8 +83,8 @@ _hubs_lock = threading.Lock()
 
 
 def _forked() -> None:
-    """In a child: the hubs' locks may be held by threads that are not there."""
-    global _hubs_lock  # noqa: PLW0603 - there is one a process
+    # In a forked child the locks may be held by threads that don't exist there.
+    global _hubs_lock  # noqa: PLW0603 - one per process
     _hubs_lock = threading.Lock()
     _hubs.clear()
 
@@ -102,7 +100,7 @@ def _hub(configuration: Configuration) -> _Hub:
 
 
 class MemoryPublisher:
-    """A publisher: hands every message to the subscribers of its topic."""
+    """Publisher that appends each message to the inboxes of the topic's subscribers."""
 
     def __init__(self, transport: MemoryTransport, hub: _Hub, spec: PublisherSpec) -> None:
         self._transport = transport
@@ -121,38 +119,38 @@ class MemoryPublisher:
 
     @property
     def subscribers(self) -> int:
-        """How many subscribers there are on the topic."""
+        """Number of subscribers of the topic."""
         return len(self.hub.hearing(self.spec.topic))
 
     @property
     def is_heard(self) -> bool:
-        """Whether there is one."""
+        """True if the topic has subscribers."""
         return self.subscribers > 0
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: no shared memory is needed."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self.hub.lock:
             self.count += 1
             self.last_stamp_ns = time.time_ns()
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         return PublisherCount(
             self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, self.problem
         )
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph."""
+        """Set the problem of a payload, which the graph shows as an alert."""
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Put it into the inboxes; `data` that can still be changed is copied.
+        """Append a message to the inboxes; mutable data is copied.
 
-        Raises `WireError` for an extension that has no form on the wire, as other back ends do.
+        Raises `WireError` for an extension that can't be encoded, as other back ends do.
         """
         if encoded.extension:
             extension_part(encoded.extension)
@@ -167,8 +165,8 @@ class MemoryPublisher:
             for subscriber in self.hub.hearing(self.spec.topic):
                 subscriber.put(message)
 
-    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing is ever on its way here
-        """Unregister. Everything was delivered when it was sent."""
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing to flush
+        """Unregister. Messages are delivered when they are sent, so nothing is flushed."""
         with self.hub.lock:
             if not self.is_closed:
                 self.is_closed = True
@@ -181,7 +179,7 @@ class MemoryPublisher:
 
 
 class MemorySubscriber(WakingSubscriber):
-    """A subscriber: its inbox, or its sink."""
+    """Subscriber with an inbox or a sink."""
 
     def __init__(self, transport: MemoryTransport, hub: _Hub, spec: SubscriberSpec) -> None:
         super().__init__(transport.changed)
@@ -196,7 +194,7 @@ class MemorySubscriber(WakingSubscriber):
         self.is_closed = False
 
     def put(self, message: Message) -> None:
-        """Called by publishers."""
+        """Append a message to the inbox. Called by publishers."""
         with self._transport.changed:
             if self.is_closed:
                 return
@@ -207,34 +205,34 @@ class MemorySubscriber(WakingSubscriber):
 
     @property
     def has_input(self) -> bool:
-        """See `WakingSubscriber.has_input`."""
+        """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
-        """The next message if one is there."""
+        """Return the next message, or None."""
         with self._transport.changed:
             return None if self.is_closed else self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message, waited for."""
+        """Return the next message; wait up to `timeout_s` seconds."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 
     def take_batch(self) -> list[Message]:
-        """What a sink gets at once."""
+        """Return the messages for one call of the sink."""
         with self._transport.changed:
             return self.inbox.take_all(_BATCH_BYTES)
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph."""
+        """Set the reader's problem, which the graph shows as an alert."""
         self.problem = problem
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
 
     def close(self) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
         with self.hub.lock:
             if self.is_closed:
                 return
@@ -253,7 +251,7 @@ class MemorySubscriber(WakingSubscriber):
 
 
 class MemoryTransport:
-    """One node's way to the others of its process."""
+    """Connection of one node to the other nodes of its process."""
 
     def __init__(self, node: NodeRecord) -> None:
         self.node = node
@@ -286,7 +284,7 @@ class MemoryTransport:
         return publisher
 
     def subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
-        """Register a subscriber, and hand it what is latched."""
+        """Register a subscriber, and deliver the history of the topic's publishers."""
         with self._joined(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
             hub.ask(requests.AddSubscriber(self.node, record))
@@ -305,7 +303,7 @@ class MemoryTransport:
         return subscriber
 
     def forget(self, closed: MemoryPublisher | MemorySubscriber) -> None:
-        """It was closed; called under its hub's lock."""
+        """Remove a closed publisher or subscriber. Call with its hub's lock held."""
         self._publishers = tuple(each for each in self._publishers if each is not closed)
         self._subscribers = tuple(each for each in self._subscribers if each is not closed)
         with self.changed:
@@ -327,7 +325,7 @@ class MemoryTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         mine = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         before = self._wakes
         with woken_by(calls, self.wake) as is_empty:
@@ -338,17 +336,17 @@ class MemoryTransport:
                     )
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         with self.changed:
             self._wakes += 1
             self.changed.notify_all()
 
-    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - at once
-        """Who is there."""
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
+        """Return the current graph."""
         return _hub(configuration).view()
 
     def renewal(self, hub: _Hub) -> requests.Renew:
-        """This node's statistics on one hub."""
+        """Return this node's statistics at one hub."""
         outs = [each for each in self._publishers if each.hub is hub and not each.is_closed]
         ins = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
         return requests.Renew(
@@ -364,11 +362,11 @@ class MemoryTransport:
         )
 
     def begin_close(self) -> None:
-        """Messages were delivered when they were sent; calls that wait are refused."""
+        """Reject queued calls. Messages need no flushing."""
         self._services.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister all and end the threads."""
+        """Unregister everything and join the threads."""
         self._closing.set()
         self._services.close(timeout_s)
         for subscriber in self._subscribers:
@@ -386,16 +384,16 @@ class MemoryTransport:
 
     @contextmanager
     def _joined(self, configuration: Configuration) -> Iterator[_Hub]:
-        """The hub that this node is in, with its lock held. Raises `ClosedError`."""
+        # Yields the hub with its lock held, after adding this node. Raises `ClosedError`.
         hub = _hub(configuration)
-        with hub.lock:  # whoever closes the node takes it once more after `_closing` is set
+        with hub.lock:  # closing the node takes the lock once more after setting `_closing`
             if self._closing.is_set():
                 raise ClosedError(f"node '{self.node.name}'")
             hub.transports[self.node.id] = self
             yield hub
 
     def _pour(self, subscriber: MemorySubscriber) -> None:
-        with self.changed:  # who closes the node meanwhile finds no thread, or one that has begun
+        with self.changed:  # closing the node meanwhile finds either no thread or a started one
             self._sinks = [*self._sinks, subscriber]
             if self._thread is None and not self._closing.is_set():
                 name = f"nep-sinks-{self.node.name}"
@@ -410,15 +408,13 @@ class MemoryTransport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except (
-                        BaseException
-                    ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
+                    except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)
 
 
 def _name(master: str | None) -> str:
-    """Any name will do: nothing listens there."""
+    # Any name is valid, as no server runs.
     return master or "memory"
 
 

@@ -1,4 +1,4 @@
-"""Servers and clients of one process: a call is put straight into its server's queue."""
+"""Servers and clients of one process: a call goes directly to the queue of its server."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ Then = Callable[[Outcome], None]
 
 
 class ServiceHub:
-    """Where servers and clients meet. Its lock guards all of them but queues."""
+    """Registry of servers and clients. Its lock guards all of them except call queues."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -55,7 +55,7 @@ class ServiceHub:
         self.clients: dict[str, tuple[MemoryClient, ...]] = {}
 
     def ask(self, request: requests.Request) -> None:
-        """Tell the graph. Raises `RequestRefusedError`."""
+        """Apply a request to the graph. Raises `RequestRefusedError`."""
         with self.lock:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
                 if isinstance(each.answer, requests.Refused):
@@ -64,8 +64,7 @@ class ServiceHub:
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way; `server` has it, None: it waits for one."""
-
+    # Call in flight. `server` is None until one is available.
     number: int
     client: MemoryClient
     data: bytes
@@ -75,15 +74,15 @@ class _Call:
     server: MemoryServer | None = None
 
     def end(self, outcome: Outcome) -> None:
-        """Tell who waits. Without a lock."""
+        # Call without locks.
         try:
             self.then(outcome)
-        except Exception:  # the others get theirs
+        except Exception:  # a failing callback must not affect other calls
             _logger.exception("the end of a call of '%s' could not be told", self.client.spec.service)
 
 
 class MemoryServer:
-    """A server: its queue."""
+    """Server with a call queue."""
 
     def __init__(self, node_id: str, hub: ServiceHub, spec: ServerSpec) -> None:
         self._node_id = node_id
@@ -95,7 +94,7 @@ class MemoryServer:
         self.is_closed = False
 
     def put(self, call: _Call) -> None:
-        """Take a call, or refuse it. With the hub's lock held."""
+        """Queue or reject a call. Call with the hub's lock held."""
         call.server = self
         incoming = IncomingCall(
             call.data,
@@ -119,12 +118,12 @@ class MemoryServer:
         return is_waited_for
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister, and refuse the calls that wait."""
+        """Unregister, and reject queued calls."""
         with self.hub.lock:
             left = tuple(each for each in self.hub.servers.get(self.spec.service, ()) if each is not self)
             is_listed = self in self.hub.servers.get(self.spec.service, ())
@@ -136,8 +135,8 @@ class MemoryServer:
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
-    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - answers are never on their way here
-        """The same, and end: who waits still is told that it has ended."""
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies need no flushing
+        """Close the server; calls in flight fail with `ServerGoneError`."""
         self.begin_close()
         with self.hub.lock:
             self.is_closed = True
@@ -153,13 +152,13 @@ class MemoryServer:
             call.end(ServerGoneError(self.spec.service))
 
     def forked(self) -> None:
-        """In a child. See `ServerTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         self.calls.forked()
 
 
 class MemoryClient:
-    """A client: its calls that are under way. Its counts are written under its hub's lock."""
+    """Client with its calls in flight. The statistics are guarded by the hub's lock."""
 
     def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: Deadlines) -> None:
         self._node_id = node_id
@@ -174,16 +173,16 @@ class MemoryClient:
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a server."""
+        """True if the service has a server."""
         return not self.is_closed and self.spec.service in self.hub.servers
 
     @property
     def calls(self) -> list[_Call]:
-        """Those that are under way. With the hub's lock held."""
+        """Calls in flight. Read with the hub's lock held."""
         return list(self._calls.values())
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         return self._begin(data, timeout_s, then, None)
 
     def _begin(
@@ -206,42 +205,42 @@ class MemoryClient:
 
     @property
     def respondents(self) -> int:
-        """How many servers there are now."""
+        """Number of servers of the service."""
         return len(self.hub.servers.get(self.spec.service, ()))
 
     def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
-        """Call each server. See `SurveyTransport.begin_all`."""
+        """Send a call to each server. See `SurveyTransport.begin_all`."""
         with self.hub.lock:
             servers = self.hub.servers.get(self.spec.service, ())
             return [self._begin(data, timeout_s, then, server) for server in servers]
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Nobody waits for these any more."""
+        """Cancel these calls."""
         for call in calls:
             self.forget(call)
 
     def take(self, call: _Call) -> bool:
-        """It is not under way any more; whether it was. With the hub's lock held."""
+        """Remove a call; return False if it was no longer in flight. Call with the hub's lock held."""
         if self._calls.pop(call.number, None) is None:
             return False
         self._bytes -= len(call.data)
         return True
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
+        """Cancel a call; its callback isn't called."""
         with self.hub.lock:
             known = self._calls.get(call.number)
             if known is not None:
                 self.take(known)
 
     def served_by(self, server: MemoryServer) -> None:
-        """There is one now: it gets what waits. With the hub's lock held."""
+        """Send waiting calls to a new server. Call with the hub's lock held."""
         for call in self.calls:
             if call.server is None:
                 server.put(call)
 
     def expire(self, now: float) -> float:
-        """End what waited too long; when to do so again."""
+        """Fail expired calls; return the next deadline."""
         with self.hub.lock:
             late = [each for each in self.calls if each.deadline <= now and self.take(each)]
             self.failed += len(late)
@@ -251,17 +250,17 @@ class MemoryClient:
             call.end(kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
-        """The services that have a server now."""
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+        """Return the names of services that have a server."""
         with self.hub.lock:
             return tuple(sorted(self.hub.servers))
 
     def counts(self) -> SubscriberCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         return SubscriberCount(self.spec.id, self.answered, self.failed)
 
     def close(self) -> None:
-        """Unregister; calls that are under way end."""
+        """Unregister; calls in flight fail with `ClosedError`."""
         with self.hub.lock:
             if self.is_closed:
                 return
@@ -277,7 +276,7 @@ class MemoryClient:
             call.end(self._closed_error())
 
     def forked(self) -> None:
-        """In a child. See `ClientTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         self._calls = {}
 
@@ -286,7 +285,7 @@ class MemoryClient:
 
 
 class MemoryServices:
-    """The servers and clients of one node. Part of `MemoryTransport`; `joined` gives the hub, locked."""
+    """Servers and clients of one node. Part of `MemoryTransport`; `joined` yields the locked hub."""
 
     def __init__(
         self, node: NodeRecord, joined: Callable[[Configuration], AbstractContextManager[ServiceHub]]
@@ -298,7 +297,7 @@ class MemoryServices:
         self._clients: tuple[MemoryClient, ...] = ()
 
     def server(self, spec: ServerSpec) -> MemoryServer:
-        """Register a server; it gets the calls that wait."""
+        """Register a server, and send it waiting calls."""
         with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
@@ -323,7 +322,7 @@ class MemoryServices:
         return client
 
     def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:
-        """The statistics of those that meet there. With its lock held."""
+        """Return the statistics of servers at `hub`. Call with its lock held."""
         return [
             each.counts()
             for each in self._servers
@@ -331,16 +330,16 @@ class MemoryServices:
         ]
 
     def client_counts(self, hub: ServiceHub) -> Iterable[SubscriberCount]:
-        """The statistics of those that meet there. With its lock held."""
+        """Return the statistics of clients at `hub`. Call with its lock held."""
         return [each.counts() for each in self._clients if each.hub is hub and not each.is_closed]
 
     def begin_close(self) -> None:
-        """Nothing is carried out any more; who waits is told."""
+        """Reject queued and new calls."""
         for server in self._servers:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close all of them and end the thread."""
+        """Close all servers and clients, and stop the timeout thread."""
         for client in self._clients:
             client.close()
         for server in self._servers:
