@@ -1,7 +1,8 @@
-"""The back end `zenoh`: nodes that carry their messages by Eclipse Zenoh, and need no master.
+"""Back end `zenoh`: messages over Eclipse Zenoh, without a master.
 
-`places` says where nodes meet, `rendezvous` how those of one computer find each other. `keys` has the key
-expressions; a `session` is one node's, with its `roster` of who is there. `library` finds the library.
+`places` parses where nodes connect, `rendezvous` lets those of one computer find each other, `keys` defines
+the key expressions, `session` is the session of one node, `roster` lists the known nodes, and `library` loads
+zenoh.
 """
 
 from nep.backends.base import Backend

@@ -1,7 +1,7 @@
-"""EarlyMessages: live messages that come before what a publisher answers to a hello. No network, no lock.
+"""EarlyMessages: messages that arrive before a publisher's reply to the hello. No network, no lock.
 
-A publisher's history and the messages that it publishes meanwhile come by two ways. What comes too early
-waits until the history is there with all that it has, and goes on behind it.
+A publisher's history and its new messages arrive over different paths. New messages that arrive too early are
+queued until the history is complete.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ __all__ = ["EarlyMessages"]
 
 T = TypeVar("T")
 _LONGEST_S = 15.0
-"""Nothing waits for longer; greetings take ten seconds at most."""
+"""Maximum time in seconds that a message is queued; greetings take ten seconds at most."""
 
 
 class EarlyMessages(Generic[T]):
-    """Those of one subscriber, which lives under its own lock. `sources`: whom it hears."""
+    """Early messages of one subscriber, guarded by its lock. `sources` are its publishers."""
 
     def __init__(
         self, sources: HeardPublishers, max_messages: int, clock: Callable[[], float] = time.monotonic
@@ -36,7 +36,7 @@ class EarlyMessages(Generic[T]):
         self._bytes = 0
 
     def keep(self, header: Header, message: T, size_bytes: int) -> bool:
-        """Whether a live message comes too early, and waits now. What waits is taken by `take`."""
+        """Queue a message that arrived too early; return False if it can be delivered now."""
         source = self._sources.find(header.publisher)
         if source is None or source.remote is None or source.has_echoed:
             return False
@@ -52,7 +52,7 @@ class EarlyMessages(Generic[T]):
         return count < self._max_messages and self._bytes < HISTORY_BYTES
 
     def take(self, publisher: int) -> list[T]:
-        """Those of a publisher that were not heard since, in order."""
+        """Remove and return a publisher's queued messages that weren't received since, in order."""
         self._until.pop(publisher, None)
         kept = self._kept.pop(publisher, [])
         self._bytes -= sum(size_bytes for _seq, _message, size_bytes in kept)

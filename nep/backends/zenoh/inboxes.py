@@ -1,4 +1,4 @@
-"""Inboxes: what one node's subscribers have in common: a condition to wait on, a thread for sinks."""
+"""Inboxes: the condition variable and the sink thread shared by one node's subscribers."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from nep.messages.message import Message
 __all__ = ["Inboxes", "Poured"]
 
 _logger = logging.getLogger("nep")
-_BATCH_S = 0.005  # sinks are called 200 times a second at most
+_BATCH_S = 0.005  # at most 200 calls of a sink per second
 _LOOK_S = 0.1
 
 
 class Poured(Protocol):
-    """A subscriber, as those who wait for its messages need it."""
+    """Subscriber as the sink thread uses it."""
 
     is_closed: bool
 
     @property
     def has_input(self) -> bool:
-        """Whether a message waits, or it is closed. With `Inboxes.changed` held."""
+        """True if a message is available or the subscriber is closed. Call with `Inboxes.changed` held."""
 
     @property
     def sink(self) -> Sink | None:
-        """Where its messages go."""
+        """Callback for its messages."""
 
     def take_batch(self) -> list[Message]:
-        """What the sink gets at once."""
+        """Return the messages for one call of the sink."""
 
 
 class Inboxes:
-    """One for each node. `changed` guards the inboxes of all its subscribers."""
+    """Inboxes of one node. `changed` guards the inboxes of all its subscribers."""
 
     def __init__(self, name: str) -> None:
         self.changed = threading.Condition()
@@ -47,13 +47,14 @@ class Inboxes:
 
     @property
     def wakes(self) -> int:
-        """How often `wake` was called."""
+        """Number of `wake` calls."""
         return self._wakes
 
     def wait(self, subscribers: Sequence[Poured], timeout_s: float, wakes: int | None = None) -> None:
-        """Wait for a message in one of them, for one of them to be closed, or for `wake`.
+        """Wait for a message in `subscribers`, for one of them to close, or for `wake`.
 
-        `wakes`: how often that was called before; whoever was woken since then does not wait.
+        `wakes` is the number of `wake` calls known to the caller; if there were more since, the call returns
+        at once.
         """
         with self.changed:
             before = self._wakes if wakes is None else wakes
@@ -63,13 +64,13 @@ class Inboxes:
             )
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         with self.changed:
             self._wakes += 1
             self.changed.notify_all()
 
     def pour(self, subscriber: Poured) -> None:
-        """Give this one's messages to its sink, until `stop_pouring`."""
+        """Deliver the subscriber's messages to its sink until `stop_pouring`."""
         with self.changed:
             self._sinks = (*self._sinks, subscriber)
             if self._thread is None and not self._closing.is_set():
@@ -78,12 +79,12 @@ class Inboxes:
             self.changed.notify_all()
 
     def stop_pouring(self, subscriber: Poured) -> None:
-        """It is closed."""
+        """Stop delivering to the subscriber's sink."""
         with self.changed:
             self._sinks = tuple(each for each in self._sinks if each is not subscriber)
 
     def close(self, timeout_s: float) -> None:
-        """End the thread."""
+        """Stop the sink thread."""
         self._closing.set()
         self.wake()
         thread = self._thread
@@ -98,8 +99,6 @@ class Inboxes:
                 if messages and subscriber.sink is not None:
                     try:
                         subscriber.sink(messages)
-                    except (
-                        BaseException
-                    ):  # also SystemExit, which would end all sinks' thread: it gets the next batch
+                    except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", messages[0].topic)
             self._closing.wait(_BATCH_S)

@@ -1,16 +1,16 @@
-"""Key expressions: where messages, greetings and liveliness tokens of nep lie in zenoh. Pure functions.
+"""Key expressions for messages, greetings and liveliness tokens of nep. Pure functions.
 
-    nep/v1/data/TOPIC              messages: the payload, and header and extension as its attachment
-    nep/v1/hello/TOPIC/PUBLISHER   a publisher answers with what is latched and the number of its last message
-    nep/v1/call/NODE               a node answers a request of `nep.protocol.requests`: who it is, its figures
-    nep/v1/live/NODE/node/...      liveliness tokens: a node, and its publishers and subscribers
+    nep/v1/data/TOPIC              messages: payload, with header and extension as attachment
+    nep/v1/hello/TOPIC/PUBLISHER   a publisher replies with its history and the number of its last message
+    nep/v1/call/NODE               a node replies to a request of `nep.protocol.requests`: records, statistics
+    nep/v1/live/NODE/node/...      liveliness tokens of a node, its publishers and subscribers
     nep/v1/live/NODE/pub/...
     nep/v1/live/NODE/sub/...
-    nep/v1/live/NODE/srv/...       a server, and since when it is there
-    nep/v1/live/NODE/cli/...       a client
-    nep/v1/serve/SERVICE/SINCE/ID  a server answers: the payload, and the call's header as its attachment
+    nep/v1/live/NODE/srv/...       token of a server, with its start time
+    nep/v1/live/NODE/cli/...       token of a client
+    nep/v1/serve/SERVICE/SINCE/ID  a server replies: payload, with the header of the call as attachment
 
-Whatever people name is one chunk, percent-encoded as in an address of the web; "" is "%".
+Each name is one chunk, percent-encoded as in a URL; "" is encoded as "%".
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _NODE_WORDS, _PUBLISHER_WORDS, _SUBSCRIBER_WORDS = 7, 6, 4
 
 
 class Alive(NamedTuple):
-    """What a token says: `record` is there, as part of the node `node_id`."""
+    """Content of a liveliness token: `record` belongs to the node `node_id`."""
 
     node_id: str
     record: NodeRecord | PublisherRecord | SubscriberRecord
@@ -68,32 +68,32 @@ def _text(word: str) -> str:
 
 
 def data_key(topic: str) -> str:
-    """Where the messages of a topic are published."""
+    """Return the key for messages of a topic."""
     return f"{_ROOT}/data/{_word(topic)}"
 
 
 def data_keys(pattern: str) -> str:
-    """Where messages of all topics are published that match a pattern, and of some that do not."""
+    """Return the key expression for messages of topics that match a pattern; it may match others, too."""
     return f"{_ROOT}/data/{_words(pattern)}"
 
 
 def hello_key(topic: str, publisher: int) -> str:
-    """Where a publisher answers new subscribers."""
+    """Return the key at which a publisher replies to new subscribers."""
     return f"{_ROOT}/hello/{_word(topic)}/{publisher:016x}"
 
 
 def hellos_key(topic: str) -> str:
-    """Where all publishers of a topic answer."""
+    """Return the key expression for hellos to all publishers of a topic."""
     return f"{_ROOT}/hello/{_word(topic)}/*"
 
 
 def hellos_keys(pattern: str) -> str:
-    """Where all publishers of the topics of `data_keys` answer."""
+    """Return the key expression for hellos to all publishers of the topics of `data_keys`."""
     return f"{_ROOT}/hello/{_words(pattern)}/*"
 
 
 def _words(pattern: str) -> str:
-    """What a topic that matches begins and ends with; zenoh has wildcards for chunks, and a topic is one."""
+    # A topic is one chunk and zenoh's wildcards match whole chunks, so only the fixed begin and end are used.
     levels = pattern.split("/")
     wild = [each for each, level in enumerate(levels) if level in _WILD]
     first, last = wild[0], wild[-1]
@@ -103,41 +103,44 @@ def _words(pattern: str) -> str:
 
 
 def topic_of(key: str) -> str:
-    """The topic of a message, or of an answer to a hello."""
+    """Return the topic in the key of a message or of a reply to a hello."""
     return _text(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 
 def call_key(node_id: str) -> str:
-    """Where a node answers."""
+    """Return the key at which a node replies to requests."""
     return f"{_ROOT}/call/{_word(node_id)}"
 
 
 def node_key(node: NodeRecord) -> str:
-    """The token of a node."""
+    """Return the token of a node."""
     words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
     return "/".join((f"{_LIVE}{_word(node.id)}/node", *map(_word, words)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
-    """The token of a publisher."""
+    """Return the token of a publisher."""
     latched = "latched" if record.latched else "plain"
     words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
     return "/".join((f"{_LIVE}{_word(node_id)}/pub", *map(_word, words)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
-    """The token of a subscriber."""
+    """Return the token of a subscriber."""
     words = (f"{record.id:016x}", record.topic, record.msg_type)
     return "/".join((f"{_LIVE}{_word(node_id)}/sub", *map(_word, words)))
 
 
 def serve_key(service: str, since_ns: int, server: int) -> str:
-    """Where a server answers. In the order of these keys, all clients call the one that was there first."""
+    """Return the key of a server.
+
+    All clients call the first server in the order of these keys, the oldest.
+    """
     return f"{_ROOT}/serve/{_word(service)}/{since_ns:016x}/{server:016x}"
 
 
 def server_key(node_id: str, record: PublisherRecord) -> str:
-    """The token of a server."""
+    """Return the token of a server."""
     since = record.endpoints[0].split("/")[_SINCE_AT]
     return "/".join(
         (f"{_LIVE}{_word(node_id)}/srv", f"{record.id:016x}", _word(service_of(record.topic) or ""), since)
@@ -145,14 +148,14 @@ def server_key(node_id: str, record: PublisherRecord) -> str:
 
 
 def client_key(node_id: str, record: SubscriberRecord) -> str:
-    """The token of a client."""
+    """Return the token of a client."""
     return "/".join(
         (f"{_LIVE}{_word(node_id)}/cli", f"{record.id:016x}", _word(service_of(record.topic) or ""))
     )
 
 
 def parse_live(key: str) -> Alive | None:
-    """What the token at this key says; None for anything else."""
+    """Parse a liveliness token; return None for other keys."""
     if not key.startswith(_LIVE):
         return None
     node_id, *words = map(_text, key[len(_LIVE) :].split("/"))
@@ -167,7 +170,7 @@ def parse_live(key: str) -> Alive | None:
             )
         if words[:1] == ["pub"] and len(words) == _PUBLISHER_WORDS:
             _kind, id_, topic, msg_type, codec, latched = words
-            if topic.startswith(PREFIX):  # else whoever makes such a token would be called
+            if topic.startswith(PREFIX):  # a forged token could otherwise register a server
                 return None
             record = PublisherRecord(
                 _number(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
@@ -184,7 +187,7 @@ def parse_live(key: str) -> Alive | None:
 
 
 def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> Alive | None:
-    """A server or a client. Raises `ValueError`."""
+    # Raises `ValueError`.
     if kind == "srv" and len(rest) == 2 and rest[0]:
         service, since = rest
         endpoint = serve_key(service, _number(since), _number(id_))
@@ -198,7 +201,7 @@ def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> A
 
 
 def _number(word: str) -> int:
-    """An id. Raises `ValueError`."""
+    # Raises `ValueError`.
     number = int(word, 16)
     if not 0 < number <= _ID_MOST:
         raise ValueError(word)

@@ -1,4 +1,4 @@
-"""The library zenoh: found when the first node asks for it, and left alone after a fork."""
+"""Access to the zenoh library: loaded with the first node, unusable after a fork."""
 
 from __future__ import annotations
 
@@ -19,13 +19,17 @@ __all__ = ["callback", "close_session", "keep_for_ever", "library", "open_sessio
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
 _inherited: set[str] = set()
-"""The names of libraries that came with a fork: zenoh's threads stayed behind, and it waits for them."""
+"""Names of libraries in use before a fork: zenoh would wait for its threads, which don't exist in the child.
+"""
 
 
-def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not all of it has types
-    """The module zenoh. Raises `BackendUnavailableError` where it is not installed or does not load.
+# zenoh is only partly typed
+def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401
+    """Return the module zenoh.
 
-    Raises `NepError` in a child that was forked from a program that uses it.
+    Raises:
+        BackendUnavailableError: zenoh is not installed or can't be loaded.
+        NepError: The process was forked from one that uses zenoh.
     """
     if _inherited:
         raise NepError(
@@ -42,24 +46,24 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
         ) from error
 
 
-def callback(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh's
-    """A handler that is called in the thread that reads the network: what comes keeps its order."""
+def callback(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
+    """Return a handler that runs in zenoh's network thread, which preserves the order of messages."""
     return importlib.import_module("zenoh.handlers").Callback(take, drop, indirect=False)
 
 
-def open_session(config: Any) -> Any:  # noqa: ANN401 - zenoh's
-    """A session with this configuration. Raises zenoh's `ZError`."""
+def open_session(config: Any) -> Any:  # noqa: ANN401 - zenoh is not typed
+    """Open a session. Raises zenoh's `ZError`."""
     session = library().open(config)
     _sessions.append(session)
     return session
 
 
-def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh's
-    """Close it. What zenoh says of a close that it could not finish is logged."""
+def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    """Close a session. Errors of zenoh are logged."""
     try:
         session.close()
     except BaseException as error:
-        # A session that cannot be closed in ten seconds panics, which is no `Exception` in Python.
+        # zenoh panics if closing takes ten seconds; the exception isn't derived from `Exception`
         if type(error).__name__ not in {"PanicException", "ZError"}:
             raise
         _logger.warning("zenoh could not close a session: %s", error)
@@ -68,13 +72,13 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh's
             _sessions.remove(session)
 
 
-def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - zenoh's
-    """In a child: let nobody forget it, for what is forgotten tells the network so."""
+def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    """Prevent the finalizer of an object in a forked child, which would notify the network."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 
 def _forked() -> None:
-    """In a child: no session may be closed, not even by being forgotten: that would never end."""
+    # In a forked child sessions must never be closed, not even by their finalizers: that would block forever.
     if "zenoh" not in sys.modules or not _sessions:
         return
     _inherited.add("zenoh")

@@ -1,4 +1,4 @@
-"""ZenohServices: one node's servers, clients and surveyors, and how they end. Part of `ZenohTransport`."""
+"""ZenohServices: servers, clients and surveyors of one node. Part of `ZenohTransport`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ Sessions = Callable[[Configuration, float | None], ZenohSession]
 
 
 class ZenohServices:
-    """`session` gives the node's session at a place; it raises `ClosedError` when the node is closed."""
+    """Services of one node.
+
+    `session` returns the node's session for a configuration; raises `ClosedError` when the node is closed.
+    """
 
     def __init__(self, session: Sessions, node_name: str) -> None:
         self._session = session
@@ -32,7 +35,7 @@ class ZenohServices:
         self._is_closed = False
 
     def server(self, spec: ServerSpec) -> ZenohServer:
-        """A new server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.server`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
         server = ZenohServer(session, spec, self._forget)
@@ -42,13 +45,13 @@ class ZenohServices:
                 self._servers = (*self._servers, server)
             session.add_server(server)
             session.meet_all(HANDSHAKE_S)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             server.close(0.0)
             raise
         return server
 
     def client(self, spec: ClientSpec) -> ZenohClient:
-        """A new client; a surveyor, too. See `ServiceTransport.client`."""
+        """Create a client or surveyor. See `ServiceTransport.client`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
         client = ZenohClient(session, spec, self._deadlines, self._forget)
@@ -65,7 +68,7 @@ class ZenohServices:
         return client
 
     def _check_open(self) -> None:
-        """With the lock held. Raises `ClosedError`."""
+        # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node_name}'")
 
@@ -75,7 +78,7 @@ class ZenohServices:
             self._clients = tuple(each for each in self._clients if each is not closed)
 
     def begin_close(self) -> None:
-        """Nothing is carried out any more; who waits is told."""
+        """Stop accepting calls; queued calls are rejected."""
         with self._lock:
             self._is_closed = True
             servers = self._servers
@@ -83,7 +86,7 @@ class ZenohServices:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close all of them and end the thread."""
+        """Close all servers and clients, and stop the timeout thread."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         for client in self._clients:
@@ -93,7 +96,7 @@ class ZenohServices:
         self._deadlines.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         for server in self._servers:

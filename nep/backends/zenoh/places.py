@@ -1,8 +1,8 @@
-"""Where the nodes of zenoh meet: what a node's `master` means to this back end, and opening a session there.
+"""Places: the values of a node's `master` for this back end, and opening a session for them.
 
-local, local/NAME          this user's nodes on this computer, at loopback
-tcp/HOST:7447,tls/...      a zenoh router (or peer): the node connects to it, and listens nowhere
-FILE.json5                 zenoh's own configuration: TLS, access control, other modes
+local, local/NAME          nodes of this user on this computer, over loopback tcp/HOST:7447,tls/...      a
+zenoh router or peer: the node connects to it and doesn't listen FILE.json5                 a zenoh
+configuration file: TLS, access control, other modes
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from nep.system.descriptors import check_room
 __all__ = ["CONFIG_VARIABLE", "Opened", "open_place", "place_name"]
 
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
-"""Names the configuration of nodes that are told nothing: a file, or what else `master` may be."""
+"""Environment variable with the default place: a file, or any other value of `master`."""
 _LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
 _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
 _SECURED = re.compile(r"\b(?:tls|quic)/")
 _FILES = (".json5", ".json", ".yaml", ".yml")
 _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
 _WAITS_S = 0.05
-"""So long may a message, or the first part of a large one, wait for room in a connection.
+"""Time in seconds that a message, or the first fragment of a large one, waits for room in a connection.
 
-Zenoh's own millisecond is over before its thread has run once on a busy computer. A subscriber that is halted
-costs its publisher this once: zenoh drops at once then, until there is room again.
+Zenoh's default of one millisecond passes before its thread has run once on a busy computer. A suspended
+subscriber costs the publisher this time once: zenoh then drops at once until there is room again.
 """
 _LARGE_WAITS_S = 1.0
-"""So long in all the parts of a large message may wait for room, before it is dropped and counts as lost.
+"""Total time in seconds that all fragments of a large message wait for room before the message is dropped.
 
-Zenoh's own 50 ms are over before 8 MB have gone through a link of 100 MB/s, or on a busy computer.
+Zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
 """
 _LONGEST_S = 10**6
 _SESSION_FILES = 16
@@ -53,10 +53,10 @@ _TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
 
 @dataclass(frozen=True)
 class Opened:
-    """A session, its entry at the rendezvous, and what a forked child has to close (see `forks.give_up`).
+    """Open session with its rendezvous entry.
 
-    `routers` are the endpoints of which one has to be connected for anybody to be met; empty where nobody
-    has to.
+    `endpoints` must be closed in a forked child (`forks.give_up`). Without a connection to one of `routers`
+    no other node is reachable; empty for peers.
     """
 
     session: Any
@@ -67,18 +67,18 @@ class Opened:
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether it has lost its router, which it looks for by itself."""
+        """True if the connection to the router is lost. Zenoh reconnects by itself."""
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
     def leave(self) -> None:
-        """Nobody shall connect to it any more."""
+        """Withdraw the session's address, so that no other session connects to it."""
         if self.meeting is not None and self.entry is not None:
             self.meeting.remove(self.entry)
 
 
 def place_name(master: str | None = None) -> str:
-    """`master` itself when it is a place, else $NEP_ZENOH_CONFIG, else "local". Raises `NepError`."""
+    """Validate a place; the default is $NEP_ZENOH_CONFIG, then "local". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a place of 'zenoh' is a 'str', not a '{kind}'").format(kind=type(master).__name__)
@@ -95,13 +95,13 @@ def place_name(master: str | None = None) -> str:
 
 
 def _endpoints_in(place: str) -> tuple[str, ...]:
-    """The endpoints that it lists; none when it lists something else."""
+    # Returns () if the place isn't a list of endpoints.
     words = tuple(word.strip() for word in place.split(","))
     return words if all(map(_ENDPOINT.fullmatch, words)) else ()
 
 
 def open_place(place: str, wait_s: float | None) -> Opened:
-    """A session there; `wait_s` is how long a router may take to answer. Raises `NepError`."""
+    """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError`."""
     local = _LOCAL.fullmatch(place)
     if local is not None:
         return _open_local(local.group(1) or "nodes")
@@ -133,7 +133,7 @@ def _open_local(name: str) -> Opened:
 
 
 def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
-    """Another program may take the port between the look and the use of it: then another one."""
+    # Another program may bind the port before zenoh does; then try another port.
     for left in reversed(range(_TRIES)):
         port = free_port()
         told: dict[str, object] = {
@@ -157,8 +157,8 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
     raise AssertionError
 
 
-def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh's
-    """A session as a file of the user's says; peers connect beside it, so that is waited for a moment."""
+def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
+    # Peers connect in the background, so wait a moment for them.
     config = _config_of(path)
     session = _open(config, str(path))
     if json.loads(config.get_json("connect/endpoints")):
@@ -168,7 +168,7 @@ def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh's
     return session
 
 
-def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh's
+def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh is not typed
     drop = {
         "wait_before_drop": round(1e6 * _WAITS_S),
         "max_wait_before_drop_fragments": round(1e6 * _LARGE_WAITS_S),
@@ -177,8 +177,8 @@ def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh's
     return library().Config.from_json5(json.dumps({**told, "transport": {"link": {"tx": queue}}}))
 
 
-def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh's
-    """The configuration in a file; where it says nothing, loopback and no multicast. Raises `NepError`."""
+def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
+    # Defaults for options that the file leaves out: loopback, no multicast. Raises `NepError`.
     try:
         config = library().Config.from_file(str(path.expanduser()))
     except library().ZError as error:
@@ -195,7 +195,7 @@ def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh's
     return config
 
 
-def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh's
+def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
     try:
         return open_session(config)
     except library().ZError as error:
@@ -213,5 +213,5 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh's
 
 
 def _short(error: Exception) -> str:
-    """Zenoh's sentence without the places in its source."""
+    # Removes the source location from zenoh's message.
     return _TAIL.sub("", str(error)).strip().rstrip(".")

@@ -1,4 +1,4 @@
-"""ZenohPublisher: publishes messages, and answers subscribers that greet it."""
+"""ZenohPublisher: publishes messages and replies to the hello of new subscribers."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ __all__ = ["ZenohPublisher"]
 
 
 class ZenohPublisher:
-    """A publisher of a session. What a subscriber cannot take at once zenoh drops; the subscriber counts it.
+    """Publisher of a session. Zenoh drops messages for subscribers without room, which count the losses.
 
-    `count_subscribers` says how many there are; `on_close` unregisters it and delivers what is on its way.
+    `count_subscribers` returns the number of subscribers of a topic; `on_close` unregisters and flushes.
     """
 
     def __init__(
         self,
-        session: Any,  # noqa: ANN401 - zenoh's
+        session: Any,  # noqa: ANN401 - zenoh is not typed
         spec: PublisherSpec,
         count_subscribers: Callable[[str], int],
         on_close: Callable[[ZenohPublisher, float], None],
@@ -61,24 +61,24 @@ class ZenohPublisher:
 
     @property
     def subscribers(self) -> int:
-        """How many there are."""
+        """Number of subscribers of the topic."""
         return self._count_subscribers(self.spec.topic)
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody takes what is published, also programs that are none of nep's."""
+        """True if the topic has subscribers, including programs that don't use nep."""
         return self._is_matched or self.subscribers > 0
 
-    def _matched(self, status: Any) -> None:  # noqa: ANN401 - zenoh's
+    def _matched(self, status: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         self._is_matched = bool(status.matching)
 
-    def _greeted(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads: what is latched, and from which number on its messages are counted."""
+    def _greeted(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        # Runs in a zenoh thread. Replies with the history and the number of the last message.
         with self._lock:
             history = () if self._is_closed else tuple(self._history)
             header = Header(self.spec.codec.number, 0, self.count, time.time_ns(), self.spec.id)
             is_closed = self._is_closed
-        with query:  # without the lock: whoever does not read its answer holds up nobody else
+        with query:  # without the lock: a querier that doesn't read the reply must not block the others
             for data, beside in history:
                 query.reply(self._key, data, attachment=beside)
             if not is_closed:
@@ -89,30 +89,30 @@ class ZenohPublisher:
         return hello_key(self.spec.topic, self.spec.id)
 
     def counts(self) -> PublisherCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
         with self._lock:
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
             )
 
     def report(self, problem: str) -> None:
-        """The publisher's trouble with a payload, for who looks at the graph."""
+        """Set the problem of a payload, which the graph shows."""
         self._problem = problem
 
     # ---- sending
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: zenoh has no shared memory here."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._lock:
             self.count += 1
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish. Raises `WireError` for an extension that has no form."""
+        """Publish a message. Raises `WireError` for an extension that can't be encoded."""
         data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
         extension = extension_part(encoded.extension) if encoded.extension else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension else 0)
@@ -133,17 +133,17 @@ class ZenohPublisher:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, after what is on its way is delivered, within `timeout_s`. Called by its publisher."""
+        """Flush within `timeout_s` seconds and unregister. Called by the publisher."""
         self._on_close(self, timeout_s)
 
     def end(self) -> bool:
-        """Nothing is published any more; False when that was so already."""
+        """Stop accepting messages; return False if it was closed already."""
         with self._lock:
             was_closed, self._is_closed = self._is_closed, True
             return not was_closed
 
     def release(self) -> None:
-        """Take it off the network."""
+        """Undeclare everything at the session."""
         for each in (self._hellos, self._listener, self._out):
-            with suppress(library().ZError):  # the session was closed, and took it along
+            with suppress(library().ZError):  # closing the session has undeclared it
                 each.undeclare()

@@ -1,8 +1,8 @@
-"""Rendezvous: how the sessions of one computer's user find each other, without a port that all know.
+"""Rendezvous: how the sessions of one user on one computer find each other without a fixed port.
 
-Each session listens at a free port of loopback and leaves a file with its number in a folder of the user's
-own. Who opens a session does that alone, under a lock: it connects to all that have left one, and leaves its
-own. So every two of them are connected, whoever came first and whoever ends first.
+Each session listens at a free loopback port and creates a file with the port's number in a folder of the
+user. Under a lock, a new session connects to all sessions with a file and then creates its own, so any two
+sessions are connected, independent of the order in which they start and end.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _STOPPED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
 
 
 class SessionPort(NamedTuple):
-    """A session's file: the port at which it listens, and whose it is. `began` tells equal pids apart."""
+    """File name of a session: its port and process. `began` distinguishes reused process ids."""
 
     port: int
     pid: int
@@ -45,12 +45,12 @@ class SessionPort(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The file's name."""
+        """Name of the file."""
         return f"{self.port}-{self.pid}-{self.began}"
 
 
 def free_port() -> int:
-    """A port of loopback that is free now and none of the original NEP's. Raises `AddressInUseError`."""
+    """Return a free loopback port, except those of the original NEP. Raises `AddressInUseError`."""
     for _try in range(_TRIES):
         with socket.socket() as probe:
             probe.bind((LOOPBACK, 0))
@@ -61,14 +61,14 @@ def free_port() -> int:
 
 
 class Rendezvous:
-    """The folder of one name. Raises `NepError` when it cannot be this user's own."""
+    """Folder of the sessions with one name. Raises `NepError` if it doesn't belong to the user."""
 
     def __init__(self, name: str) -> None:
         self._folder = _own_folder(_own_folder(_root()) / name)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """While nobody else opens a session here. Who hangs while it does holds up others for 5 s."""
+        """Hold the lock for opening a session. A process that hangs with it delays others by 5 s only."""
         with (self._folder / "lock").open("ab") as file:
             is_held = _lock(file.fileno())
             if not is_held:
@@ -80,7 +80,7 @@ class Rendezvous:
                     _unlock(file.fileno())
 
     def entries(self) -> list[SessionPort]:
-        """Who listens. Files of programs that have ended are deleted."""
+        """Return the sessions of running programs; delete the files of others."""
         found = []
         for path in self._folder.iterdir():
             entry = _entry_in(path.name)
@@ -98,13 +98,13 @@ class Rendezvous:
         return found
 
     def add(self, port: int) -> SessionPort:
-        """Leave a file: this process listens there."""
+        """Create the file of a session that listens at `port`."""
         entry = SessionPort(port, os.getpid(), _began(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry
 
     def remove(self, entry: SessionPort) -> None:
-        """Take it back."""
+        """Delete the file of a session."""
         with contextlib.suppress(OSError):
             (self._folder / entry.name).unlink(missing_ok=True)
 
@@ -151,7 +151,7 @@ def _began(pid: int) -> int:
 
 
 def _status(entry: SessionPort) -> str | None:
-    """What its process does; None when that has ended."""
+    # Returns None if the process has ended.
     try:
         process = psutil.Process(entry.pid)
         status = process.status()
@@ -164,7 +164,7 @@ def _status(entry: SessionPort) -> str | None:
 
 
 def _lock(descriptor: int) -> bool:
-    """Lock a file for this process; False when that took too long."""
+    # Returns False on timeout.
     pause, deadline = threading.Event(), time.monotonic() + _LOCK_S
     while not _try_lock(descriptor):
         if time.monotonic() > deadline:

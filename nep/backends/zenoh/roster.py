@@ -1,4 +1,4 @@
-"""Roster: who is there, by the liveliness tokens that were heard. No network; it has its own lock."""
+"""Roster: known nodes, publishers and subscribers, from their liveliness tokens. No network; thread-safe."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["Roster"]
 
 _Record = TypeVar("_Record", PublisherRecord, SubscriberRecord)
 _MOST = 100_000
-"""So many tokens are noted: whoever reaches a network of zenoh can make any number."""
+"""Maximum number of tokens: any program in the network can create them."""
 
 
 class Roster:
-    """Nodes, publishers and subscribers. Only `note` changes it; may be asked from any thread."""
+    """Known nodes, publishers and subscribers. Only `note` changes it. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -29,7 +29,7 @@ class Roster:
         self._count = 0
 
     def note(self, alive: Alive, *, is_there: bool) -> None:
-        """A token came or went. A second one of the same id is the same."""
+        """Add or remove a token (idempotent)."""
         with self._lock:
             if is_there and self._count >= _MOST:
                 return
@@ -50,7 +50,7 @@ class Roster:
                         self._patterns.add(record.topic)
 
     def count_subscribers(self, topic: str) -> int:
-        """How many hear a topic."""
+        """Return the number of subscribers of a topic."""
         found = len(self._subscribers.get(topic, ()))
         if not self._patterns:
             return found
@@ -58,29 +58,29 @@ class Roster:
             return found + sum(len(self._subscribers[each]) for each in self._matching(topic))
 
     def _matching(self, topic: str) -> list[str]:
-        """The other topics of subscribers that match this one. With the lock held."""
+        # Other topics than `topic`. Call with the lock held.
         return [each for each in self._patterns if each != topic and matches(each, topic)]
 
     @property
     def published(self) -> tuple[str, ...]:
-        """The topics that have publishers."""
+        """Topics with publishers."""
         with self._lock:
             return tuple(each for each in self._publishers if service_of(each) is None)
 
     @property
     def served(self) -> tuple[str, ...]:
-        """The services that have servers."""
+        """Services with servers."""
         with self._lock:
             return tuple(name for each in self._publishers if (name := service_of(each)) is not None)
 
     def servers_of(self, service: str) -> tuple[str, ...]:
-        """Where the servers of a service answer, those that are there for longest first."""
+        """Return the keys of a service's servers, oldest first."""
         with self._lock:
             there = self._publishers.get(topic_of(service), {}).values()
             return tuple(sorted(record.endpoints[0] for _node_id, record in there if record.endpoints))
 
     def subscribers_of(self, topic: str) -> tuple[Expected, ...]:
-        """Those that hear a topic."""
+        """Return the subscribers of a topic."""
         with self._lock:
             there = [
                 found
@@ -90,20 +90,20 @@ class Roster:
             return tuple(Expected(each.id, node_id, self._name(node_id)) for node_id, each in there)
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
-        """Those on a topic."""
+        """Return the publishers of a topic."""
         with self._lock:
             there = self._publishers.get(topic, {}).values()
             return tuple(RemotePublisher(each, node_id, self._name(node_id)) for node_id, each in there)
 
     def remote(self, node_id: str, record: PublisherRecord) -> RemotePublisher:
-        """A publisher with its node's name."""
+        """Return a publisher's record with the name of its node."""
         with self._lock:
             return RemotePublisher(record, node_id, self._name(node_id))
 
     def members(
         self,
     ) -> list[tuple[NodeRecord, tuple[PublisherRecord, ...], tuple[SubscriberRecord, ...]]]:
-        """All nodes with what they have."""
+        """Return all nodes with their publishers and subscribers."""
         with self._lock:
             publishers = _by_node(self._publishers)
             subscribers = _by_node(self._subscribers)
@@ -120,7 +120,7 @@ class Roster:
 def _note(
     table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_there: bool
 ) -> int:
-    """Put it in or take it out; how many more there are."""
+    # Returns the change of the number of entries.
     record = alive[1]
     there = table.setdefault(record.topic, {})
     before = len(there)

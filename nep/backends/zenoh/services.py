@@ -1,7 +1,7 @@
-"""Servers and clients of zenoh: a server is a queryable, a call a question to it, the answer its reply.
+"""Servers and clients over zenoh: a server is a queryable, a call a query, its reply the query's reply.
 
-Payloads travel as they are, beside them as attachment the header of `nep.protocol.service_wire`. A question
-whose server ends is ended by zenoh without a reply: so the client knows that it is lost.
+Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. Zenoh finishes a query
+without a reply when its server ends, so the client knows that the call is lost.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ __all__ = ["ZenohClient", "ZenohServer"]
 
 _logger = logging.getLogger("nep")
 _LATE_S = 30.0
-"""So long after its time an answer is still heard, and counted as late."""
+"""Time in seconds after the timeout in which a reply is still counted as late."""
 _LONGEST_S = 1e9
 _GONE_S = 0.5
-"""That a server is gone is heard so long after its calls have ended, at most."""
+"""Maximum time in seconds between the end of a server's calls and the removal of its token."""
 
 Then = Callable[[Outcome], None]
 
 
 class ZenohServer:
-    """A server: its queryable, its queue, and the questions that have no answer yet."""
+    """Server with its queryable, call queue and unanswered queries."""
 
     def __init__(
         self, session: ZenohSession, spec: ServerSpec, on_close: Callable[[ZenohServer], object]
@@ -80,8 +80,8 @@ class ZenohServer:
         session.check(self.record)
         self._queryable: Any = session.answering(self._key, self._asked)
 
-    def _asked(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads: somebody calls."""
+    def _asked(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        # Runs in a zenoh thread.
         data: bytes = b"" if query.payload is None else query.payload.to_bytes()
         beside: bytes = b"" if query.attachment is None else query.attachment.to_bytes()
         try:
@@ -109,7 +109,7 @@ class ZenohServer:
         if not self.calls.put(incoming):
             incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh's
+    def _answer(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh is not typed
         self.tally.add(reply)
         with self._lock:
             if query not in self._queries:
@@ -125,32 +125,32 @@ class ZenohServer:
         return True
 
     def counts(self) -> PublisherCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister, and refuse the calls that wait and those that still come."""
+        """Unregister; reject queued and new calls."""
         self._session.forget_service(self)
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
-    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - answers go out with what follows them
-        """The same, and end: who waits still is told that it has ended."""
+    def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies are flushed by the session
+        """Close the server; calls without a reply end."""
         self.begin_close()
         with self._lock:
             if self.is_closed:
                 return
             self.is_closed = True
             left, self._queries = tuple(self._queries), set()
-        with suppress(library().ZError):  # the session was closed, and took it along
+        with suppress(library().ZError):  # closing the session has undeclared it
             self._queryable.undeclare()
         for query in left:
             query.drop()
         self._on_close(self)
 
     def forked(self) -> None:
-        """In a child. See `ServerTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         for query in self._queries:
             keep_for_ever(query)
@@ -160,11 +160,8 @@ class ZenohServer:
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way, sent to the server at `key`; "": it waits for one.
-
-    `over_at`: zenoh has said that nothing comes any more; until then it is seen whether the server is gone.
-    """
-
+    # Call in flight at the server `key`; "" while there is none. `over_at`: deadline for the removal of the
+    # server's token after zenoh has finished the query.
     number: int
     data: bytes | memoryview
     timeout_s: float | None
@@ -179,7 +176,7 @@ class _Call:
 
 
 class ZenohClient(ClientCalls[_Call]):
-    """A client, or a surveyor: its calls that are under way."""
+    """Client or surveyor with its calls in flight."""
 
     def __init__(
         self,
@@ -204,23 +201,23 @@ class ZenohClient(ClientCalls[_Call]):
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a server."""
+        """True if the service has a server."""
         return not self.is_closed and bool(self._servers)
 
     @property
     def respondents(self) -> int:
-        """How many servers there are now."""
+        """Number of servers of the service."""
         return len(self._servers)
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         call = self._added(data, timeout_s, then)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
         return call
 
     def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
-        """Call each server. See `SurveyTransport.begin_all`."""
+        """Send a call to each server. See `SurveyTransport.begin_all`."""
         calls: list[OpenCall] = []
         try:
             for key in self._servers:
@@ -245,14 +242,14 @@ class ZenohClient(ClientCalls[_Call]):
         return call
 
     def _send(self, call: _Call, key: str) -> None:
-        """Ask the server at `key`, unless somebody has asked one already. Without the lock."""
+        # Call without the lock. Does nothing if the call was already sent.
         with self._lock:
             if not key or call.key or call.number not in self._calls:
                 return
             call.key = key
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
-        call.data = b""  # it is heard for a while after its time
+        call.data = b""  # the query outlives its timeout: free the payload
         heard_s = _LONGEST_S if limit_s is None else min(_LONGEST_S, limit_s + _LATE_S)
         try:
             self._session.call(
@@ -262,10 +259,10 @@ class ZenohClient(ClientCalls[_Call]):
             _logger.debug("a call of '%s' could not be sent: %s", self.spec.service, error)
             self._end(call, self._closed_error())
 
-    def _replied(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads, or in the one that sends: the server answers."""
+    def _replied(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        # Runs in a zenoh thread, or in the one that sends.
         if reply.ok is None:
-            return  # zenoh's own word, such as of a time that is over
+            return  # an error of zenoh, such as a timeout
         sample = reply.ok
         beside = b"" if sample.attachment is None else sample.attachment.to_bytes()
         try:
@@ -282,7 +279,7 @@ class ZenohClient(ClientCalls[_Call]):
                 self.late += 1
 
     def _over(self, call: _Call) -> None:
-        """Nothing comes any more: unless it has answered, the server has ended, or never got the call."""
+        # The query is finished: without a reply the server has ended, or never received the call.
         if call.key not in self._servers:
             self._end(call, ServerGoneError(self.spec.service))
             return
@@ -290,7 +287,7 @@ class ZenohClient(ClientCalls[_Call]):
         self._deadlines.add(call.over_at)
 
     def _end_unanswered(self, call: _Call, now: float) -> None:
-        """A call of which zenoh has said that nothing comes any more."""
+        # For calls whose query is finished without a reply.
         if call.key not in self._servers:
             self._end(call, ServerGoneError(self.spec.service))
         elif call.over_at <= now:
@@ -301,7 +298,7 @@ class ZenohClient(ClientCalls[_Call]):
             self._end(call, NepError(reason.format(service=self.spec.service, key=call.key)))
 
     def _end(self, call: _Call, outcome: Outcome) -> bool:
-        """Tell who waits; False when nobody does."""
+        # Returns False if the call is no longer in flight.
         with self._lock:
             if not self._take(call):
                 return False
@@ -311,18 +308,18 @@ class ZenohClient(ClientCalls[_Call]):
         return True
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """Nobody waits for these any more."""
+        """Cancel these calls."""
         for call in calls:
             self.forget(call)
 
     # ---- events
 
     def servers_changed(self) -> None:
-        """A server came or went: the thread of deadlines sends what waits."""
+        """Process a change of the servers: the timeout thread sends waiting calls."""
         self._deadlines.add(0.0)
 
     def expire(self, now: float) -> float:
-        """Send what waited for a server, and end what waited too long; when to do so again."""
+        """Send waiting calls and fail expired ones; return the next deadline."""
         key = next(iter(self._servers), "")
         with self._lock:
             waiting = [each for each in self._calls.values() if not each.key and each.deadline > now]
@@ -341,18 +338,18 @@ class ZenohClient(ClientCalls[_Call]):
             dues = [min(each.deadline, each.over_at) for each in self._calls.values()]
         return min(dues, default=math.inf)
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
-        """The services that have a server now."""
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+        """Return the names of services that have a server."""
         return tuple(sorted(self._session.roster.served))
 
     def counts(self) -> SubscriberCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
 
     # ---- closing
 
     def close(self) -> None:
-        """Unregister; calls that are under way end."""
+        """Unregister; calls in flight fail with `ClosedError`."""
         with self._lock:
             if self.is_closed:
                 return

@@ -1,4 +1,4 @@
-"""ZenohSession: one node's session at one place: who is there, what it has, and questions to others."""
+"""ZenohSession: one node's session at one place: discovery, registrations and requests."""
 
 from __future__ import annotations
 
@@ -55,34 +55,34 @@ __all__ = ["Inquiry", "ListedClient", "ListedServer", "ZenohSession"]
 
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
-"""Zenoh says itself that the time of a question is over; should it not, nobody waits much longer."""
+"""Extra time in seconds before a query times out here; normally zenoh reports the timeout."""
 _GREETING_S = 10.0
 _REPLIES_MOST, _LISTS_MOST = 100, 20_000
 
 
 class ListedServer(Protocol):
-    """A server, as others may see it."""
+    """Server as the session lists it."""
 
     record: PublisherRecord
 
     def counts(self) -> PublisherCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
 
 
 class ListedClient(Protocol):
-    """A client, as others may see it."""
+    """Client as the session lists it."""
 
     record: SubscriberRecord
 
     def counts(self) -> SubscriberCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
 
     def servers_changed(self) -> None:
-        """A server of its service came or went. In one of zenoh's threads: it does not wait."""
+        """Process a change of the service's servers. Runs in a zenoh thread; must not block."""
 
 
 class Inquiry:
-    """A question that was asked: who answered, and whether all have that could."""
+    """Pending query: replies so far, and whether all have replied."""
 
     def __init__(self, timeout_s: float, on_over: Callable[[], None] | None = None) -> None:
         self._on_over = on_over
@@ -91,15 +91,15 @@ class Inquiry:
         self._is_over = False
         self._changed = threading.Condition()
 
-    def answered(self, reply: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads."""
+    def answered(self, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        """Add a reply. Runs in a zenoh thread."""
         if reply.ok is not None:
             with self._changed:
                 self.answers[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
                 self._changed.notify_all()
 
     def over(self) -> None:
-        """All have answered, or the time is over."""
+        """Finish the query: all have replied, or the timeout has passed."""
         with self._changed:
             self._is_over = True
             self._changed.notify_all()
@@ -107,7 +107,7 @@ class Inquiry:
             self._on_over()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
-        """Wait for those that are `wanted`, or for all; the keys of those that did not answer."""
+        """Wait for the replies of `wanted`, or of all; return the keys without a reply."""
         ends_at = self._ends_at if deadline is None else min(deadline, self._ends_at)
         with self._changed:
             wait_until(
@@ -119,7 +119,7 @@ class Inquiry:
 
 
 class ZenohSession:
-    """Opens a session at `place`. Raises `NepError` when none can be had there within `wait_s`."""
+    """Session at `place`. Raises `NepError` if it can't be opened within `wait_s` seconds."""
 
     def __init__(self, node: NodeRecord, place: str, wait_s: float | None) -> None:
         self.node = node
@@ -157,11 +157,20 @@ class ZenohSession:
         over: Callable[[], None] | None = None,
         is_last: bool = False,
     ) -> Inquiry:
-        """Ask all that answer at `key`. With `is_last` it comes behind all that was published before."""
+        """Query all nodes that reply at `key`; doesn't wait.
+
+        Args:
+            key: Key expression.
+            request: Request in the payload, or None.
+            timeout_s: Seconds until the query is finished.
+            take: Called with each reply, in a zenoh thread.
+            over: Called when the query is finished.
+            is_last: True to send it behind all messages published before.
+        """
         zenoh = library()
         question = Inquiry(timeout_s, over)
 
-        def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh's
+        def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             if take is not None and reply.ok is not None:
                 take(reply.ok)
             question.answered(reply)
@@ -179,7 +188,10 @@ class ZenohSession:
         return question
 
     def meet_all(self, timeout_s: float) -> Mapping[str, bytes]:
-        """Go to every node and back; what each declared before is known here then, and the reverse."""
+        """Query every node and wait; return the replies.
+
+        Afterwards all earlier declarations are known on both sides.
+        """
         if self._opened.meeting is None:
             self._ask_routers(timeout_s)
         question = self.ask(ALL_CALLS, requests.Ping(), timeout_s)
@@ -187,15 +199,15 @@ class ZenohSession:
         return question.answers
 
     def _ask_routers(self, timeout_s: float) -> None:
-        """Go to the routers and back: they have told by then who can be asked."""
+        # The reply of the routers follows the declarations of all reachable nodes.
         question = Inquiry(timeout_s)
         self._zenoh.liveliness().get(
             node_key(self.node), callback(question.answered, question.over), timeout=max(timeout_s, 0.001)
         )
         question.wait()
 
-    def _called(self, query: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads: somebody asks this node."""
+    def _called(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        # Runs in a zenoh thread.
         asked = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
         answer = b""
         if isinstance(asked, requests.Look):
@@ -207,7 +219,7 @@ class ZenohSession:
             query.reply(call_key(self.node.id), answer)
 
     def _presented(self) -> tuple[Request, ...]:
-        """This node as it registers and renews; nothing as long as it has nothing."""
+        # This node's registration and statistics; empty while it has nothing.
         with self._lock:
             publishers, subscribers = self._publishers, self._subscribers
             servers, clients = self._servers, self._clients
@@ -243,7 +255,7 @@ class ZenohSession:
         return (join, renewal, *missing)
 
     def _own_record(self) -> NodeRecord:
-        """This node without its key, which proves its id to masters and is nobody else's to know."""
+        # Without the node's key, which proves its id to masters and must stay secret.
         node = self.node
         return NodeRecord(
             node.id, node.name, node.host, node.pid, node.language, node.generation, node.since_ns
@@ -251,8 +263,8 @@ class ZenohSession:
 
     # ---- discovery
 
-    def _noticed(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
-        """In one of zenoh's threads: a token came or went."""
+    def _noticed(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        # Runs in a zenoh thread.
         alive = parse_live(str(sample.key_expr))
         if alive is None:
             return
@@ -275,7 +287,7 @@ class ZenohSession:
                     subscriber.lapsed(record.id)
 
     def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
-        """A publisher came after its subscriber: where its counting begins, and what it has latched."""
+        # Greets a publisher that came after its subscriber.
         self.ask(
             hello_key(record.topic, record.id),
             None,
@@ -285,9 +297,9 @@ class ZenohSession:
         )
 
     def look(self, timeout_s: float) -> GraphView:
-        """Everybody's records and figures of this moment; of who does not answer in time only that it is.
+        """Return the graph; nodes that don't reply in time are listed without statistics.
 
-        Raises `NepError` while the router is away.
+        Raises `NepError` while the router is disconnected.
         """
         if self._opened.is_cut_off:
             raise NepError(
@@ -313,32 +325,32 @@ class ZenohSession:
     # ---- publishers and subscribers
 
     def check(self, record: PublisherRecord | SubscriberRecord) -> None:
-        """Raises `RequestRefusedError` for what a master would refuse."""
+        """Raise `RequestRefusedError` for a record that a master would reject."""
         try:
             check_record(record)
         except WireError as error:
             raise RequestRefusedError(error.reason) from error
 
     def join(self) -> None:
-        """Let others see this node."""
+        """Announce this node."""
         with self._lock:
             if self.node.id not in self._tokens:
                 self._tokens[self.node.id] = self._declare(node_key(self.node))
 
-    def _declare(self, key: str) -> Any:  # noqa: ANN401 - zenoh's
+    def _declare(self, key: str) -> Any:  # noqa: ANN401 - zenoh is not typed
         return self._zenoh.liveliness().declare_token(key)
 
     def add_publisher(self, publisher: ZenohPublisher) -> None:
-        """It is there: others may see it."""
+        """Announce a publisher."""
         with self._lock:
             self._publishers = (*self._publishers, publisher)
             self._tokens[publisher] = self._declare(publisher_key(self.node.id, publisher.record))
 
     def add_subscriber(self, subscriber: ZenohSubscriber) -> None:
-        """It takes messages from now on, and others may see it."""
+        """Subscribe and announce a subscriber."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
-        for remote in self._publishers_for(subscriber):  # what comes before they are greeted waits
+        for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
             subscriber.met(remote)
         key = data_keys(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
@@ -347,7 +359,7 @@ class ZenohSession:
             self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
 
     def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
-        """Ask all publishers of its topic what they have latched, and where its counting begins."""
+        """Greet all publishers of a subscriber's topic, which reply with their history and last number."""
         there = self._publishers_for(subscriber)
         for remote in there:
             subscriber.met(remote)
@@ -366,11 +378,11 @@ class ZenohSession:
         )
 
     def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
-        """One that is made with zenoh's session."""
+        """Create a publisher with zenoh's session."""
         return make(self._zenoh)
 
     def forget(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
-        """It is closed: nobody sees it any more."""
+        """Withdraw a closed publisher or subscriber."""
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not closed)
             self._subscribers = tuple(each for each in self._subscribers if each is not closed)
@@ -379,35 +391,35 @@ class ZenohSession:
                 undeclared.append(self._outputs.pop(closed.spec.id, None))
         for each in undeclared:
             if each is not None:
-                with suppress(library().ZError):  # the session was closed, and took it along
+                with suppress(library().ZError):  # closing the session has undeclared it
                     each.undeclare()
 
     # ---- servers and clients
 
     def add_server(self, server: ListedServer) -> None:
-        """It answers from now on, and others may see it."""
+        """Announce a server."""
         with self._lock:
             self._servers = (*self._servers, server)
             self._tokens[server] = self._declare(server_key(self.node.id, server.record))
 
     def add_client(self, client: ListedClient) -> None:
-        """It hears of servers from now on, and others may see it."""
+        """Announce a client."""
         with self._lock:
             self._clients = (*self._clients, client)
             self._tokens[client] = self._declare(client_key(self.node.id, client.record))
 
     def forget_service(self, closed: ListedServer | ListedClient) -> None:
-        """It is closed, or takes no calls any more: nobody sees it any more. May be called twice."""
+        """Withdraw a server or client (idempotent)."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
             token = self._tokens.pop(closed, None)
         if token is not None:
-            with suppress(library().ZError):  # the session was closed, and took it along
+            with suppress(library().ZError):  # closing the session has undeclared it
                 token.undeclare()
 
-    def answering(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh's
-        """A queryable."""
+    def answering(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
+        """Declare a queryable."""
         return self._zenoh.declare_queryable(key, callback(take))
 
     def call(
@@ -418,7 +430,7 @@ class ZenohSession:
         take: Callable[[Any], None],
         over: Callable[[], None],
     ) -> None:
-        """Send a call's header and payload to the server at `key`. Raises zenoh's `ZError`."""
+        """Send a call to the server at `key`. Raises zenoh's `ZError`."""
         zenoh = library()
         header, data = (each if isinstance(each, bytes) else bytes(each) for each in parts)
         self._zenoh.get(
@@ -435,7 +447,7 @@ class ZenohSession:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Take all off the network, tell everybody, and close."""
+        """Withdraw all tokens, wait until other nodes know, and close the session."""
         self._opened.leave()
         with self._lock:
             tokens = list(self._tokens.values())
@@ -443,12 +455,12 @@ class ZenohSession:
         for token in tokens:
             token.undeclare()
         if tokens and timeout_s > 0.0:
-            self.meet_all(timeout_s)  # who looks at the graph after this does not see this node any more
+            self.meet_all(timeout_s)  # a graph queried after this doesn't contain this node any more
         close_session(self._zenoh)
 
 
 def _requests_in(key: str, answer: bytes) -> tuple[Request, ...]:
-    """What a node tells of itself; nothing of what is not understood, or tells of another node."""
+    # Ignores malformed requests and those about other nodes.
     try:
         bodies = unpack_bounded(answer, _REPLIES_MOST, _LISTS_MOST) if answer else []
     except ValueError:

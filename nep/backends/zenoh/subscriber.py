@@ -1,4 +1,4 @@
-"""ZenohSubscriber: what zenoh calls with each message, and the inbox that keeps it for a reader."""
+"""ZenohSubscriber: receives messages from zenoh and queues them for a reader."""
 
 from __future__ import annotations
 
@@ -29,19 +29,20 @@ __all__ = ["ZenohSubscriber"]
 _logger = logging.getLogger("nep")
 _EARS_MAX = 10_000
 _BATCH_BYTES = 64 * 2**20
-"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
+"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
+"""
 
 
 class _Ear(NamedTuple):
-    """What hears one topic: the first part of its messages, and of those for this subscriber alone."""
-
+    # Parser for one topic. `topic` and `own` are the first parts of messages to all, and to this subscriber
+    # alone.
     topic: bytes
     own: bytes
     parser: CarefulParser
 
 
 class ZenohSubscriber(WakingSubscriber):
-    """A subscriber: its inbox, or its sink. `on_close` takes it off the network, once and without a lock."""
+    """Subscriber with an inbox or a sink. `on_close` unregisters it; called once, without a lock."""
 
     def __init__(
         self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
@@ -60,7 +61,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._problem = ""
         self._ear = self._new_ear(spec.topic)
         self._ears: OrderedDict[str, _Ear] = OrderedDict()
-        """With wildcards: those of topics that were heard, the one that was heard last at the end."""
+        """Parsers of recently received topics (with wildcards), most recent last."""
 
     def _new_ear(self, topic: str) -> _Ear:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
@@ -69,11 +70,11 @@ class ZenohSubscriber(WakingSubscriber):
         return _Ear(topic_part(topic), own, parser)
 
     def hears(self, topic: str) -> bool:
-        """Whether messages of this topic are for it."""
+        """Return True if the subscriber receives messages of this topic."""
         return topic == self.spec.topic or (self.spec.is_pattern and matches(self.spec.topic, topic))
 
-    def _ear_of(self, sample: Any) -> _Ear | None:  # noqa: ANN401 - zenoh's
-        """What hears the topic of a sample; None when that does not match, which zenoh cannot see."""
+    def _ear_of(self, sample: Any) -> _Ear | None:  # noqa: ANN401 - zenoh is not typed
+        # Returns None if the topic doesn't match: zenoh's key expression is wider than the pattern.
         if not self.spec.is_pattern:
             return self._ear
         topic = topic_of(str(sample.key_expr))
@@ -89,69 +90,69 @@ class ZenohSubscriber(WakingSubscriber):
     # ---- reading
 
     def poll(self) -> Message | None:
-        """The next message if one is there."""
+        """Return the next message, or None."""
         with self._inboxes.changed:
             return None if self.is_closed else self._inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message, waited for."""
+        """Return the next message; wait up to `timeout_s` seconds."""
         self._inboxes.wait((self,), timeout_s)
         return self.poll()
 
     @property
     def has_input(self) -> bool:
-        """See `WakingSubscriber.has_input`."""
+        """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self._inbox) > 0
 
     @property
     def sink(self) -> Sink | None:
-        """Where its messages go."""
+        """Callback for its messages."""
         return self.spec.sink
 
     def take_batch(self) -> list[Message]:
-        """What a sink gets at once."""
+        """Return the messages for one call of the sink."""
         with self._inboxes.changed:
             return self._inbox.take_all(_BATCH_BYTES)
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
         return self._sources.received
 
     @property
     def lost(self) -> int:
-        """Messages that did not arrive, or were dropped here for lack of room."""
+        """Number of messages lost or dropped here for lack of room."""
         return self._sources.lost
 
     @property
     def refused(self) -> int:
-        """What came and was no message at all."""
+        """Number of inputs rejected because they aren't valid messages."""
         return self._refusals.count
 
     def report(self, problem: str) -> None:
-        """The reader's trouble with a message, for who looks at the graph."""
+        """Set the reader's problem, which the graph shows."""
         self._problem = problem
 
     def counts(self) -> SubscriberCount:
-        """The figures for who looks at the graph."""
+        """Return the statistics for the graph."""
         problem = self._problem or self._refusals.told()
         return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
 
-    def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
-        """A message on the topic."""
+    def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        """Process a message of the topic."""
         ear = self._ear_of(sample)
         if ear is not None:
             self._take(sample, ear, ear.topic)
 
-    def told(self, sample: Any) -> None:  # noqa: ANN401 - zenoh's
-        """What a publisher answers to a hello: what is latched, or the number of its last message."""
+    def told(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        """Process a publisher's reply to a hello: a message of the history, or the number of the last one."""
         ear = self._ear_of(sample)
         if ear is not None:
             self._take(sample, ear, ear.own)
 
-    def _take(self, sample: Any, ear: _Ear, first: bytes) -> None:  # noqa: ANN401 - zenoh's
+    def _take(self, sample: Any, ear: _Ear, first: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
         payload: bytes = sample.payload.to_bytes()
         beside: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
         rest = [beside[:HEADER_BYTES]]
@@ -164,14 +165,14 @@ class ZenohSubscriber(WakingSubscriber):
                 self._take_parts(ear, first, rest)
 
     def _take_parts(self, ear: _Ear, first: bytes, rest: list[bytes]) -> None:
-        """With the lock of the inboxes held."""
+        # Call with the lock of the inboxes held.
         try:
             if not rest[0]:
                 raise WireError(_("it has no header; a program of another kind published it"), len(rest[-1]))
             if first == ear.topic and _is_latched(rest[0]) and self._is_early(ear, rest):
                 return
             self._hear(ear.parser.parse(first, rest))
-            if first == ear.own and len(rest) == 1:  # the end of an answer
+            if first == ear.own and len(rest) == 1:  # end of the reply to a hello
                 self._take_early(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
@@ -180,7 +181,7 @@ class ZenohSubscriber(WakingSubscriber):
     def _is_early(self, ear: _Ear, rest: list[bytes]) -> bool:
         header = read_header(rest[0])
         is_early = self._early.keep(header, (ear, rest), sum(map(len, rest)))
-        if not is_early:  # nor does any before it wait any longer
+        if not is_early:  # messages queued before it need not wait either
             self._take_early(header.publisher)
         return is_early
 
@@ -194,20 +195,20 @@ class ZenohSubscriber(WakingSubscriber):
             self._hear(ear.parser.parse(ear.topic, rest))
 
     def greeted(self, publishers: Iterable[int]) -> None:
-        """Who of these has not answered a hello by now is not waited for."""
+        """Stop waiting for these publishers' replies to a hello."""
         with self._inboxes.changed:
             for publisher in publishers:
                 self._take_early(publisher)
 
     def met(self, remote: RemotePublisher) -> None:
-        """A publisher is there."""
+        """Add a publisher."""
         with self._inboxes.changed:
             for old in self._sources.replaced_by(remote):
                 self._sources.pop(old)
             self._sources.listed(remote).is_lapsed = False
 
     def lapsed(self, publisher: int) -> None:
-        """A publisher is not there any more; it is remembered, for it may only be out of reach."""
+        """Mark a publisher as silent; it is kept, because it may only be unreachable."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
@@ -216,7 +217,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._sources.pop(each)
 
     def bye(self, publisher: int, last_seq: int) -> None:
-        """A publisher closes; nothing comes after its message `last_seq`."""
+        """Process a publisher's bye; its last message was `last_seq`."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
@@ -230,7 +231,7 @@ class ZenohSubscriber(WakingSubscriber):
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
         with self._inboxes.changed:
             if self.is_closed:
                 return
@@ -241,7 +242,7 @@ class ZenohSubscriber(WakingSubscriber):
         self._on_close(self)
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
 
 

@@ -1,4 +1,4 @@
-"""The back end `zenoh`: one session for each node and place; no master."""
+"""Transport of the back end `zenoh`: one session per node and place, no master."""
 
 from __future__ import annotations
 
@@ -36,15 +36,14 @@ _FLUSH_MOST_S = 60.0
 
 @dataclass
 class _Farewell:
-    """A publisher that closes: what it asked of its subscribers' nodes."""
-
+    # Closing publisher with its flush request to the subscribers' nodes.
     session: ZenohSession
     question: Inquiry
     expected: tuple[Expected, ...]
 
 
 class ZenohTransport:
-    """One node's way to the others. Raises `BackendUnavailableError` where zenoh is not installed."""
+    """Connection of one node. Raises `BackendUnavailableError` if zenoh is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         library()
@@ -64,14 +63,14 @@ class ZenohTransport:
     # ---- publishers and subscribers
 
     def publisher(self, spec: PublisherSpec) -> ZenohPublisher:
-        """A new publisher. See `Transport.publisher`."""
+        """Create a publisher. See `Transport.publisher`."""
         with self._unless_closed():
             return self._publisher(spec)
 
     def _publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         session = self._session(spec.configuration, spec.wait_s)
 
-        def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh's
+        def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh is not typed
             return ZenohPublisher(
                 zenoh_session, spec, session.roster.count_subscribers, self._close_publisher
             )
@@ -87,13 +86,13 @@ class ZenohTransport:
             missing = [each for each in expected if call_key(each.node_id) not in answered]
             publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
             publisher.missing_ids = tuple(each.id for each in missing)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             publisher.close(0.0)
             raise
         return publisher
 
     def subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
-        """A new subscriber. See `Transport.subscriber`."""
+        """Create a subscriber. See `Transport.subscriber`."""
         with self._unless_closed():
             return self._subscriber(spec)
 
@@ -115,22 +114,22 @@ class ZenohTransport:
         return subscriber
 
     def server(self, spec: ServerSpec) -> ZenohServer:
-        """A new server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.server`."""
         with self._unless_closed():
             return self._services.server(spec)
 
     def client(self, spec: ClientSpec) -> ZenohClient:
-        """A new client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.client`."""
         with self._unless_closed():
             return self._services.client(spec)
 
     def survey(self, spec: ClientSpec) -> ZenohClient:
-        """A new surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.survey`."""
         return self.client(spec)
 
     @contextmanager
     def _unless_closed(self) -> Iterator[None]:
-        """What zenoh raises when the node was closed meanwhile becomes `ClosedError`."""
+        # Converts errors of zenoh to `ClosedError` if the node was closed meanwhile.
         try:
             yield
         except library().ZError as error:
@@ -146,7 +145,7 @@ class ZenohTransport:
             table[made] = session
 
     def _check_open(self) -> None:
-        """With the lock held. Raises `ClosedError`."""
+        # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
 
@@ -158,7 +157,7 @@ class ZenohTransport:
                     "is needed, and master='tcp/192.168.1.5:7447' gives the node a router of another computer"
                 )
             )
-        with self._opening:  # the session of a place is opened once
+        with self._opening:  # open only one session per place
             with self._lock:
                 self._check_open()
                 session = self._sessions.get(configuration.master)
@@ -186,7 +185,7 @@ class ZenohTransport:
         self._finish(publisher, time.monotonic() + timeout_s)
 
     def _say_bye(self, publisher: ZenohPublisher) -> None:
-        """Nothing is published any more: ask the nodes that subscribe whether all has come."""
+        # Asks the subscribers' nodes to confirm that all messages have arrived; doesn't wait.
         with self._lock:
             session = self._publishers.get(publisher)
         if not publisher.end() or session is None:
@@ -199,7 +198,7 @@ class ZenohTransport:
                 self._farewells[publisher] = _Farewell(session, question, expected)
 
     def _finish(self, publisher: ZenohPublisher, deadline: float) -> None:
-        """Wait until all has come, until `deadline`; log what was not delivered, and to how many."""
+        # Waits for the confirmations until `deadline`; logs undelivered messages.
         with self._lock:
             farewell = self._farewells.pop(publisher, None)
             session = self._publishers.pop(publisher, None)
@@ -227,7 +226,7 @@ class ZenohTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         mine = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
         before = self._inboxes.wakes
         with woken_by(calls, self.wake) as is_empty:
@@ -235,18 +234,18 @@ class ZenohTransport:
                 self._inboxes.wait(mine, timeout_s, before)
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         self._inboxes.wake()
 
     # ---- graph and closing
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Who is there. See `Transport.graph`."""
+        """Return the current graph. See `Transport.graph`."""
         with self._unless_closed():
             return self._session(configuration, timeout_s).look(min(timeout_s, HANDSHAKE_S))
 
     def begin_close(self) -> None:
-        """Say that all ends here, and wait for nothing. See `Transport.begin_close`."""
+        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
@@ -257,7 +256,7 @@ class ZenohTransport:
             self._say_bye(publisher)
 
     def close(self, timeout_s: float) -> None:
-        """Close all. See `Transport.close`."""
+        """Close everything. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
@@ -277,7 +276,7 @@ class ZenohTransport:
             session.close(min(_LEAVE_S, timeout_s))
 
     def forked(self) -> None:
-        """In a child: its sockets are the parent's. See `nep.system.forks`."""
+        """Close the descriptors of the parent's sockets, see `nep.system.forks`."""
         for session in self._sessions.values():
             give_up(*session.endpoints)
         self._services.forked()
