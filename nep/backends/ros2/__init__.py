@@ -1,7 +1,8 @@
-"""The back end `ros2`: nodes that are nodes of ROS 2, by Cyclone DDS and rosbags alone.
+"""Back end `ros2`: nodes that are ROS 2 nodes, over Cyclone DDS and rosbags, without a ROS installation.
 
-`names`, `message_types`, `fields` and `type_mapping` say what is what, `participant` is this program in DDS,
-`publisher`, `subscriber`, `graph` and `transport` are the contract of `nep.backends.base`.
+`names`, `message_types`, `fields` and `type_mapping` convert names and values, `participant` is this
+program's presence in DDS, and `publisher`, `subscriber`, `graph` and `transport` implement
+`nep.backends.base`.
 """
 
 from nep.backends.base import Backend

@@ -1,4 +1,4 @@
-"""What the environment says: the domain, the release, who may be found; and Cyclone DDS's settings."""
+"""Settings from the environment: domain, release, discovery range, and the configuration of Cyclone DDS."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from nep.i18n import _
 __all__ = ["PARTICIPANTS_MAX", "configuration", "distribution", "domain", "is_loopback_only"]
 
 _DOMAINS = 233
-"""Ports of larger domains do not exist."""
+"""Number of domains; higher ones have no valid ports."""
 _EVERYWHERE = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
 _RANGES = frozenset({"", "OFF", "LOCALHOST", *_EVERYWHERE})
 PARTICIPANTS_MAX = 100
-"""So many programs of a computer may be in a domain, and are looked for where multicast does not work."""
+"""Maximum number of participants per computer in a domain, and of ports probed without multicast."""
 _PARTICIPANTS = PARTICIPANTS_MAX - 1
 _SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
-"""Large messages need few packets, 8 MB a seventh of the time."""
+"""Large packets: 8 MB take a seventh of the time."""
 _INTERNAL = (
     "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration></Internal>"
 )
-"""So much is on its way before publishing waits; whoever closes has waited already."""
+"""Amount of data in flight before publishing blocks. Closing doesn't linger, because nep has already waited.
+"""
 
 
 def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> str:
-    """The domain that a node is given as its `master`, else ROS_DOMAIN_ID, else "0". Raises `NepError`."""
+    """Return the domain for a node's `master`; the default is $ROS_DOMAIN_ID, then "0". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a domain of ROS 2 is a 'str' such as '5', not a '{kind}'").format(kind=type(master).__name__)
@@ -57,7 +58,7 @@ def _is_domain(said: str) -> bool:
 
 
 def distribution(environment: Mapping[str, str]) -> str:
-    """The release whose messages are spoken, in small letters: ROS_DISTRO, else "jazzy"."""
+    """Return the ROS 2 release in lower case: $ROS_DISTRO, or "jazzy"."""
     return environment.get("ROS_DISTRO", "").strip().lower() or "jazzy"
 
 
@@ -73,7 +74,7 @@ def _range(environment: Mapping[str, str]) -> str:
 
 
 def _reach(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
-    """Who may be met. Raises `NepError`."""
+    # Returns the discovery range. Raises `NepError`.
     local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _range(environment)
     if said == "OFF":
         return "nobody"
@@ -89,12 +90,12 @@ def _peers(environment: Mapping[str, str]) -> list[str]:
 
 
 def is_loopback_only(environment: Mapping[str, str]) -> bool:
-    """Whether only programs of this computer are met, or none. So it is unless it is said otherwise."""
+    """Return True if only programs of this computer, or none, are discovered. This is the default."""
     return _reach(environment) in {"nobody", "computer"}
 
 
 def configuration(environment: Mapping[str, str]) -> str | None:
-    """Settings for Cyclone DDS as XML; None when CYCLONEDDS_URI has the user's own."""
+    """Return the XML configuration for Cyclone DDS; None if $CYCLONEDDS_URI has the user's own."""
     if environment.get("CYCLONEDDS_URI"):
         return None
     reach = _reach(environment)

@@ -1,4 +1,4 @@
-"""Fields of ROS messages: maps become rosbags' objects and back, and what is wrong is told with its place."""
+"""Conversion between maps and rosbags' message objects, with validation that reports the field path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
 PLACEHOLDER = "structure_needs_at_least_one_member"
-"""What a message without fields has in DDS."""
+"""Member of an empty message in DDS."""
 _BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
 _RANGES = {
     **{name: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for name, bits in _BITS.items()},
@@ -35,16 +35,16 @@ _NUMBERS = {
 }
 _FLOATS = frozenset({"float32", "float64"})
 _LARGEST_FLOAT32 = 3.4028235677973366e38
-"""The first that rounds to infinity."""
+"""Smallest number that rounds to infinity."""
 _OCTETS = frozenset({"uint8", "byte"})
 
 
 @dataclass(frozen=True, slots=True)
 class RosField:
-    """A field: `kind` is the type of its value or its items.
+    """Field of a message; `kind` is the type of its value or of its items.
 
-    `length`: None for a single value, the count of an array, -1 for a sequence; `size` bounds it, 0 not at
-    all. `text_most` bounds each string.
+    `length` is None for a single value, the number of items of an array, and -1 for a sequence. `size` bounds
+    a sequence and `text_most` each string; 0 is unbounded.
     """
 
     name: str
@@ -56,7 +56,7 @@ class RosField:
 
 
 class RosFieldError(Exception):
-    """Why the value at `path` does not fit."""
+    """Error of the value at `path`."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
@@ -65,17 +65,17 @@ class RosFieldError(Exception):
 
 
 class Types(Protocol):
-    """Where definitions come from."""
+    """Registry of message definitions."""
 
     def fields(self, name: str) -> tuple[RosField, ...]:
-        """The fields of a type."""
+        """Return the fields of a type."""
 
-    def message_class(self, name: str) -> Any:  # noqa: ANN401 - rosbags makes it
-        """Its class."""
+    def message_class(self, name: str) -> Any:  # noqa: ANN401 - created by rosbags
+        """Return the class of a type."""
 
 
 def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
-    """Rosbags' description with `uint8` for `char`, and the same as `RosField`s."""
+    """Return rosbags' description with `char` as `uint8`, and the corresponding `RosField` objects."""
     plain = [(name, _without_char(each)) for name, each in entries]
     return plain, tuple(_field(name, each) for name, each in plain)
 
@@ -101,8 +101,8 @@ def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pair
 # ---- maps to messages
 
 
-def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - rosbags'
-    """The object of a type with these values; what is left out is zero. Raises `RosFieldError`."""
+def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - not typed
+    """Convert a map to a message object; missing fields are zero. Raises `RosFieldError`."""
     if not isinstance(payload, Mapping):
         raise (
             RosFieldError(
@@ -132,7 +132,7 @@ def _joined(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def _zero(types: Types, field: RosField) -> Any:  # noqa: ANN401 - what the field is
+def _zero(types: Types, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return to_message(types, field.kind, {})
@@ -146,7 +146,7 @@ def _zero(types: Types, field: RosField) -> Any:  # noqa: ANN401 - what the fiel
 _NUMBERS_ZERO: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
 
 
-def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - what the field is
+def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is not None:
         return _items(types, field, value, path)
     if field.is_message:
@@ -174,7 +174,7 @@ def _single(field: RosField, value: object, path: str) -> str | bool | int | flo
                 least=least, most=most, kind=field.kind
             ),
         )
-    return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags has it signed
+    return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags stores bytes as signed
 
 
 def _float(field: RosField, value: object, path: str) -> float:
@@ -238,7 +238,7 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
 
 
 def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
-    """Numbers as an array of the field's type, checked at once; item by item only to find what is wrong."""
+    # Validates the whole array at once; item by item only to find the path of an invalid one.
     np = _numpy()
     wanted = np.dtype(_NUMBERS[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
@@ -257,7 +257,7 @@ def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an 
 
 
 def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
-    """Whether all of them fit for sure."""
+    # False means that the items must be checked one by one.
     if found.dtype == wanted:
         return True
     if field.kind in _FLOATS:
@@ -274,7 +274,6 @@ def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - a
 
 
 def _plain(value: object) -> object:
-    """A scalar of numpy as Python's."""
     if isinstance(value, bool | int | float | str) or getattr(value, "shape", None) != ():
         return value
     return value.item() if hasattr(value, "item") else value
@@ -287,8 +286,8 @@ def _kind(value: object) -> str:
 # ---- messages to maps
 
 
-def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - rosbags'
-    """The fields of a message: maps, lists, `bytes`, numbers, texts."""
+def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - not typed
+    """Convert a message object to maps, lists, `bytes`, numbers and strings."""
     return {
         each.name: _plain_field(types, each, getattr(message, each.name))
         for each in types.fields(name)
@@ -296,7 +295,7 @@ def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  #
     }
 
 
-def _plain_field(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - what the field is
+def _plain_field(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return from_message(types, field.kind, value)
@@ -308,7 +307,7 @@ def _plain_field(types: Types, field: RosField, value: Any) -> object:  # noqa: 
     return value.tobytes() if field.kind in _OCTETS else value.tolist()
 
 
-def _numpy() -> Any:  # noqa: ANN401 - optional and heavy
-    import numpy as np  # noqa: PLC0415 - optional and heavy
+def _numpy() -> Any:  # noqa: ANN401 - the module numpy
+    import numpy as np  # noqa: PLC0415 - optional and slow to import
 
     return np

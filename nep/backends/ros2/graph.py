@@ -1,8 +1,8 @@
-"""The graph of a domain: what discovery has found, told as a master would tell it.
+"""Graph of a domain, built from DDS discovery.
 
-Nodes of this program are exact, with their counts and problems. Of others there are names, topics, types and
-who belongs to whom; nobody tells how much they send. What belongs to no node of ROS 2, such as a program
-with DDS alone, is listed as a node named after its participant.
+Nodes of this program are listed with statistics and problems. For others, DDS discovery provides names,
+topics, types and ownership, but no rates. Endpoints that belong to no ROS 2 node, such as those of plain DDS
+programs, are listed under a node named after their participant.
 """
 
 from __future__ import annotations
@@ -46,13 +46,12 @@ from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 __all__ = ["graph_of"]
 
 _MOST = 10_000
-"""So many writers and readers of others are shown."""
+"""Maximum number of foreign writers and readers shown."""
 
 
 @dataclass
 class _Names:
-    """How this program, or another one of nep, calls what has other names in DDS."""
-
+    # Names in nep of DDS topics and types, as used by this program or another nep program.
     topics: dict[str, str] = field(default_factory=dict)
     types: dict[tuple[str, str], str] = field(default_factory=dict)
     ids: set[int] = field(default_factory=set)
@@ -67,7 +66,7 @@ class _Names:
         return known or endpoint.told.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
-        """What it says, unless somebody else says it too."""
+        # The announced id, unless another endpoint announces the same.
         said = id_of(endpoint.gid, endpoint.told.get("nepid"))
         found = id_of(endpoint.gid, None) if said in self.ids else said
         self.ids.add(found)
@@ -75,7 +74,7 @@ class _Names:
 
 
 def graph_of(participant: Participant) -> GraphView:
-    """The graph as it is known now."""
+    """Return the current graph."""
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _Names()
     for local in participant.locals:
         _add_local(graph, local, names)
@@ -139,7 +138,7 @@ def _add_local(graph: Graph, local: Local, names: _Names) -> None:
 def _foreign(
     participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _Names
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
-    """Each writer and reader of others with its node; nodes that have none with None."""
+    # Yields foreign writers and readers with their node, and None for nodes without any.
     own = participant.gid
     alive = participant.participants() - {own}
     found = [(kind, each) for kind, each in all_found if each.participant != own]
@@ -174,7 +173,7 @@ def _stranger(gid: bytes) -> NodeRecord:
 def _add_foreign(
     graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint | None, names: _Names
 ) -> None:
-    """What a stranger tells and the graph refuses is left out."""
+    # Records that the graph rejects are skipped.
     if node.id not in graph.members:
         graph.apply(Join(node), 0, 0.0, node.id)
     if endpoint is None:
@@ -195,7 +194,7 @@ def _add_foreign(
 def _add_foreign_service(
     graph: Graph, node: NodeRecord, kind: str, endpoint: DdsEndpoint, topic: str, number: int
 ) -> None:
-    """Who reads requests serves, who writes them calls."""
+    # A reader of requests is a server, a writer of requests is a client.
     msg_type = service_type_of(endpoint.type) or SERVICE_TYPE
     if kind == "reader":
         server = PublisherRecord(number, topic, msg_type, SERVICE_TYPE, ("ros2",))
@@ -207,5 +206,5 @@ def _add_foreign_service(
 def _codec_of(msg_type: str) -> str:
     try:
         return mapping_for(msg_type).codec.name
-    except NepError:  # a type that is not known here
+    except NepError:  # unknown type
         return CDR if "/" in msg_type else codec_for(msg_type).name

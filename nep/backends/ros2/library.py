@@ -1,4 +1,4 @@
-"""The libraries cyclonedds and rosbags: found when the first node asks; told of forks, kept to loopback."""
+"""Access to cyclonedds and rosbags: loaded with the first node, unusable after a fork."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
 _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _DESCRIPTORS = "/proc/self/fd"
 _PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
-"""Where the ports of domain 0 begin, and how many each has, as DDS's wire protocol says."""
+"""Base port of domain 0, and ports per domain, as specified by the DDS wire protocol (RTPS)."""
 _inherited: set[str] = set()
-"""Whether this is a child that was forked: the threads of Cyclone DDS stayed behind."""
+"""Not empty in a forked child, where the threads of Cyclone DDS don't exist."""
 
 
 class Dds(NamedTuple):
-    """The modules of cyclonedds; it is not typed."""
+    """Modules of cyclonedds, which is not typed."""
 
     core: Any
     domain: Any
@@ -41,9 +41,11 @@ class Dds(NamedTuple):
 
 
 def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
-    """Cyclone DDS. Raises `BackendUnavailableError` where it is not installed or its library does not load.
+    """Return the modules of Cyclone DDS.
 
-    Raises `NepError` in a child that was forked from a program that uses it.
+    Raises:
+        BackendUnavailableError: cyclonedds is not installed or can't be loaded.
+        NepError: The process was forked from one that uses it.
     """
     if _inherited:
         raise NepError(
@@ -54,12 +56,12 @@ def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
         )
     try:
         return Dds(*(load(f"cyclonedds.{part}") for part in _PARTS))
-    except Exception as error:  # its loader raises a class of its own
+    except Exception as error:  # its loader raises its own exception class
         raise _unavailable() from error
 
 
 def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
-    """`rosbags.typesys`. Raises `BackendUnavailableError` where it is not installed."""
+    """Return `rosbags.typesys`. Raises `BackendUnavailableError` if it is not installed."""
     try:
         return load("rosbags.typesys")
     except (ImportError, OSError) as error:
@@ -76,9 +78,9 @@ def _unavailable() -> BackendUnavailableError:
 
 
 def keep_to_loopback(domain: int) -> None:
-    """Let this process's sockets of a domain hear loopback alone, where the system can do that (Linux).
+    """Restrict the receiving sockets of a domain to loopback. Linux only.
 
-    Cyclone DDS binds what it hears with to every address, whatever it is told.
+    Cyclone DDS always binds them to all addresses.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -95,22 +97,23 @@ def keep_to_loopback(domain: int) -> None:
             OSError,
             ValueError,
             TypeError,
-        ):  # gone, of another kind, or an old kernel forbids it
+        ):  # closed, another kind of descriptor, or not permitted by an old kernel
             continue
 
 
 def has_forked() -> bool:
-    """Whether nothing of DDS may be touched here."""
+    """Return True in a forked child, where DDS must not be used."""
     return bool(_inherited)
 
 
 def _forked() -> None:
-    """In a child: nothing of DDS may be deleted, not even when the interpreter ends: that would wait."""
+    # In a forked child no entity may be deleted, not even at exit: that would block.
     core = sys.modules.get("cyclonedds.core")
     if core is None:
         return
     _inherited.add("cyclonedds")
-    for entity in list(core.Entity._entities.values()):  # noqa: SLF001 - what is not there is not deleted
+    # keeps the finalizers from deleting anything
+    for entity in list(core.Entity._entities.values()):  # noqa: SLF001
         if isinstance(entity, core.WaitSet):
             entity.attached.clear()
     core.Entity._entities.clear()  # noqa: SLF001

@@ -1,8 +1,8 @@
-"""Matches: programs of nep tell each other which of their writers and readers have found which others.
+"""Matches: nep programs exchange which writers and readers they have matched.
 
-What a writer of DDS sends reaches a reader only when the reader's program has found the writer, too, and DDS
-has no word for that. So each program tells it on a topic that ROS 2 does not show: its participant's GUID,
-then pairs of GUIDs, one of its own and the one that was found.
+A DDS writer's messages reach a reader only after the reader's program has also discovered the writer, which
+DDS doesn't report to the writer. Each program therefore publishes its matches on a topic hidden from ROS 2:
+its participant's GUID, then pairs of GUIDs, an own endpoint and its match.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from nep.errors import DecodeError
 __all__ = ["GID_BYTES", "PREFIX_BYTES", "Matches", "matched_gids"]
 
 GID_BYTES, PREFIX_BYTES = 16, 12
-"""A GUID, and the part that all of a participant have in common."""
+"""Length of a GUID, and of the prefix shared by all GUIDs of a participant."""
 _TOPIC = "nep_matches"
 _TYPE = "std_msgs/msg/UInt8MultiArray"
 _MOST_PAIRS, _MOST_PARTICIPANTS = 100_000, 4096
 
 
 def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds is not typed
-    """The GUIDs of all that a writer or reader has found."""
+    """Return the GUIDs matched by a writer or reader."""
     if hasattr(entity, "get_matched_subscriptions"):
         handles, look = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
     else:
@@ -34,7 +34,7 @@ def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds 
 
 
 class Matches:
-    """See the module. Guarded by the lock of its participant."""
+    """Matches of all programs; see the module. Guarded by the participant's lock."""
 
     def __init__(self, library: Dds, types: MessageTypes, topics: DdsTopics, gid: bytes) -> None:
         self._types = types
@@ -53,19 +53,19 @@ class Matches:
         self.reader = topics.state_reader(_TOPIC, _TYPE)
 
     def follow(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """A writer or reader of this program is there."""
+        """Add a writer or reader of this program."""
         entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
         self._followed[entity.guid.bytes] = entity
         self._found[entity.guid.bytes] = frozenset()
 
     def forget(self, gid: bytes) -> None:
-        """It is closed."""
+        """Remove a closed writer or reader."""
         self._followed.pop(gid, None)
         self._found.pop(gid, None)
         self._has_news = True
 
     def look(self) -> None:
-        """Tell what has changed since the last look."""
+        """Publish the own matches if they have changed."""
         for gid, entity in self._followed.items():
             if entity.take_status():
                 found = matched_gids(entity)
@@ -84,7 +84,7 @@ class Matches:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
 
     def hear(self, cdr: bytes) -> None:
-        """Another program has told; what is none of it is left out."""
+        """Process the matches of another program; malformed data is ignored."""
         try:
             told = self._types.decode(_TYPE, cdr)
         except DecodeError:
@@ -107,13 +107,13 @@ class Matches:
         )
 
     def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
-        """Whether the other one's program has told that it has found ours."""
+        """Return True if the other program has reported a match of `other` with `own`."""
         return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
 
     def unready(self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]) -> set[bytes]:
-        """Those of `known` that no one of ours has found, or that tell (the third) and have not found it.
+        """Return the GUIDs in `known` that aren't matched on both sides.
 
-        Each is its GUID and that of its participant, and whether its program tells what it has found.
+        Each item of `known` is a GUID, the GUID of its participant, and True if its program reports matches.
         """
         found = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {

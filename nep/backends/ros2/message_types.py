@@ -1,7 +1,7 @@
-"""Types of ROS messages: which there are, and maps ↔ CDR. The definitions and the codec are rosbags'.
+"""ROS message types: definitions, and conversion between maps and CDR by rosbags.
 
-The types of common packages come with rosbags for each release of ROS 2; `MessageTypes.add` takes further
-ones from text in the form of a .msg file, `MessageTypes.add_folder` from such files.
+rosbags includes the common packages of each ROS 2 release. `MessageTypes.add` adds a type from the text of a
+.msg file, `MessageTypes.add_folder` from a folder of such files.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from nep.i18n import _
 __all__ = ["FOLDERS", "MessageTypes", "message_types"]
 
 FOLDERS = "NEP_ROS_MSG_PATH"
-"""The environment's variable with folders of .msg files."""
+"""Environment variable with folders of .msg files."""
 _LARGEST_FILE = 2**20
 _MOST_FILES = 10_000
 _WIDE = "wstring"
@@ -37,7 +37,7 @@ _GID = "rmw_dds_common/msg/Gid"
 
 
 class MessageTypes:
-    """The types of one release of ROS 2. Used from any thread."""
+    """Message types of one ROS 2 release. Thread-safe."""
 
     def __init__(self, release: str) -> None:
         rosbags = typesys()
@@ -58,7 +58,7 @@ class MessageTypes:
         self._read_definitions()
 
     def _read_definitions(self) -> None:
-        """Make `char` the `uint8` that it is: type hashes are of that."""
+        # `char` is replaced by `uint8`, which type hashes are computed from.
         for name, (constants, entries) in list(self._store.fielddefs.items()):
             if name not in self._fields:
                 plain, fields = read_definition(entries)
@@ -67,16 +67,16 @@ class MessageTypes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All types that are known, as "std_msgs/msg/String"."""
+        """Names of all known types, such as "std_msgs/msg/String"."""
         return tuple(sorted(name for name in self._fields if "/msg/" in name))
 
     @property
     def gid_bytes(self) -> int:
-        """How long the ids of writers and readers are in this release's `ros_discovery_info`."""
+        """Length of GUIDs in the `ros_discovery_info` of this release."""
         return self._fields[_GID][0].size if _GID in self._fields else 24
 
     def checked(self, msg_type: str) -> str:
-        """The whole name of a type in either form. Raises `NepError` for one that is not known."""
+        """Return the full name of a known type. Raises `NepError` for an unknown one."""
         name = type_name(msg_type)
         if name in self._left_out and name not in self._fields:
             raise self._left_out[name]
@@ -90,16 +90,16 @@ class MessageTypes:
         return name
 
     def fields(self, name: str) -> tuple[RosField, ...]:
-        """The fields of a type."""
+        """Return the fields of a type."""
         return self._fields[name]
 
     def type_hash(self, name: str) -> str:
-        """`RIHS01_…`, which ROS 2 tells of a type from Iron on."""
+        """Return the type hash (`RIHS01_…`), which ROS 2 announces since Iron."""
         with self._lock:
             return str(self._store.hash_rihs01(name))
 
     def encode(self, name: str, payload: object) -> bytes:
-        """A map of fields as CDR; fields that are left out are zero, empty or false. Raises `EncodeError`."""
+        """Encode a map as CDR; missing fields are zero, empty or False. Raises `EncodeError`."""
         kind = type(payload).__name__
         try:
             message = to_message(self, name, payload)
@@ -107,40 +107,41 @@ class MessageTypes:
                 return bytes(self._store.serialize_cdr(message, name))
         except RosFieldError as error:
             raise EncodeError(name, kind, error.reason, place=error.path or ".") from error
-        except Exception as error:  # a type that rosbags has no codec for, such as one with wide strings
+        except Exception as error:  # rosbags has no codec for some types, such as those with wide strings
             raise EncodeError(name, kind, str(error) or type(error).__name__) from error
 
     def decode(self, name: str, data: bytes | memoryview) -> object:
-        """CDR as a map of fields; arrays of `uint8` are `bytes`, others lists. Raises `DecodeError`."""
+        """Decode CDR to a map; arrays of `uint8` become `bytes`, others lists. Raises `DecodeError`."""
         try:
             with self._lock:
                 message = self._store.deserialize_cdr(data, name)
-        except Exception as error:  # they come from anybody
+        except Exception as error:  # the data is untrusted
             raise DecodeError(name, len(data), str(error) or type(error).__name__) from error
         return from_message(self, name, message)
 
-    def message_class(self, name: str) -> Any:  # noqa: ANN401 - rosbags makes it
-        """Rosbags' class of a type."""
+    def message_class(self, name: str) -> Any:  # noqa: ANN401 - created by rosbags
+        """Return rosbags' class of a type."""
         return self._store.types[name]
 
     def add(self, name: str, text: str) -> None:
-        """Make known a type such as "my_robot/msg/Arm" by the text of its .msg file.
+        """Add a type such as "my_robot/msg/Arm" from the text of its .msg file.
 
-        Raises `NepError` for a text that is none, uses types that are not known, or is another than before.
+        Raises `NepError` if the text is invalid, uses unknown types, or differs from a known type of this
+        name.
         """
         for wrong in self._add({type_name(name): text}).values():
             raise wrong
 
     def add_part(self, name: str, text: str) -> None:
-        """Make known the request or answer of a service, such as "std_srvs/srv/SetBool_Request".
+        """Add the request or response type of a service, such as "std_srvs/srv/SetBool_Request".
 
         Raises `NepError` as `add` does.
         """
         package, _srv, last = name.split("/")
-        alike = f"{package}/msg/{last}"  # so that the package's own messages are found
+        alike = f"{package}/msg/{last}"  # lets rosbags resolve the package's own messages
         try:
             found = self._rosbags.get_types_from_msg(text, alike)[alike]
-        except Exception as error:  # its parser raises classes of its own
+        except Exception as error:  # its parser raises its own exception classes
             raise NepError(
                 _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
             ) from error
@@ -160,10 +161,10 @@ class MessageTypes:
                 self._read_definitions()
 
     def add_folder(self, folder: Path) -> None:
-        """Make known all .msg files in a folder, each in its package's `msg`: `my_robot/msg/Arm.msg`.
+        """Add all .msg files in a folder, such as `my_robot/msg/Arm.msg`.
 
-        A file that lies otherwise belongs to the package that its folder is named after. What is wrong with
-        one is said when its type is asked for; raises as `add` when none is right.
+        The package of a file outside a `msg` folder is the name of its folder. Errors in a file are reported
+        when its type is used; raises as `add` does if no file is valid.
         """
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):
@@ -183,13 +184,13 @@ class MessageTypes:
         self._left_out.update(wrong)
 
     def _add(self, texts: Mapping[str, str]) -> dict[str, NepError]:
-        """Make known what can be; why the others cannot. Raises `NepError` for one that was another."""
+        # Returns the errors of invalid types. Raises `NepError` if a known type has changed.
         found: dict[str, Any] = {}
         wrong: dict[str, NepError] = {}
         for name, text in texts.items():
             try:
                 found.update(self._rosbags.get_types_from_msg(text, name))
-            except Exception as error:  # noqa: BLE001 - its parser raises classes of its own
+            except Exception as error:  # noqa: BLE001 - its parser raises its own exception classes
                 wrong[name] = NepError(
                     _("the definition of '{name}' cannot be read: {error}").format(name=name, error=error)
                 )
@@ -211,7 +212,7 @@ class MessageTypes:
         return wrong
 
     def _missing(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
-        """Those that use what neither they nor this has."""
+        # Types that use unknown types.
         wide = _("'{name}' has a wide string, '{field}', which 'ros2' cannot carry; use a string")
         unknown = _("'{name}' uses '{kind}' for its field '{field}', which is not known; add it, too")
         return {
@@ -242,7 +243,7 @@ _types_lock = threading.Lock()
 
 
 def message_types() -> MessageTypes:
-    """The types of the release in ROS_DISTRO, with those of the folders in NEP_ROS_MSG_PATH.
+    """Return the types of the release in $ROS_DISTRO, with those of the folders in $NEP_ROS_MSG_PATH.
 
     Raises `BackendUnavailableError`, and `NepError` as `MessageTypes.add_folder` does.
     """

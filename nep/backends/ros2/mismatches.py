@@ -1,6 +1,6 @@
-"""Mismatches: writers and readers of one topic that DDS does not let meet, as alerts in plain words.
+"""Alerts for writers and readers of one topic that DDS doesn't match because of type or QoS.
 
-DDS itself says nothing where people look: who asks for more than is offered hears nothing.
+DDS itself reports this only in the program's log, if at all.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from nep.protocol.graph_view import Alert
 __all__ = ["Party", "mismatches"]
 
 _NAMES = 3
-"""So many nodes are named in a sentence."""
+"""Maximum number of nodes named in an alert."""
 _MOST = 100
-"""So many of a topic's writers, and of its readers, are compared."""
+"""Maximum number of a topic's writers, and of its readers, that are compared."""
 
 
 @dataclass(frozen=True)
 class Party:
-    """A writer or reader, and the name of its node."""
+    """Writer or reader with the name of its node."""
 
     node: str
     endpoint: DdsEndpoint
 
 
 def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Iterator[Alert]:
-    """What keeps readers of a topic from hearing its writers."""
+    """Yield alerts for readers that can't receive from a writer of the topic."""
     readers, writers = tuple(_once(readers[:_MOST])), writers[:_MOST]
     kinds: tuple[tuple[Callable[[DdsEndpoint, DdsEndpoint], bool], Callable[..., Alert]], ...] = (
         (lambda writer, reader: writer.type != reader.type, _other_type),
@@ -47,7 +47,7 @@ def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -
 
 
 def _once(readers: Iterable[Party]) -> Iterator[Party]:
-    """Of the two readers that a subscriber of nep may have, the one that asks for less."""
+    # A subscriber of nep may have two readers; keep the one with the weaker requirements.
     known: dict[str, Party] = {}
     for each in readers:
         said = each.endpoint.told.get("nepid") or each.endpoint.gid.hex()

@@ -1,4 +1,4 @@
-"""Names of ROS 2 and of DDS: topics, types, and what is told in a USER_DATA."""
+"""Names in ROS 2 and DDS: topics, types, services, and entries of USER_DATA."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
 _PARAMETERS = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
-"""Those of a node whose id begins with a digit, which ROS 2 does not allow behind a "/"."""
+"""Parameter topics of nodes whose id starts with a digit, which ROS 2 doesn't allow after a "/"."""
 _ROS_PARAMETERS = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
 _SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
 _DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
@@ -38,7 +38,7 @@ _NO_NAME = re.compile(r"\W", re.ASCII)
 
 
 def dds_topic(topic: str) -> str:
-    """`rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError` for what ROS 2 has no name for."""
+    """Return the DDS topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
     found = _PARAMETERS.fullmatch(topic)
     if found is not None:
         topic = f"{found[1]}_{found[2]}"
@@ -54,23 +54,23 @@ def dds_topic(topic: str) -> str:
 
 
 def ros_topic(topic: str) -> str | None:
-    """`/chatter` for "rt/chatter"; None for a topic that is none of ROS 2."""
+    """Return the ROS topic: `/chatter` for "rt/chatter"; None for other DDS topics."""
     return _as_nep_has_it(topic[2:]) if topic.startswith("rt/") else None
 
 
 def _as_nep_has_it(name: str) -> str:
-    """The name of a node's parameters without the "_" of `dds_topic`'s; any other name as it is."""
+    # Removes the "_" that `dds_topic` inserts into parameter topics.
     found = _ROS_PARAMETERS.fullmatch(name)
     return name if found is None else f"{found[1]}{found[2]}"
 
 
 def is_type_name(msg_type: str) -> bool:
-    """Whether it is written as ROS writes types: "std_msgs/msg/String", "std_msgs/String"."""
+    """Return True for a ROS type name: "std_msgs/msg/String" or "std_msgs/String"."""
     return _TYPE.fullmatch(msg_type) is not None
 
 
 def type_name(msg_type: str) -> str:
-    """`std_msgs/msg/String` for both forms. Raises `NepError`."""
+    """Return the full name, `std_msgs/msg/String`, for both forms. Raises `NepError`."""
     found = _TYPE.fullmatch(msg_type)
     if found is None:
         raise NepError(
@@ -82,54 +82,57 @@ def type_name(msg_type: str) -> str:
 
 
 def dds_type(ros_type: str) -> str:
-    """`std_msgs::msg::dds_::String_`."""
+    """Return the DDS type, such as `std_msgs::msg::dds_::String_`."""
     package, kind, name = ros_type.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
 
 def dds_service(service: str) -> tuple[str, str]:
-    """`rq/addRequest` and `rr/addReply` for "add" and "/add". Raises `BadTopicError` as `dds_topic` does."""
+    """Return the DDS topics of a service: `rq/addRequest` and `rr/addReply` for "add" and "/add".
+
+    Raises `BadTopicError` as `dds_topic` does.
+    """
     name = dds_topic(service).removeprefix("rt/")
     return f"rq/{name}Request", f"rr/{name}Reply"
 
 
 def ros_service(topic: str) -> str | None:
-    """`/add` for "rq/addRequest"; None for a topic that is no service's requests."""
+    """Return the service: `/add` for "rq/addRequest"; None for other DDS topics."""
     found = _REQUESTS.fullmatch(topic)
     return None if found is None else _as_nep_has_it(found[1])
 
 
 def service_type_of(dds_type: str) -> str | None:
-    """`std_srvs/srv/SetBool` for the name of its requests in DDS; None for any other type."""
+    """Return the service type, `std_srvs/srv/SetBool`, for the DDS type of its requests; otherwise None."""
     found = _DDS_REQUEST.fullmatch(dds_type)
     return None if found is None else f"{found[1]}/srv/{found[2]}"
 
 
 def service_type_name(msg_type: str) -> str | None:
-    """`std_srvs/srv/SetBool`, also for "std_srvs/SetBool"; None for what is no type of a service."""
+    """Return the full name, `std_srvs/srv/SetBool`, for both forms; None for other names."""
     found = _SERVICE_TYPE.fullmatch(msg_type)
     return None if found is None else f"{found[1]}/srv/{found[3]}"
 
 
 def ros_type(dds_type: str) -> str:
-    """`std_msgs/msg/String` for its name in DDS; the name itself when it is none of ROS 2."""
+    """Return the ROS type, `std_msgs/msg/String`, for a DDS type; unchanged if it isn't from ROS 2."""
     found = _DDS_TYPE.fullmatch(dds_type)
     return dds_type if found is None else f"{found[1]}/msg/{found[2]}"
 
 
 def split_node_name(name: str) -> tuple[str, str]:
-    """The namespace and the name of a node, both as ROS 2 allows them; other letters become '_'."""
+    """Return a node's namespace and name as ROS 2 allows them; invalid characters become "_"."""
     *spaces, last = [_NO_NAME.sub("_", part) for part in name.split("/") if part] or ["_"]
     parts = [f"_{part}" if part[:1].isdigit() else part for part in (*spaces, last)]
     return "/" + "/".join(parts[:-1]), parts[-1]
 
 
 def user_data(entries: Mapping[str, str]) -> bytes:
-    """`key=value;` for each."""
+    """Encode entries as `key=value;`."""
     return "".join(f"{key}={value};" for key, value in entries.items()).encode("ascii")
 
 
 def user_data_of(data: bytes) -> dict[str, str]:
-    """What was told in that form by anybody; the rest is left out."""
+    """Decode such entries; malformed ones are skipped."""
     entries = (entry.partition("=") for entry in data.decode("ascii", "replace").split(";"))
     return {key: value for key, _equals, value in entries if key and value}

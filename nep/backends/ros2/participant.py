@@ -1,8 +1,8 @@
-"""Participant: this program in one domain of DDS. Its nodes share it; a thread of its own reads for them.
+"""Participant: this program in one DDS domain, shared by its nodes. A thread of its own reads for them.
 
-Other participants learn of its nodes, and which writers and readers are theirs, from `ros_discovery_info`,
-as ROS 2 does it. What is told of a writer or reader itself stands in its USER_DATA: the type's hash for
-ROS 2, and for other programs of nep the ids of the node and of the publisher or subscriber.
+Other participants learn its nodes and their writers and readers from `ros_discovery_info`, as in ROS 2. The
+USER_DATA of a writer or reader contains the type hash for ROS 2, and for other nep programs the ids of the
+node and of the publisher or subscriber.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ _logger = logging.getLogger("nep")
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _INFO_TOPIC = "ros_discovery_info"
 _MOST_PARTICIPANTS = 4096
-"""So many others are remembered."""
+"""Maximum number of other participants remembered."""
 _FILES = 16
-"""What a participant opens."""
+"""File descriptors per participant."""
 _SETTLE_S = 0.3
-"""So old a participant knows the others that are there: their answers come within milliseconds."""
+"""Seconds after which a new participant knows the existing ones, which respond within milliseconds."""
 _LOOK_S = 0.01
 _AT_ONCE = 10_000
 
 
 @dataclass(frozen=True)
 class RosNode:
-    """A node as `ros_discovery_info` tells of it; `gids` are those of its writers and readers."""
+    """Node in `ros_discovery_info`; `gids` are those of its writers and readers."""
 
     name: str
     gids: frozenset[bytes]
@@ -61,7 +61,7 @@ class RosNode:
 
 @dataclass(frozen=True)
 class DdsEndpoint:
-    """A writer or reader that discovery has found, its own too. `told`: what its USER_DATA says of it."""
+    """Discovered writer or reader, possibly of this program. `told` has the entries of its USER_DATA."""
 
     gid: bytes
     participant: bytes
@@ -72,92 +72,92 @@ class DdsEndpoint:
     told: dict[str, str]
 
     def is_of(self, kind: str, type_hash: str) -> bool:
-        """Whether it has this type, and tells of no other definition."""
+        """Return True if it has this type, and announces no other definition of it."""
         return self.type == kind and self.told.get("typehash", type_hash) == type_hash
 
 
 class Local(Protocol):
-    """A node of this process."""
+    """Node of this process."""
 
     node: NodeRecord
 
     @property
     def publishers(self) -> Sequence[LocalPublisher]:
-        """Those that are open."""
+        """Open publishers."""
 
     @property
     def subscribers(self) -> Sequence[LocalSubscriber]:
-        """Those that are open."""
+        """Open subscribers."""
 
     @property
     def servers(self) -> Sequence[LocalServer]:
-        """Those that are open."""
+        """Open servers."""
 
     @property
     def clients(self) -> Sequence[LocalClient]:
-        """Those that are open."""
+        """Open clients."""
 
     def load(self) -> float | None:
-        """The share of a core that the process uses."""
+        """Return the CPU load of the process, as a share of one core."""
 
     def look(self) -> None:
-        """Somebody came or went. In the participant's thread, under its lock."""
+        """Process changed endpoints. Runs in the participant's thread, with its lock held."""
 
 
 class LocalPublisher(Protocol):
-    """A publisher of this process."""
+    """Publisher of this process."""
 
     spec: PublisherSpec
 
     @property
     def record(self) -> PublisherRecord:
-        """For the graph."""
+        """Record for the graph."""
 
     @property
     def counts(self) -> PublisherCount:
-        """For the graph."""
+        """Statistics for the graph."""
 
 
 class LocalSubscriber(Protocol):
-    """A subscriber of this process."""
+    """Subscriber of this process."""
 
     spec: SubscriberSpec
 
     @property
     def record(self) -> SubscriberRecord:
-        """For the graph."""
+        """Record for the graph."""
 
     @property
     def counts(self) -> SubscriberCount:
-        """For the graph."""
+        """Statistics for the graph."""
 
 
 class LocalServer(Protocol):
-    """A server of this process."""
+    """Server of this process."""
 
     spec: ServerSpec
 
     @property
     def record(self) -> PublisherRecord:
-        """For the graph."""
+        """Record for the graph."""
 
     @property
     def counts(self) -> PublisherCount:
-        """For the graph."""
+        """Statistics for the graph."""
 
 
 class LocalClient(Protocol):
-    """A client of this process."""
+    """Client of this process."""
 
     spec: ClientSpec
 
     @property
     def record(self) -> SubscriberRecord:
-        """For the graph."""
+        """Record for the graph."""
 
     @property
     def counts(self) -> SubscriberCount:
-        """For the graph."""
+        """Statistics for the graph."""
 
 
 @dataclass
@@ -167,14 +167,14 @@ class _Member:
 
 
 class Participant:
-    """See the module. Raises `NepError` where Cyclone DDS cannot begin, such as without a network."""
+    """Participant of a domain; see the module. Raises `NepError` if Cyclone DDS can't start."""
 
     def __init__(self, number: int) -> None:
         self.number = number
         self.dds: Dds = dds()
         self.types: MessageTypes = message_types()
         self.changed = threading.Condition(threading.RLock())
-        """Guards everything here; told when somebody comes or goes."""
+        """Guards all state; notified when endpoints change."""
         self._members: dict[str, _Member] = {}
         self._others: dict[bytes, tuple[RosNode, ...]] = {}
         self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
@@ -208,7 +208,7 @@ class Participant:
             keep_to_loopback(self.number)
         self.gid = self.entity.guid.bytes
         self.topics = DdsTopics(self.dds, self.types, self.entity)
-        """Under `changed`."""
+        """Topics; guarded by `changed`."""
         self._waitset = core.WaitSet(self.entity)
         self._guard = core.GuardCondition(self.entity)
         self._waitset.attach(self._guard)
@@ -242,14 +242,14 @@ class Participant:
         except self.dds.core.DDSException as error:
             if error.code != self.dds.core.DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:
                 raise
-            return None  # the program has made it already, with settings of its own
+            return None  # the program has already created the domain, with its own settings
 
     def qos(self, *policies: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """These policies together."""
+        """Combine policies to a Qos object."""
         return self.dds.qos.Qos(*policies)
 
     def settle(self) -> None:
-        """Wait until the others that were there can be known."""
+        """Wait until existing participants are discovered. Returns at once if that was done."""
         if self._is_settled:
             return
         with self.changed:
@@ -261,7 +261,7 @@ class Participant:
             self._is_settled = True
 
     def _is_complete(self) -> bool:
-        """Whether all participants of ROS 2 that are known have told of their nodes, and these are found."""
+        # True if all ROS 2 participants have announced their nodes and the endpoints of these are discovered.
         if self._is_closing:
             return True
         found = {each.gid for kind in ("writer", "reader") for each in self.endpoints(kind)}
@@ -273,13 +273,13 @@ class Participant:
     # ---- nodes
 
     def add(self, local: Local) -> None:
-        """A node of this process comes."""
+        """Add a node of this process."""
         with self.changed:
             self._members[local.node.id] = _Member(local)
             self._tell()
 
     def remove(self, node_id: str) -> bool:
-        """It goes; whether it was the last."""
+        """Remove a node; return True if it was the last."""
         with self.changed:
             self._members.pop(node_id, None)
             if self._members:
@@ -287,7 +287,7 @@ class Participant:
             return not self._members
 
     def assign(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """A "writer" or "reader" is this node's."""
+        """Assign a "writer" or "reader" to a node."""
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].add(entity.guid.bytes)
@@ -296,7 +296,7 @@ class Participant:
             self._waitset.attach(entity)
 
     def withdraw(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """It is closed."""
+        """Remove and delete a "writer" or "reader"."""
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].discard(entity.guid.bytes)
@@ -306,7 +306,7 @@ class Participant:
             _delete(entity)
 
     def _tell(self) -> None:
-        """Write the nodes of this process into `ros_discovery_info`. With the lock held."""
+        # Publishes the nodes of this process. Call with the lock held.
         entries = []
         for member in self._members.values():
             space, name = split_node_name(member.local.node.name)
@@ -326,7 +326,6 @@ class Participant:
         return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
 
     def _read_news(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Somebody came or went."""
         reader.read(_AT_ONCE, news)
         self._has_news = True
 
@@ -350,14 +349,14 @@ class Participant:
         )
 
     def names_of(self, gids: Iterable[bytes]) -> tuple[str, ...]:
-        """The names of the nodes that these writers and readers of others are of, each once."""
+        """Return the names of the nodes that own these foreign writers and readers."""
         wanted = set(gids)
         with self.changed:
             nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
         return tuple(sorted({each.name for each in nodes}))
 
     def own_gids(self) -> dict[bytes, str]:
-        """The writers and readers of this process, each with the name of its node."""
+        """Return the GUIDs of this process's writers and readers with the names of their nodes."""
         with self.changed:
             return {
                 gid: member.local.node.name
@@ -368,12 +367,12 @@ class Participant:
 
     @property
     def locals(self) -> tuple[Local, ...]:
-        """The nodes of this process."""
+        """Nodes of this process."""
         with self.changed:
             return tuple(each.local for each in self._members.values())
 
     def others(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
-        """The nodes of other participants that are alive; those of others are forgotten."""
+        """Return the nodes of other participants in `alive`; remove all others."""
         with self.changed:
             self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
             return dict(self._others)
@@ -381,7 +380,7 @@ class Participant:
     # ---- discovery
 
     def participants(self, *, with_nodes: bool = False) -> frozenset[bytes]:
-        """All participants of the domain that are there, or those that have nodes of ROS 2."""
+        """Return the GUIDs of all participants of the domain, or of those with ROS 2 nodes."""
         core, builtin = self.dds.core, self.dds.builtin
         with self.changed:
             reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
@@ -397,7 +396,7 @@ class Participant:
         )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
-        """All "writer"s or "reader"s that are there, on every topic or on one of DDS."""
+        """Return all endpoints of a kind ("writer" or "reader"), on all DDS topics or on one."""
         with self.changed:
             if self._is_closing:
                 return []
@@ -410,7 +409,7 @@ class Participant:
         ]
 
     def described(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
-        """What discovery tells of a writer or reader."""
+        """Convert discovery data of a writer or reader."""
         policies = policy(self.dds)
         has_data = policies.Userdata in found.qos
         return DdsEndpoint(
@@ -432,7 +431,7 @@ class Participant:
             self._waitset.attach(condition)
 
     def unwatch(self, reader: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """No more."""
+        """Stop watching a reader."""
         with self.changed:
             found = self._reads.pop(id(reader), None)
             if found is not None:
@@ -458,15 +457,15 @@ class Participant:
         return self._is_closing
 
     def is_in_its_thread(self) -> bool:
-        """Whether this is the thread that reads for all."""
+        """Return True in the participant's thread."""
         return threading.current_thread() is self._thread
 
     def has_closed(self) -> bool:
-        """Whether all that belongs to it is gone, or goes."""
+        """Return True once `close` was called."""
         return self._is_closing
 
     def close(self) -> None:
-        """End the thread and leave the domain."""
+        """Stop the thread and leave the domain."""
         with self.changed:
             if self._is_closing:
                 return
@@ -487,7 +486,7 @@ class Participant:
 
 
 def _tried(step: Callable[[], None]) -> None:
-    """A step of the participant's thread, which goes on whatever comes from others."""
+    # The thread continues whatever it receives.
     try:
         step()
     except Exception:
@@ -502,12 +501,12 @@ def _read_states(reader: Any, ready: Any, hear: Callable[[bytes], None]) -> None
 
 
 def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-    """Now, with all that belongs to it, not when Python forgets it."""
+    # Deletes the entity and its children now, not in the finalizer.
     entity.__del__()
 
 
 def policy(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-    """The policies of cyclonedds."""
+    """Return the policy classes of cyclonedds."""
     return library.qos.Policy
 
 
@@ -518,7 +517,7 @@ _lock = threading.Lock()
 
 
 def join(local: Local, number: int) -> Participant:
-    """The participant of this process in this domain, with this node. Raises as `Participant`."""
+    """Return the process's participant in a domain and add a node. Raises as `Participant` does."""
     with _lock:
         if number not in _participants:
             _participants[number] = Participant(number)
@@ -527,7 +526,7 @@ def join(local: Local, number: int) -> Participant:
 
 
 def leave(participant: Participant, node_id: str) -> None:
-    """The node is closed; the participant too when it was the last."""
+    """Remove a closed node, and close the participant with the last one."""
     with _lock:
         if participant.remove(node_id):
             if _participants.get(participant.number) is participant:
@@ -536,8 +535,8 @@ def leave(participant: Participant, node_id: str) -> None:
 
 
 def _forked() -> None:
-    """In a child: the lock may be held by a thread that is not there."""
-    global _lock  # noqa: PLW0603 - there is one a process
+    # In a forked child the lock may be held by a thread that doesn't exist there.
+    global _lock  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
     _participants.clear()
 

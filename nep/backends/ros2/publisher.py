@@ -1,4 +1,4 @@
-"""Ros2Publisher: a writer of DDS. Whom it has found is asked of Cyclone DDS each time."""
+"""Ros2Publisher: a DDS writer."""
 
 from __future__ import annotations
 
@@ -25,16 +25,21 @@ __all__ = ["Ros2Publisher", "told_of", "wait_for_others"]
 _logger = logging.getLogger("nep")
 _PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
 _GREETING_S = 0.1
-"""What another program than nep's needs to get ready after both know of each other."""
+"""Seconds that programs without nep need to get ready after discovery on both sides."""
 _LOOK_S = 0.01
 
 
 def wait_for_others(
     participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
 ) -> tuple[str, ...]:
-    """Wait until all of `known` and ours have found each other, half a second at most; nodes that have not.
+    """Wait until `known` endpoints and ours are matched; return the names of nodes that aren't.
 
-    `entities`: our writer or readers. Other programs than nep's do not tell when they are ready.
+    Waits up to `HANDSHAKE_S`. Programs without nep don't report their matches, so they get a fixed time.
+
+    Args:
+        participant: Participant of this process.
+        known: Endpoints to wait for.
+        entities: Returns our writers or readers.
     """
     deadline = time.monotonic() + HANDSHAKE_S
     expected = [(each.gid, each.participant, "nepid" in each.told) for each in known]
@@ -51,7 +56,7 @@ def wait_for_others(
 
 
 def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
-    """What the USER_DATA of a writer or reader says: what ROS 2 asks for, and what programs of nep do."""
+    """Return the USER_DATA of a writer or reader: entries for ROS 2 and for nep."""
     told = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
     if _PLAIN.fullmatch(spec.msg_type):
         told["neptype"] = spec.msg_type
@@ -59,7 +64,7 @@ def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) 
 
 
 class Ros2Publisher:
-    """See the module. Raises `BadTopicError`, `NepError`."""
+    """Publisher over a DDS writer. Raises `BadTopicError`, `NepError`."""
 
     def __init__(
         self,
@@ -111,13 +116,13 @@ class Ros2Publisher:
         ]
         try:
             self.missing = wait_for_others(participant, wanted, lambda: [self._writer])
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.finish(0.0)
             raise
 
     @property
     def record(self) -> PublisherRecord:
-        """For the graph."""
+        """Record for the graph."""
         spec = self.spec
         return PublisherRecord(
             spec.id, spec.topic, spec.msg_type, spec.codec.name, ("ros2",), spec.is_latched
@@ -125,12 +130,12 @@ class Ros2Publisher:
 
     @property
     def counts(self) -> PublisherCount:
-        """For the graph."""
+        """Statistics for the graph."""
         return PublisherCount(self.spec.id, self.count, self._bytes, self.count, self._stamp_ns, self.problem)
 
     @property
     def subscribers(self) -> int:
-        """How many are matched; the two readers that a subscriber of nep may have are one."""
+        """Number of matched subscribers; two readers of one nep subscriber count as one."""
         with self._participant.changed:
             if self._is_closed:
                 return 0
@@ -145,26 +150,26 @@ class Ros2Publisher:
 
     @property
     def is_heard(self) -> bool:
-        """Whether there are any."""
+        """True if any reader is matched."""
         with self._participant.changed:
             return not self._is_closed and bool(self._writer.get_matched_subscriptions())
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._participant.changed:
             self.count += 1
             self._stamp_ns = time.time_ns()
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph of this program."""
+        """Set the problem of a payload, which the graph of this program shows."""
         self.problem = problem
 
-    def lend(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - there is no memory that all share
-        """None: what is published is copied."""
+    def lend(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - no shared memory
+        """Return None: payloads are copied."""
         return None
 
     def send(self, encoded: Encoded) -> None:
-        """Write it. Where a reader is far behind, this waits for room for a tenth of a second at most."""
+        """Publish a message. Blocks for up to 0.1 s while a reader is far behind."""
         cdr = self._mapping.pack(encoded)
         sample = sample_of(self._kind, cdr)
         if self._is_closed:
@@ -176,7 +181,7 @@ class Ros2Publisher:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'") from error
             codes = self._participant.dds.core.DDSException
-            if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # it looks at every message
+            if error.code == codes.DDS_RETCODE_BAD_PARAMETER:  # cyclonedds validates every message
                 raise WireError(
                     _("they are no message of type '{name}'").format(name=self._mapping.ros_type), len(cdr)
                 ) from error
@@ -187,18 +192,18 @@ class Ros2Publisher:
             self._bytes += len(encoded.data)
 
     def close(self, timeout_s: float) -> None:
-        """Wait until readers have confirmed what was written, and close. Called by its publisher."""
+        """Wait for acknowledgements and close. Called by the publisher."""
         self._on_close(self, timeout_s)
 
     def finish(self, timeout_s: float) -> None:
-        """See `close`. May be called twice."""
+        """Wait up to `timeout_s` seconds for acknowledgements and close (idempotent)."""
         if self._is_closed or has_forked():
             return
         if self._participant.has_closed():
             self._is_closed = True
             return
         if self.spec.qos in ("", "reliable") and timeout_s > 0.0:
-            # Not `wait_for_acks`, which fails when the time is over (cyclonedds 11.0.1).
+            # `wait_for_acks` raises on timeout (cyclonedds 11.0.1)
             wait = self._writer._wait_for_acks  # noqa: SLF001
             if wait(self._writer._ref, int(min(timeout_s, 3600.0) * 1e9)):  # noqa: SLF001
                 _logger.warning("'%s' is closed before all its subscribers took everything", self.spec.topic)

@@ -1,13 +1,13 @@
-"""Quality of service in one word, and what it is in DDS.
+"""QoS profiles of nep and their DDS policies.
 
-| word          | reliability | what is kept for readers that are behind    |
+| name          | reliability | queue depth                                 |
 |---------------|-------------|---------------------------------------------|
-| "" "reliable" | RELIABLE    | nep's own depth: see `depth_of`             |
-| "best_effort" | BEST_EFFORT | the same                                    |
-| "sensor"      | BEST_EFFORT | 5 messages, as ROS 2's profile sensor data  |
+| "" "reliable" | RELIABLE    | see `depth_of`                              |
+| "best_effort" | BEST_EFFORT | see `depth_of`                              |
+| "sensor"      | BEST_EFFORT | 5 messages, as ROS 2's sensor data profile  |
 
-Durability is VOLATILE, TRANSIENT_LOCAL for what is latched. Depth is nobody's business but one's own: it
-plays no part in who is matched with whom.
+Durability is TRANSIENT_LOCAL for latched topics, otherwise VOLATILE. The depth is local: it doesn't affect
+matching.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ __all__ = ["QUALITIES", "depth_of", "qualities"]
 QUALITIES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
 _BLOCKING_NS = 100_000_000
-"""So long a message waits for room before it is lost to those that are behind: DDS's own default."""
+"""Maximum time that a message waits for room before it is lost: the default of DDS."""
 _DEPTHS = {"image": 16, "bytes": 200, CDR: 200}
 _DEPTH = 8192
-"""ROS 2's own 10 would lose bursts of small messages."""
+"""ROS 2's default of 10 would lose bursts of small messages."""
 _NO_LIMIT = -1
 
 
 def depth_of(quality: str, codec: str) -> int:
-    """How many messages are kept."""
+    """Return the queue depth in messages."""
     return _SENSOR_DEPTH if quality == "sensor" else _DEPTHS.get(codec, _DEPTH)
 
 
 def qualities(
     library: Dds, quality: str, depth: int, *, is_latched: bool, told: bytes, history: int = 1
 ) -> tuple[Any, ...]:
-    """The policies of a writer or reader. `history`: what a writer keeps for those that come late."""
+    """Return the policies of a writer or reader; `history` messages are kept for late readers."""
     policies = policy(library)
     is_reliable = quality in ("", "reliable")
     found = [

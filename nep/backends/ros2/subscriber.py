@@ -1,8 +1,8 @@
-"""Ros2Subscriber: a reader of DDS, and a second one where a publisher has latched something.
+"""Ros2Subscriber: a DDS reader, and a second one if a publisher latches.
 
-A reader that asks for what was latched (TRANSIENT_LOCAL) is not matched with publishers that do not latch,
-one that does not ask gets nothing that is old. So the usual one does not ask, and one that asks is added
-when a publisher is found that latches; what both bring counts once.
+A TRANSIENT_LOCAL reader isn't matched with volatile writers, and a VOLATILE reader doesn't receive older
+messages. The first reader is therefore volatile; a second one is added when a latching publisher is
+discovered. Messages received by both count once.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ _logger = logging.getLogger("nep")
 _BATCH = 256
 _BATCH_BYTES = 64 * 2**20
 _MOST_SOURCES = 4096
-"""So many publishers are remembered."""
+"""Maximum number of publishers remembered."""
 
 
 def id_of(gid: bytes, told: str | None) -> int:
-    """The id of a publisher or subscriber: what a program of nep says, else one made of its GUID."""
+    """Return the id of a publisher or subscriber: the announced one, or one derived from its GUID."""
     try:
         number = int(told or "", 16)
     except ValueError:
@@ -51,35 +51,34 @@ def id_of(gid: bytes, told: str | None) -> int:
 
 
 class ReaderOwner(Protocol):
-    """The transport that it belongs to."""
+    """Transport that owns the subscriber."""
 
     node: NodeRecord
     changed: threading.Condition
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in one of them, or for `wake`."""
+        """Wait for a message in `subscribers`, or for `wake`."""
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
 
     def forget(self, subscriber: Ros2Subscriber) -> None:
-        """It is closed."""
+        """Remove a closed subscriber."""
 
 
 @dataclass
 class _Source:
-    """A publisher whose messages came."""
-
+    # Publisher of received messages.
     id: int
     kind: MessageKind
     newest_ns: int = -1
     is_caught_up: bool = False
     held: list[tuple[int, Message]] = field(default_factory=list)
-    """What came before the history, with the times."""
+    """Messages received before the history, with their time stamps."""
 
 
 class Ros2Subscriber(WakingSubscriber):
-    """See the module. Raises `BadTopicError`, `NepError`."""
+    """Subscriber over DDS readers. Raises `BadTopicError`, `NepError`."""
 
     def __init__(self, transport: ReaderOwner, participant: Participant, spec: SubscriberSpec) -> None:
         super().__init__(transport.changed)
@@ -112,12 +111,12 @@ class Ros2Subscriber(WakingSubscriber):
                 self._add_reader(is_latched=True)
         try:
             wait_for_others(participant, writers, lambda: self._readers)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.close()
             raise
 
     def _add_reader(self, *, is_latched: bool) -> None:
-        """With the participant's lock held."""
+        # Call with the participant's lock held.
         participant, spec = self._participant, self.spec
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
@@ -134,7 +133,7 @@ class Ros2Subscriber(WakingSubscriber):
         participant.watch(reader, ready, lambda: self._read(reader, ready))
 
     def look_for_latched(self) -> None:
-        """Ask for what was latched when a publisher has come that latches. In the participant's thread."""
+        """Add a second reader if a latching publisher has appeared. Runs in the participant's thread."""
         if not self._has_latched and not self.is_closed:
             for handle in self._readers[0].get_matched_publications():
                 if self._source(self._readers[0], handle).kind.is_latched:
@@ -144,7 +143,7 @@ class Ros2Subscriber(WakingSubscriber):
     # ---- receiving
 
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """In the participant's thread, under its lock."""
+        # Runs in the participant's thread, with its lock held.
         while samples := reader.take(_BATCH, ready):
             came = [each for sample in samples for each in self._messages(reader, sample)]
             if came:
@@ -169,16 +168,14 @@ class Ros2Subscriber(WakingSubscriber):
                 )
             return []
         message = arrived(source.kind, data, info.source_timestamp, 0, source.id)
-        message.seq = None  # DDS has numbers, and tells them to nobody
+        message.seq = None  # DDS doesn't expose its sequence numbers
         if source.kind.is_latched:
             return self._in_order(reader, source, message, info.source_timestamp)
         return [message]
 
     def _in_order(self, reader: Any, source: _Source, message: Message, stamp_ns: int) -> list[Message]:  # noqa: ANN401 - see above
-        """What of a publisher that latches is next: the history first, then what follows; none twice.
-
-        What the usual reader hears before the other one has the history waits for that.
-        """
+        # Merges the messages of a latching publisher: the history first, then the others, without duplicates.
+        # Messages of the first reader are held until the second one has received the history.
         if reader is not self._readers[0] or not self._has_latched:
             came: list[tuple[int, Message]] = []
             if self._has_latched:
@@ -196,7 +193,7 @@ class Ros2Subscriber(WakingSubscriber):
         return self._newer(source, came)
 
     def _newer(self, source: _Source, came: list[tuple[int, Message]]) -> list[Message]:
-        """Those that were not heard."""
+        # Drops duplicates.
         new = []
         for stamp_ns, each in came:
             if stamp_ns > source.newest_ns:
@@ -205,7 +202,7 @@ class Ros2Subscriber(WakingSubscriber):
         return new
 
     def _last_of(self, handle: int) -> list[Message]:
-        """A publisher went: what waits comes now."""
+        # A publisher has disappeared: deliver its held messages.
         source = self._sources.get(handle)
         if source is None or not source.held:
             return []
@@ -241,31 +238,31 @@ class Ros2Subscriber(WakingSubscriber):
                 self._dropped += dropped
             self.tell_waiting()
 
-    # ---- sending
+    # ---- reading
 
     @property
     def has_input(self) -> bool:
-        """See `WakingSubscriber.has_input`."""
+        """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
-        """The next message if one is there."""
+        """Return the next message, or None."""
         with self._transport.changed:
             return None if self.is_closed else self.inbox.take()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message, waited for."""
+        """Return the next message; wait up to `timeout_s` seconds."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 
     def take_batch(self) -> list[Message]:
-        """What a sink gets at once."""
+        """Return the messages for one call of the sink."""
         with self._transport.changed:
             return self.inbox.take_all(_BATCH_BYTES)
 
     @property
     def lost(self) -> int | None:
-        """What DDS says was lost on the way, and what was dropped here."""
+        """Number of messages lost according to DDS, or dropped here."""
         with self._participant.changed:
             return self._lost_before + self._lost_now() + self._dropped
 
@@ -276,30 +273,30 @@ class Ros2Subscriber(WakingSubscriber):
 
     @property
     def record(self) -> SubscriberRecord:
-        """For the graph."""
+        """Record for the graph."""
         return SubscriberRecord(self.spec.id, self.spec.topic, self.spec.msg_type)
 
     @property
     def counts(self) -> SubscriberCount:
-        """For the graph."""
+        """Statistics for the graph."""
         return SubscriberCount(self.spec.id, self.received, self.lost, self.problem)
 
     @property
     def gids(self) -> frozenset[bytes]:
-        """Its readers."""
+        """GUIDs of its readers."""
         with self._participant.changed:
             return frozenset() if self.is_closed else frozenset(each.guid.bytes for each in self._readers)
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph of this program."""
+        """Set the reader's problem, which the graph of this program shows."""
         self.problem = problem
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
 
     def close(self) -> None:
-        """Close its readers and forget what was not read."""
+        """Close the readers and discard unread messages."""
         if has_forked():
             return
         with self._participant.changed:

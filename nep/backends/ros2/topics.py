@@ -1,7 +1,7 @@
-"""DdsTopics of Cyclone DDS, and the classes of their samples, which are CDR already.
+"""DdsTopics: topics of Cyclone DDS, and sample classes whose content is already CDR.
 
-A class has the members of its ROS message for the type's description in discovery; bytes are made and read
-by rosbags' codec.
+A class has the members of its ROS message, for the type description in discovery. Encoding and decoding are
+done by rosbags.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _NAMES = {"byte": "uint8"}
 
 
 class DdsTopics:
-    """The topics of one participant: one for each name and type. Its lock guards them."""
+    """Topics of one participant, by name and type. Guarded by the participant's lock."""
 
     def __init__(self, library: Dds, types: MessageTypes, entity: Any) -> None:  # noqa: ANN401 - see `Dds`
         self._dds = library
@@ -30,21 +30,21 @@ class DdsTopics:
         self._topics: dict[tuple[str, str], Any] = {}
 
     def topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """The topic of DDS of this name, for samples with `cdr` of this type of ROS."""
+        """Return the DDS topic of this name, for samples of a ROS type in CDR."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
         return self._topics[key]
 
     def service_topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """The topic of a service's requests or answers."""
+        """Return the topic of a service's requests or responses."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.service_class(ros_type))
         return self._topics[key]
 
     def state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """A writer whose last sample is also read by those that come later."""
+        """Create a writer whose last sample is kept for late readers."""
         policies = self._dds.qos.Policy
         last = policies.History.KeepLast(1)
         kept = (last, policies.DurabilityService(0, last, -1, -1, -1))
@@ -53,7 +53,7 @@ class DdsTopics:
         )
 
     def state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """A reader of what such writers have written."""
+        """Create a reader for the samples of state writers."""
         kept = self._dds.qos.Policy.History.KeepLast(1000)
         return self._dds.sub.DataReader(
             self._entity, self.topic(name, ros_type), self._state_qos(ros_type, kept)
@@ -69,19 +69,19 @@ class DdsTopics:
             *kept,
         )
 
-    def service_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
-        """The class of samples of a service's requests or answers, as rmw_cyclonedds has them.
+    def service_class(self, ros_type: str) -> Any:  # noqa: ANN401 - created dynamically
+        """Return the sample class of a service's requests or responses, as in rmw_cyclonedds.
 
-        Who calls, and the number of the call, come before the fields.
+        The client's id and the number of the call precede the fields.
         """
         hints = self._dds.idl.types
         return self._class(ros_type, {"guid": hints.uint64, "sequence_number": hints.int64})
 
-    def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - made here
-        """The class of samples of a type of ROS."""
+    def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - created dynamically
+        """Return the sample class of a ROS type."""
         return self._class(ros_type, {})
 
-    def _class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - made here
+    def _class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
         if ros_type not in self._classes:
             members = head | {each.name: self._member(each) for each in self._types.fields(ros_type)}
             made = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
@@ -107,12 +107,12 @@ class DdsTopics:
         return hints.sequence[item, field.size] if field.size else hints.sequence[item]
 
     def clear(self) -> None:
-        """The participant is closed."""
+        """Release all topics, when the participant is closed."""
         self._topics.clear()
 
 
-def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - made above
-    """A sample of a class of samples."""
+def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
+    """Return a sample with this content."""
     made = kind.__new__(kind)
     made.cdr = cdr
     return made

@@ -1,4 +1,4 @@
-"""The back end `ros2` for one node: its publishers, its subscribers, its sinks' thread, waiting."""
+"""Transport of the back end `ros2`: publishers, subscribers, services and the sink thread of one node."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from nep.system.cpu import CpuLoad
 __all__ = ["Ros2Transport"]
 
 _logger = logging.getLogger("nep")
-_BATCH_S = 0.005  # sinks are called 200 times a second at most
+_BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 
 class Ros2Transport:
-    """One node's way to the others. Raises `BackendUnavailableError` where its packages are not installed."""
+    """Connection of one node. Raises `BackendUnavailableError` if its packages are not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         dds()
         typesys()
         self.node = node
         self.changed = threading.Condition()
-        """Guards inboxes; taken after the participant's lock, never before it."""
+        """Guards inboxes. Lock order: the participant's lock before this one."""
         self._wakes = 0
         self._load = CpuLoad()
         self._participant: Participant | None = None
@@ -77,13 +77,12 @@ class Ros2Transport:
         return participant
 
     def _check_open(self) -> None:
-        """Raises `ClosedError`."""
         if self._closing.is_set():
             raise ClosedError(f"node '{self.node.name}'")
 
     @contextmanager
     def _unless_closed(self) -> Iterator[None]:
-        """What Cyclone DDS raises when the node was closed meanwhile becomes `ClosedError`."""
+        # Converts errors of Cyclone DDS to `ClosedError` if the node was closed meanwhile.
         try:
             yield
         except dds().core.DDSException:
@@ -91,12 +90,12 @@ class Ros2Transport:
             raise
 
     def look(self) -> None:
-        """In the participant's thread, under its lock: somebody came or went."""
+        """Process changed endpoints. Runs in the participant's thread, with its lock held."""
         for each in self._subscribers:
             each.look_for_latched()
 
     def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
-        """A new writer; returns when the readers that are known are matched."""
+        """Create a writer; returns when it is matched with the known readers."""
         with self._unless_closed():
             participant = self._joined(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
@@ -108,7 +107,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
-        """A new reader; returns when the writers that are known are matched."""
+        """Create a reader; returns when it is matched with the known writers."""
         with self._unless_closed():
             participant = self._joined(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
@@ -125,7 +124,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def server(self, spec: ServerSpec) -> Ros2Server:
-        """A new server; returns when the clients that are known are matched."""
+        """Create a server; returns when it is matched with the known clients."""
         with self._unless_closed():
             participant = self._joined(spec.configuration)
             server = Ros2Server(participant, self.node.id, spec, self._forget_service)
@@ -137,7 +136,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def client(self, spec: ClientSpec) -> Ros2Client:
-        """A new client; returns when the servers that are known are matched."""
+        """Create a client; returns when it is matched with the known servers."""
         with self._unless_closed():
             participant = self._joined(spec.configuration)
             client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._forget_service)
@@ -160,7 +159,7 @@ class Ros2Transport:
             self._publishers = tuple(each for each in self._publishers if each is not publisher)
 
     def forget(self, subscriber: Ros2Subscriber) -> None:
-        """It is closed."""
+        """Remove a closed subscriber."""
         with self._lock:
             self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
 
@@ -170,7 +169,7 @@ class Ros2Transport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`."""
+        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         mine = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         before = self._wakes
         with woken_by(calls, self.wake) as is_empty:
@@ -183,49 +182,49 @@ class Ros2Transport:
                 )
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         with self.changed:
             self._wakes += 1
             self.changed.notify_all()
 
-    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - at once
-        """Who has been found in the domain."""
+    def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
+        """Return the graph of discovered endpoints."""
         with self._unless_closed():
             return graph_of(self._joined(configuration))
 
     @property
     def publishers(self) -> tuple[Ros2Publisher, ...]:
-        """Those that are open."""
+        """Open publishers."""
         return self._publishers
 
     @property
     def subscribers(self) -> tuple[Ros2Subscriber, ...]:
-        """Those that are open."""
+        """Open subscribers."""
         return self._subscribers
 
     @property
     def servers(self) -> tuple[Ros2Server, ...]:
-        """Those that are open."""
+        """Open servers."""
         return self._servers
 
     @property
     def clients(self) -> tuple[Ros2Client, ...]:
-        """Those that are open."""
+        """Open clients."""
         return self._clients
 
     def load(self) -> float | None:
-        """The share of a core that the process uses."""
+        """Return the CPU load of the process, as a share of one core."""
         return self._load.ratio()
 
     def begin_close(self) -> None:
-        """What is written is on its way already; no call is taken any more."""
+        """Reject calls. Messages need no flushing."""
         with self._lock:
             self._is_closing = True
         for server in self._servers:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Close all, leave the domain, end the thread."""
+        """Close everything, leave the domain and join the threads."""
         if has_forked():
             return
         with self._lock:
@@ -259,6 +258,6 @@ class Ros2Transport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit, which would end all sinks' thread
+                    except BaseException:  # also SystemExit: the sinks' thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)

@@ -1,14 +1,14 @@
-"""Type mapping: in which ROS message a message type of nep travels, and how its bytes get in and out.
+"""Type mapping: the ROS message for each message type of nep, and the conversion of its data.
 
-| msg_type                 | ROS type                      | what is in it                               |
-|--------------------------|-------------------------------|---------------------------------------------|
-| json, and any other      | std_msgs/msg/String           | the JSON text                               |
-| string                   | std_msgs/msg/String           | the text                                    |
-| bytes, msgpack           | std_msgs/msg/UInt8MultiArray  | the bytes, no dimensions                    |
-| image                    | sensor_msgs/msg/CompressedImage | the JPEG or PNG file                      |
-| a ROS type by its name   | that one                      | its fields                                  |
+| msg_type                 | ROS type                        | content                    |
+|--------------------------|---------------------------------|----------------------------|
+| json, and any other      | std_msgs/msg/String             | the JSON text              |
+| string                   | std_msgs/msg/String             | the text                   |
+| bytes, msgpack           | std_msgs/msg/UInt8MultiArray    | the bytes, no dimensions   |
+| image                    | sensor_msgs/msg/CompressedImage | the JPEG or PNG file       |
+| a ROS type by its name   | that type                       | its fields                 |
 
-A ROS type by its name has the codec "cdr": its payload is a map, its bytes are the message as DDS has it.
+A ROS type has the codec "cdr": its payload is a map, its data the CDR of the message.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from nep.protocol.wire import extension_part
 __all__ = ["CDR", "TypeMapping", "codec_for", "mapping_for"]
 
 CDR = "cdr"
-"""The codec of messages that are ROS messages to their readers."""
+"""Codec of messages that are ROS messages for their readers."""
 _STRING = "std_msgs/msg/String"
 _BYTES = "std_msgs/msg/UInt8MultiArray"
 _IMAGE = "sensor_msgs/msg/CompressedImage"
 _HEAD = b"\0\1\0\0"
-"""Plain CDR, its numbers little-endian."""
+"""Encapsulation header of little-endian CDR."""
 _FILES = ("jpeg", "png")
 _MOST = 2**32 - 64
 
 
 @dataclass(frozen=True)
 class TypeMapping:
-    """How one message type travels. `pack` and `unpack` raise `WireError` for bytes that are none of it."""
+    """Conversion of one message type. `pack` and `unpack` raise `WireError` for invalid data."""
 
     ros_type: str
     codec: Codec
@@ -53,17 +53,17 @@ class TypeMapping:
     unpack: Callable[[bytes], bytes | memoryview]
 
     def kind(self, topic: str, msg_type: str, *, is_latched: bool) -> MessageKind:
-        """What messages from one publisher have in common."""
+        """Return the common attributes of one publisher's messages."""
         return MessageKind(topic, self.codec.name, msg_type, is_latched, self.codec.decode)
 
 
 def codec_for(msg_type: str) -> Codec:
-    """The codec of a message type. Raises `NepError` for a ROS type that is not known."""
+    """Return the codec of a message type. Raises `NepError` for an unknown ROS type."""
     return mapping_for(msg_type).codec
 
 
 def mapping_for(msg_type: str) -> TypeMapping:
-    """How a message type travels. Raises `NepError` for a ROS type that is not known."""
+    """Return the mapping of a message type. Raises `NepError` for an unknown ROS type."""
     if is_type_name(msg_type):
         return _ros_mapping(message_types().checked(msg_type))
     codec = codecs.codec_for(msg_type)
@@ -109,7 +109,7 @@ def _as_it_is(made: Encoded) -> bytes:
 
 
 def _plain(made: Encoded) -> bytes:
-    """The bytes alone: ROS has no place for an extension. Raises `WireError` as other back ends do."""
+    # ROS messages can't carry extensions. Raises `WireError` as other back ends do.
     if made.extension:
         extension_part(made.extension)
     data = made.data if isinstance(made.data, bytes) else bytes(made.data)
@@ -119,7 +119,7 @@ def _plain(made: Encoded) -> bytes:
 
 
 def _encode_text(payload: object) -> Encoded:
-    """As the codec does; refuses what would end the text. Raises `EncodeError`."""
+    # Rejects zero bytes, which end a string in ROS. Raises `EncodeError`.
     made = codecs.STRING.encode(payload)
     if 0 in made.data:
         raise EncodeError("string", "str", _zero_reason())
@@ -159,14 +159,14 @@ def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
 
 
 def _numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
-    """Numbers in the order that its first four bytes tell. Raises `WireError`."""
+    # The header has the byte order. Raises `WireError`.
     if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
         raise WireError(_("it is no message of ROS"), len(cdr))
     return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
 
 
 def _from_field(name: str, cdr: bytes) -> bytes:
-    """The field `data` of a message. Raises `WireError`."""
+    # Raises `WireError`.
     try:
         decoded = message_types().decode(name, cdr)
     except DecodeError as error:
@@ -176,7 +176,7 @@ def _from_field(name: str, cdr: bytes) -> bytes:
 
 
 def _encode_image(payload: object) -> Encoded:
-    """As the codec does; refuses what would be sent raw. Raises `EncodeError`."""
+    # Rejects raw images. Raises `EncodeError`.
     made = image_codec.encode(payload)
     if (made.extension or {}).get("encoding") not in _FILES:
         raise EncodeError("image", type(payload).__name__, _raw_reason())
@@ -197,7 +197,7 @@ def _pack_image(made: Encoded) -> bytes:
     except DecodeError as error:
         raise WireError(_raw_reason(), len(data)) from error
     seconds, nanoseconds = divmod(time.time_ns(), 10**9)
-    # A stamp, an empty frame_id and its filling, the format's name, the file.
+    # stamp, empty frame_id with padding, format, file
     head = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
     name = kind.encode() + b"\0"
     named = struct.pack("<I", len(name)) + name + bytes(-len(name) % 4)

@@ -1,1 +1,1 @@
-"""Services of the back end ros2: servers and clients, what they have in DDS, and the definitions of types."""
+"""Services of the back end `ros2`: servers, clients, their DDS endpoints, and service types."""

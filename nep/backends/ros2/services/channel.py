@@ -1,9 +1,8 @@
-"""ServiceChannel: the writers and readers of a server or client, and who is at the other side.
+"""ServiceChannel: the DDS writers and readers of a server or client, and their matches.
 
-As rmw_cyclonedds has it, requests are on `rq/NAMERequest`, answers on `rr/NAMEReply`, and before the fields
-of each stand the caller's id (u64) and the number of the call (i64). What ROS has no form for, that a server
-of a type of ROS failed, programs of nep tell each other on a topic that ROS 2 does not show: the same 16
-bytes, what it is (u8), and the reason.
+As in rmw_cyclonedds, requests are on `rq/NAMERequest` and responses on `rr/NAMEReply`, and the fields are
+preceded by the client's id (u64) and the number of the call (i64). ROS has no form for errors of a server;
+nep programs exchange them on a topic hidden from ROS 2: the same 16 bytes, the kind (u8), and the reason.
 """
 
 from __future__ import annotations
@@ -33,22 +32,22 @@ _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILED = struct.Struct("<QqB")
 _BATCH = 256
 _MOST_WRITERS = 1024
-"""So many clients are remembered."""
+"""Maximum number of clients remembered."""
 _BLOCKING_NS = 100_000_000
 _GREETING_S = 0.1
-"""What another program than nep's needs to get ready after both know of each other."""
+"""Seconds that programs without nep need to get ready after discovery on both sides."""
 _KINDS = (CallKind.ERROR, CallKind.REFUSED)
 
 
 class CallId(NamedTuple):
-    """Who calls, and which of its calls it is."""
+    """Client id and number of a call."""
 
     guid: int
     number: int
 
 
 class HeardPart(NamedTuple):
-    """A request or an answer: its CDR without the id, and the writer that it came from (b"": it is gone)."""
+    """Request or response: its CDR without the id, and its writer; None if the writer has disappeared."""
 
     id: CallId
     cdr: bytes
@@ -56,9 +55,17 @@ class HeardPart(NamedTuple):
 
 
 class ServiceChannel:
-    """See the module. `guid` is the client's id; a server has none.
+    """DDS endpoints of a server or client; see the module.
 
-    `hear` gets what comes, `failed` failures; both in the participant's thread.
+    Args:
+        participant: Participant of this process.
+        node_id: Id of the node.
+        service: Name of the service.
+        kind: Service type.
+        entry_id: Id of the server or client.
+        guid: Id in the calls of a client; None for a server.
+        hear: Called with requests or responses, in the participant's thread.
+        failed: Called with errors, in the participant's thread.
     """
 
     def __init__(
@@ -155,7 +162,7 @@ class ServiceChannel:
             for sample in samples:
                 cdr = getattr(sample, "cdr", None)
                 if cdr is None or len(cdr) < _CDR_BYTES + 16 or cdr[0] != 0 or cdr[1] > 1:
-                    continue  # a writer went, or it is none of CDR
+                    continue  # a disposed writer, or not CDR
                 guid, number = struct.unpack_from(f"{'<' if cdr[1] else '>'}Qq", cdr, _CDR_BYTES)
                 call = CallId(guid, number)
                 if self._is_wanted(call):
@@ -165,7 +172,7 @@ class ServiceChannel:
                 return
 
     def _is_wanted(self, call: CallId) -> bool:
-        """Whether it is for this one: all clients hear all answers."""
+        # All clients receive all responses.
         return self._guid is None or call.guid == self._guid
 
     def _writer_of(self, reader: Any, handle: int) -> DdsEndpoint | None:  # noqa: ANN401 - cyclonedds is not typed
@@ -183,7 +190,7 @@ class ServiceChannel:
         for sample in reader.take(_BATCH, ready):
             cdr = getattr(sample, "cdr", None)
             if cdr is None or self._failed is None:
-                continue  # a writer went
+                continue  # a disposed writer
             try:
                 told: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
             except DecodeError:
@@ -198,7 +205,7 @@ class ServiceChannel:
     # ---- sending, without the participant's lock
 
     def send(self, call: CallId, cdr: bytes) -> None:
-        """Write a request or an answer. Raises `WireError`, and `DDSException` when it is closed."""
+        """Write a request or response. Raises `WireError`, or `DDSException` after closing."""
         order = "<" if cdr[1] else ">"
         whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
         codes = self.participant.dds.core.DDSException
@@ -210,7 +217,7 @@ class ServiceChannel:
             raise
 
     def send_failure(self, call: CallId, reply: Reply) -> None:
-        """Tell programs of nep that there is no answer. Raises as `send` does."""
+        """Send an error to nep programs. Raises as `send` does."""
         data = _FAILED.pack(*call, reply.kind) + bytes(reply.data)
         cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
         self._writers[1].write(sample_of(self._failure_class, cdr))
@@ -219,7 +226,7 @@ class ServiceChannel:
 
     @property
     def known(self) -> list[DdsEndpoint]:
-        """The writers and readers of the other side that have been found."""
+        """Discovered endpoints of the other side."""
         (out, out_type), (into, into_type) = self._topics
         found = [(each, out_type) for each in self.participant.endpoints("reader", out)] + [
             (each, into_type) for each in self.participant.endpoints("writer", into)
@@ -228,7 +235,7 @@ class ServiceChannel:
 
     @property
     def entities(self) -> Sequence[Any]:
-        """Its own writers and readers of requests and answers."""
+        """Own writer and reader of requests and responses."""
         return (self._writers[0], self._readers[0])
 
     def _matched(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
@@ -239,7 +246,7 @@ class ServiceChannel:
         return [self.participant.described(data) for data in map(look, handles) if data is not None]
 
     def ready_servers(self) -> frozenset[bytes]:
-        """For a client: the writers of answers of those servers that can be called."""
+        """Return the response writers of callable servers. For clients."""
         if self.is_closed:
             return frozenset()
         there = self._handles()
@@ -249,7 +256,7 @@ class ServiceChannel:
         return self._ready
 
     def _handles(self) -> tuple[int, ...]:
-        """All that have been found, by numbers of Cyclone DDS's."""
+        # Changes whenever the matches do.
         readers = (each.get_matched_publications() for each in self._readers)
         return (*self._writers[0].get_matched_subscriptions(), -1, *(one for each in readers for one in each))
 
@@ -278,7 +285,7 @@ class ServiceChannel:
     def _is_confirmed(
         self, reader: DdsEndpoint, writers: list[DdsEndpoint], failing: list[list[DdsEndpoint]]
     ) -> bool:
-        """Whether a server of nep has told that it has found all that belongs to this client."""
+        # True if a nep server has reported matches with all endpoints of this client.
         pairs = [(self._writers[0], [reader]), (self._readers[0], writers)]
         pairs += zip(self._readers[1:], failing, strict=True)
         return all(
@@ -291,11 +298,11 @@ class ServiceChannel:
         )
 
     def servers(self) -> frozenset[bytes]:
-        """For a client: the writers of answers that are there now."""
+        """Return the response writers of all matched servers. For clients."""
         return frozenset() if self.is_closed else frozenset(e.gid for e in self._matched(self._readers[0]))
 
     def hears_us(self, client: DdsEndpoint) -> bool:
-        """For a server: whether the client that has this writer of requests can be answered."""
+        """Return True if the client with this request writer can be answered. For servers."""
         there = [each for each in self._matched(self._writers[0]) if each.participant == client.participant]
         word = client.told.get("clientid")
         return any(word is None or each.told.get("clientid") in {None, word} for each in there)
@@ -303,13 +310,13 @@ class ServiceChannel:
     # ---- closing
 
     def finish(self, timeout_s: float) -> None:
-        """Wait until what was written is confirmed. Without the participant's lock."""
+        """Wait for acknowledgements. Call without the participant's lock."""
         if not self.is_closed and not has_forked() and timeout_s > 0.0 and not self.participant.has_closed():
-            for writer in self._writers:  # not `wait_for_acks`, which fails when the time is over
+            for writer in self._writers:  # `wait_for_acks` raises on timeout
                 writer._wait_for_acks(writer._ref, int(min(timeout_s, 3600.0) * 1e9))  # noqa: SLF001
 
     def close(self) -> None:
-        """Leave the network. May be called twice."""
+        """Close all endpoints. Idempotent."""
         if has_forked():
             return
         with self.participant.changed:

@@ -1,6 +1,6 @@
-"""Ros2Client: calls a service of ROS 2. What type it has is told by its server, unless the client is told.
+"""Ros2Client: calls a ROS 2 service. The type is taken from the server unless it is given.
 
-DDS sends a request to all servers of the name; the first answer counts.
+DDS delivers a request to all servers of a name; the first response counts.
 """
 
 from __future__ import annotations
@@ -29,15 +29,14 @@ __all__ = ["Ros2Client"]
 
 _logger = logging.getLogger("nep")
 _SEEK_S, _WATCH_S = 0.02, 0.1
-"""How often a server is looked for, and whether it is still there."""
+"""Intervals for discovering a server, and for checking that it still exists."""
 
 Then = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way; `servers` may answer it, None: it was not sent."""
-
+    # Call in flight. `servers` may respond; None if it isn't sent yet.
     number: int
     data: bytes | memoryview
     timeout_s: float | None
@@ -51,9 +50,9 @@ class _Call:
 
 
 class Ros2Client(ClientCalls[_Call]):
-    """A client: its calls that are under way. Raises `BadTopicError`, `NepError`.
+    """Client with its calls in flight. Raises `BadTopicError`, `NepError`.
 
-    `_lock` is taken after the participant's lock, never before it.
+    Lock order: the participant's lock before `_lock`.
     """
 
     def __init__(
@@ -76,16 +75,16 @@ class Ros2Client(ClientCalls[_Call]):
         self._told = None if told is None else known_service(participant.types, told)
         try:
             channel: ServiceChannel | None = None
-            with contextlib.suppress(NepError):  # calls are told: another server may come meanwhile
+            with contextlib.suppress(NepError):  # reported by calls: another server may appear meanwhile
                 channel = self._open_channel()
             if channel is not None:
                 wait_for_others(participant, channel.known, lambda: channel.entities)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.close()
             raise
 
     def _open_channel(self) -> ServiceChannel | None:
-        """It, as soon as its type is known: what the client was told, or else what the first server has."""
+        # Returns None while the type is unknown: neither given nor announced by a server.
         with self._participant.changed:
             found = [
                 name
@@ -112,29 +111,29 @@ class Ros2Client(ClientCalls[_Call]):
 
     @property
     def record(self) -> SubscriberRecord:
-        """For the graph."""
+        """Record for the graph."""
         return SubscriberRecord(self.spec.id, topic_of(self.spec.service), SERVICE_TYPE)
 
     @property
     def counts(self) -> SubscriberCount:
-        """For the graph."""
+        """Statistics for the graph."""
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed))
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a server that can be called."""
+        """True if a server can be called."""
         with self._participant.changed:
             if self.is_closed:
                 return False
             if not self._ready_servers():
-                with contextlib.suppress(NepError):  # a server's type is not known here
+                with contextlib.suppress(NepError):  # the server's type is unknown here
                     self._open_channel()
             return bool(self._ready_servers())
 
     # ---- calling
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -148,14 +147,13 @@ class Ros2Client(ClientCalls[_Call]):
         return call
 
     def _send_waiting(self) -> None:
-        """Send what waits for a server, if there is one."""
         wrong: NepError | None = None
         with self._participant.changed:
             channel, servers = self._channel, self._ready_servers()
-            if not servers:  # looking at all that is there takes its time
+            if not servers:  # only without a ready server: listing all endpoints is slow
                 try:
                     channel, servers = self._open_channel(), self._ready_servers()
-                except NepError as error:  # the server has a type that is not known here
+                except NepError as error:  # the server's type is unknown here
                     wrong = error
             with self._lock:
                 waiting = [each for each in self._calls.values() if each.servers is None]
@@ -183,10 +181,10 @@ class Ros2Client(ClientCalls[_Call]):
                 reason = _("the call cannot be sent: {reason}").format(reason=error)
                 self._end(call, NepError(reason))
 
-    # ---- closing
+    # ---- outcomes
 
     def _heard(self, heard: HeardPart) -> None:
-        """In the participant's thread: an answer."""
+        # Runs in the participant's thread.
         channel = self._channel
         if channel is None:
             return
@@ -197,7 +195,7 @@ class Ros2Client(ClientCalls[_Call]):
         self._end_numbered(heard.id.number, outcome)
 
     def _told_failure(self, call: CallId, reply: Reply) -> None:
-        """In the participant's thread: a server of nep tells that there is no answer."""
+        # Runs in the participant's thread: an error from a nep server.
         self._end_numbered(call.number, reply)
 
     def _end_numbered(self, number: int, outcome: Outcome) -> None:
@@ -216,7 +214,7 @@ class Ros2Client(ClientCalls[_Call]):
         self._tell(call, outcome)
 
     def expire(self, now: float) -> float:
-        """Send what waited for a server, and end what waited too long, or whose servers are gone."""
+        """Send waiting calls; fail expired calls and those whose servers have disappeared."""
         with self._lock:
             is_waiting = any(each.servers is None for each in self._calls.values())
         if is_waiting:
@@ -238,15 +236,15 @@ class Ros2Client(ClientCalls[_Call]):
             ]
         return min(dues, default=math.inf)
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - at once
-        """The services that have a server now."""
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
+        """Return the names of services that have a server."""
         found = (ros_service(each.topic) for each in self._participant.endpoints("reader"))
         return tuple(sorted({each for each in found if each is not None}))
 
     # ---- closing
 
     def close(self) -> None:
-        """Calls that are under way end. May be called twice."""
+        """Unregister; calls in flight fail with `ClosedError`. Idempotent."""
         with self._lock:
             if self.is_closed:
                 return

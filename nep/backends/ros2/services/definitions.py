@@ -1,6 +1,6 @@
-"""Types of services of ROS 2, by their names: the common ones, and those of .srv files.
+"""ROS 2 service types: the common ones, and those of .srv files.
 
-`nep_msgs/srv/Call` is that by which nep itself calls nep: see `nep.backends.typed_services`.
+`nep_msgs/srv/Call` is the type for calls between nep nodes, see `nep.backends.typed_services`.
 """
 
 from __future__ import annotations
@@ -45,23 +45,22 @@ _LARGEST_FILE = 2**20
 
 
 def request_of(service_type: str) -> str:
-    """The type of its requests."""
+    """Return the request type of a service type."""
     return f"{service_type}_Request"
 
 
 def answer_of(service_type: str) -> str:
-    """The type of its answers."""
+    """Return the response type of a service type."""
     return f"{service_type}_Response"
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A request or answer in CDR."""
-
+    # Codec of a request or response in CDR.
     types: MessageTypes
     name: str
 
-    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - whatever was given
+    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - any payload
         return self.types.encode(self.name, payload)
 
     def decode(self, data: bytes) -> dict[str, Any]:
@@ -72,7 +71,7 @@ class _Part:
 
 
 def known_service(types: MessageTypes, name: str) -> TypedService:
-    """A type of services by its whole name. Raises `NepError` for one that is not known."""
+    """Return a service type by its full name. Raises `NepError` for an unknown one."""
     texts = _COMMON.get(name) or _in_folders(name)
     if texts is None:
         raise NepError(
@@ -93,7 +92,7 @@ def known_service(types: MessageTypes, name: str) -> TypedService:
 
 
 def _in_folders(name: str) -> tuple[str, str] | None:
-    """The texts of the .srv file of this type, above and below its line."""
+    # Returns the parts of the .srv file before and after its separator.
     package, _srv, last = name.split("/")
     for folder in filter(None, os.environ.get(FOLDERS, "").split(os.pathsep)):
         for path in sorted(Path(folder).rglob(f"{last}.srv")):
@@ -117,7 +116,7 @@ def _in_folders(name: str) -> tuple[str, str] | None:
 
 
 def served_type(types: MessageTypes, msg_type: str) -> TypedService:
-    """The type of a server or client that is made for `msg_type`. Raises `NepError`."""
+    """Return the service type for a server's or client's `msg_type`. Raises `NepError`."""
     name = service_type_name(msg_type)
     if name is not None:
         return known_service(types, name)
@@ -131,5 +130,5 @@ def served_type(types: MessageTypes, msg_type: str) -> TypedService:
 
 
 def codec_of_calls(msg_type: str) -> Codec:
-    """The codec of a client's calls: a type of ROS has maps, which may have bytes and NaN."""
+    """Return the codec of a client's calls. ROS types use msgpack, which supports bytes and NaN."""
     return CODECS["msgpack"] if service_type_name(msg_type) is not None else codecs.codec_for(msg_type)

@@ -1,4 +1,4 @@
-"""Ros2Server: serves a service of ROS 2. Requests are read in the participant's thread."""
+"""Ros2Server: serves a ROS 2 service. Requests are read in the participant's thread."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["Ros2Server"]
 
 _logger = logging.getLogger("nep")
 _MEET_S = 1.0
-"""So long an answer waits for a client that can call already and cannot be answered yet."""
+"""Seconds that a response waits for the match with the client's reader."""
 _LOOK_S = 0.01
 
 
 class Ros2Server:
-    """A server: its queue. Raises `BadTopicError`, `NepError`."""
+    """Server with a call queue. Raises `BadTopicError`, `NepError`."""
 
     def __init__(
         self,
@@ -48,25 +48,25 @@ class Ros2Server:
         )
         try:
             wait_for_others(participant, self._channel.known, lambda: self._channel.entities)
-        except BaseException:  # also Ctrl+C: nobody has it, so nobody could close it
+        except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self._channel.close()
             raise
 
     @property
     def record(self) -> PublisherRecord:
-        """For the graph."""
+        """Record for the graph."""
         return PublisherRecord(
             self.spec.id, topic_of(self.spec.service), self._type.name, SERVICE_TYPE, self.endpoints
         )
 
     @property
     def counts(self) -> PublisherCount:
-        """For the graph."""
+        """Statistics for the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def _asked(self, heard: HeardPart) -> None:
-        """In the participant's thread, under its lock."""
+        # Runs in the participant's thread, with its lock held.
         try:
             asked = self._type.call_in(heard.cdr)
         except NepError as error:
@@ -86,7 +86,7 @@ class Ros2Server:
         if self._type.is_nep or reply.kind == CallKind.ANSWER:
             try:
                 cdr = self._type.body_of_reply(reply)
-            except NepError as error:  # what the callback gave is no answer of this type
+            except NepError as error:  # the callback's result doesn't fit the type
                 reply = failure(CallKind.ERROR, type(error).__name__, str(error))
         self.tally.add(reply)
         if self._channel.is_closed:
@@ -102,13 +102,13 @@ class Ros2Server:
     def _write(self, call: CallId, cdr: bytes | None, reply: Reply) -> None:
         if cdr is not None:
             self._channel.send(call, cdr)
-        else:  # ROS has no form for it: its clients wait until their time is up
+        else:  # ROS has no form for errors: its clients wait until their timeout
             self._channel.send_failure(call, reply)
 
     def _meet(self, heard: HeardPart) -> None:
-        """Wait until the client's reader of answers is found, which need not be as quick as its writer."""
+        # The client's reader may be discovered later than its writer.
         if heard.writer is None or "nepid" in heard.writer.told:
-            return  # it is gone, or has seen to that itself
+            return  # disconnected, or a nep client, which waits for the match itself
         deadline = time.monotonic() + _MEET_S
         with self._participant.changed:
             while not self._channel.is_closed and not self._channel.hears_us(heard.writer):
@@ -120,12 +120,12 @@ class Ros2Server:
     # ---- closing
 
     def begin_close(self) -> None:
-        """Refuse the calls that wait and those that still come."""
+        """Reject queued and new calls."""
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
-        """The same, and end: answers are confirmed within `timeout_s`. May be called twice."""
+        """Close; waits up to `timeout_s` seconds for acknowledgements of responses. Idempotent."""
         self.begin_close()
         if self.is_closed:
             return
@@ -135,6 +135,6 @@ class Ros2Server:
         self._on_close(self)
 
     def forked(self) -> None:
-        """In a child. See `ServerTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         self.calls.forked()
