@@ -1,7 +1,7 @@
-"""The back end `ros`: ROS 1 through rospy. Nodes of nep meet nodes of ROS at the ROS master.
+"""Back end `ros`: ROS 1 over rospy. Nodes of nep and ROS nodes share the ROS master.
 
-`library` finds rospy, `process` has the one ROS node of a process, `master` asks the ROS master, `definition`
-and `carried` make bytes of ROS messages, `transport` joins them. See docs/ros.md.
+`library` loads rospy, `process` is the process's one ROS node, `master` queries the ROS master, `definition`
+and `carried` convert ROS messages, and `transport` implements `nep.backends.base`. See docs/ros.md.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["BACKEND"]
 
 
 def _open(node: NodeRecord) -> Transport:
-    from nep.backends.ros.transport import RospyTransport  # noqa: PLC0415 - XML-RPC is heavy, and for ROS only
+    from nep.backends.ros.transport import RospyTransport  # noqa: PLC0415 - XML-RPC is slow to import and only for ROS
 
     return RospyTransport(node)
 

@@ -1,4 +1,4 @@
-"""Where the ROS master is. Without what asking it needs: this is imported with every node of nep."""
+"""Address of the ROS master. Kept separate because it is imported with every nep node."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _PORT = 11311
 
 
 def address_of(given: str | None) -> str:
-    """Where the ROS master is, HOST:PORT: `given`, else $ROS_MASTER_URI, else "127.0.0.1:11311".
+    """Return the ROS master's address as HOST:PORT: `given`, else $ROS_MASTER_URI, else 127.0.0.1:11311.
 
-    "http://HOST:PORT" is understood; the port 11311 is added when there is none. Raises `NepError`.
+    Accepts "http://HOST:PORT"; the port defaults to 11311. Raises `NepError`.
     """
     text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_PORT}"
     if not isinstance(text, str):
@@ -38,6 +38,6 @@ def address_of(given: str | None) -> str:
 
 
 def is_own_computer(address: str) -> bool:
-    """Whether it is reached by a loopback address."""
+    """Return True for a loopback address."""
     host = host_of(address)
     return host == "localhost" or host.startswith("127.")

@@ -1,16 +1,16 @@
-"""What carries what: message types of nep in messages of ROS, and back.
+"""Type mapping between message types of nep and ROS messages.
 
-| msg_type                      | ROS message                   | its bytes are                          |
-|-------------------------------|-------------------------------|----------------------------------------|
-| json, and any name that is no ROS type | std_msgs/String      | JSON text in `data`                    |
-| string                        | std_msgs/String               | the text in `data`                     |
-| bytes, msgpack                | std_msgs/UInt8MultiArray      | in `data`                              |
-| image                         | sensor_msgs/CompressedImage   | JPEG or PNG in `data`                  |
-| sensor_msgs/Image             | itself                        | raw pixels; a picture's array          |
-| package/Type                  | itself                        | what `nep.backends.ros.definition` says |
+| msg_type                      | ROS message                 | data                                     |
+|-------------------------------|-----------------------------|------------------------------------------|
+| json, and other non-ROS names | std_msgs/String             | JSON text in `data`                      |
+| string                        | std_msgs/String             | the text in `data`                       |
+| bytes, msgpack                | std_msgs/UInt8MultiArray    | the bytes in `data`                      |
+| image                         | sensor_msgs/CompressedImage | JPEG or PNG in `data`                    |
+| sensor_msgs/Image             | itself                      | raw pixels, an array                     |
+| package/Type                  | itself                      | see `nep.backends.ros.definition`        |
 
-Readers take what the publisher's connection tells, not what they expect: a subscriber of `image` reads both
-messages with pictures, one of `json` reads any message as a map.
+The ROS type announced by the publisher's connection decides how a message is decoded: a subscriber of `image`
+accepts both image messages, and one of `json` decodes any message to a map.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 STAMP = struct.Struct("<III")
-"""With what a message that has a header begins: seq, secs, nsecs."""
+"""Start of a message with a header: seq, secs, nsecs."""
 _LENGTH = struct.Struct("<I")
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
 _STRING = "std_msgs/String"
@@ -58,13 +58,13 @@ _MD5SUMS = {
     _COMPRESSED: "8f7a12909da2c9d3332d540a0977563f",
     _RAW: "060021388200f6f0f447d0fcd9c64743",
 }
-"""Of the definitions that are built in here."""
+"""Checksums of the built-in definitions."""
 _CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _ARRAY, "image": _COMPRESSED}
 _EMPTY_LAYOUT = bytes(8)
 _DEPTH_HEADER = 12
-"""Parameters of compressed_depth_image_transport, which 16-bit pictures do not need; a PNG follows."""
+"""Header of compressed_depth_image_transport, unused for 16-bit images; a PNG follows."""
 _NUMBER = 6
-"""No number of the native wire: such messages do not travel there."""
+"""Not a codec number of the native wire, on which such messages aren't sent."""
 _definitions: dict[str, Definition] = {}
 
 Unpacked = tuple[bytes | memoryview, Mapping[str, object] | None]
@@ -72,17 +72,20 @@ Unpack = Callable[[memoryview], Unpacked]
 
 
 def is_ros_type(msg_type: str) -> bool:
-    """Whether it names a message of ROS: "package/Type", the type with a capital."""
+    """Return True for a ROS type name: "package/Type", the type with a capital letter."""
     return _ROS_TYPE.fullmatch(msg_type) is not None
 
 
 def ros_type_of(msg_type: str) -> str:
-    """The ROS message that carries a message type."""
+    """Return the ROS message for a message type."""
     return msg_type if is_ros_type(msg_type) else _CARRIERS[codec_for(msg_type).name]
 
 
 def installed(name: str) -> Definition:
-    """The definition of an installed ROS message. Raises `NepError` that says what to install."""
+    """Return the definition of an installed ROS message.
+
+    Raises `NepError`, which names the package to install.
+    """
     if name not in _definitions:
         found = message_text(name)
         if found is None:
@@ -92,7 +95,7 @@ def installed(name: str) -> Definition:
 
 
 def not_installed(name: str, what: str) -> NepError:
-    """That a type is not there; `what` it would be."""
+    """Return the error for a type that isn't installed; `what` is its kind."""
     known = escaped(shortened(name, 100))
     return NepError(
         _(
@@ -106,7 +109,7 @@ def not_installed(name: str, what: str) -> NepError:
 
 
 def codec_of(msg_type: str) -> Codec:
-    """The codec of this back end for a message type. Raises `NepError` for a ROS type that is not there."""
+    """Return the codec of a message type. Raises `NepError` for a ROS type that isn't installed."""
     if msg_type in _PICTURES:
         return _picture_codec(installed(msg_type))
     if is_ros_type(msg_type):
@@ -116,7 +119,7 @@ def codec_of(msg_type: str) -> Codec:
 
 
 def ros_codec(definition: Definition) -> Codec:
-    """Maps ↔ the bytes of a ROS message."""
+    """Return a codec that converts between maps and a ROS message."""
 
     def encode(payload: object) -> Encoded:
         return Encoded(definition.encode(_stamped(payload) if definition.has_header else payload))
@@ -128,7 +131,7 @@ def ros_codec(definition: Definition) -> Codec:
 
 
 def _stamped(payload: object) -> object:
-    """A map with the time of now where its header has none; ROS 2's names of a time become ROS 1's."""
+    # Fills in the current time if the header has none, and accepts ROS 2's field names of a time.
     if not isinstance(payload, Mapping):
         return payload
     header = payload.get("header", {})
@@ -177,7 +180,7 @@ def _check_file(made: Encoded, kind: str) -> str:
 
 
 def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
-    """The body of a ROS message with these bytes of a codec. Raises `EncodeError`, `WireError`."""
+    """Return the ROS message body for encoded data. Raises `EncodeError`, `WireError`."""
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
         head = bytes(4) + _now() + bytes(4)
@@ -227,7 +230,7 @@ def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> byte
 
 @dataclass(frozen=True)
 class Unpacker:
-    """How the messages of one publisher are read. `unpack` raises `WireError` for what is no such message."""
+    """Decoder for messages of one publisher. `unpack` raises `WireError` for invalid messages."""
 
     codec: Codec
     msg_type: str
@@ -236,9 +239,9 @@ class Unpacker:
 
 
 def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpacker:
-    """For a subscriber of `msg_type` who hears messages of `ros_type`, defined by `text`.
+    """Return the decoder for a subscriber of `msg_type` and messages of `ros_type`, defined by `text`.
 
-    Raises `NepError` when they do not go together.
+    Raises `NepError` if the types aren't compatible.
     """
     wanted = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
@@ -257,7 +260,7 @@ def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpa
 
 
 def _installed_like(ros_type: str, md5sum: str) -> Definition:
-    """For a publisher who does not tell its definition."""
+    # For a publisher that doesn't announce its definition.
     definition, found = installed(ros_type), message_text(ros_type)
     if found is None or md5sum not in {"*", found[1]}:
         raise another_version(ros_type)
@@ -265,7 +268,7 @@ def _installed_like(ros_type: str, md5sum: str) -> Definition:
 
 
 def another_version(ros_type: str) -> NepError:
-    """That the other side has another definition of it."""
+    """Return the error for a type with another definition on the other side."""
     return NepError(
         _(
             "its '{ros_type}' has other fields than the one known here; use the same version on both sides"
@@ -282,7 +285,7 @@ def _mismatch(msg_type: str, ros_type: str) -> NepError:
 
 
 def _sized(body: memoryview, at: int) -> tuple[memoryview, int]:
-    """The bytes behind their length at `at`, and where they end."""
+    # Returns the bytes after the length at `at`, and the offset of their end.
     (size,) = _LENGTH.unpack_from(body, at)
     if at + 4 + size > len(body):
         raise WireError(_("it is cut off"), len(body))
@@ -322,7 +325,7 @@ def _from_compressed(body: memoryview) -> Unpacked:
 
 
 def _from_raw(body: memoryview) -> Unpacked:
-    """Rows without what pads them, little-endian."""
+    # Returns the rows without padding, in little-endian order.
     _frame, at = _sized(body, STAMP.size)
     height, width = struct.unpack_from("<II", body, at)
     name, at = _sized(body, at + 8)

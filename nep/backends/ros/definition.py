@@ -1,9 +1,9 @@
-"""Definitions of ROS messages: their text ↔ how maps become bytes and back. No ROS is needed for it.
+"""ROS message definitions: parser, and conversion between maps and bytes. Needs no ROS installation.
 
-Who publishes tells every subscriber the whole definition, so that messages are read whose package is not
-installed, and no program is made from what a stranger wrote. A map has the fields by their names; what is
-left out is zero or empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`, when written also
-seconds as a number; arrays are lists, `uint8[]` and `char[]` are bytes.
+A publisher sends the full definition to each subscriber, so messages of packages that aren't installed can be
+decoded, and no code is generated from untrusted input. A map has the fields by name; missing ones are zero or
+empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`, or a number of seconds when encoding.
+Arrays are lists, `uint8[]` and `char[]` are bytes.
 """
 
 from __future__ import annotations
@@ -36,27 +36,24 @@ _LENGTH = struct.Struct("<I")
 _HEADERS = ("Header", "std_msgs/Header", "roslib/Header")
 _DEEPEST = 30
 _MOST_FIELDS = 2_000
-"""With all that is inside: a definition may come from a stranger, and needs memory for each of them."""
+"""Limit including nested fields: a definition may come from an untrusted publisher."""
 _MOST_EMPTY = 10_000
-"""So many messages without bytes may be in one."""
+"""Maximum number of nested messages without content."""
 
 
 class _FieldError(Exception):
-    """What is wrong with the field at `path`."""
-
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         self.reason = reason
 
 
 class _Reader:
-    """Takes values from bytes, one after the other. Raises `struct.error` at their end."""
-
+    # Reads values sequentially. Raises `struct.error` at the end of the data.
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = memoryview(data)
         self.at = 0
         self.messages_left = _MOST_EMPTY + _DEEPEST * len(self.data)
-        """So many messages may be inside: those without bytes are bounded by nothing else."""
+        """Remaining number of nested messages; those without content are not bounded by the data's size."""
 
     @property
     def left(self) -> int:
@@ -74,9 +71,10 @@ class _Reader:
 
 @dataclass(frozen=True)
 class FieldKind:
-    """Type of a field: how its values are written and read. A value has `least` bytes or more.
+    """Type of a field with its encoder and decoder. A value has at least `least` bytes.
 
-    `fields` are those of a message; `element` is what an array consists of, `length` the size of a fixed one.
+    `fields` are those of a message; `element` is the type of an array's items, `length` the size of a fixed
+    array.
     """
 
     name: str
@@ -98,20 +96,20 @@ class DefinitionField:
 
 @dataclass(frozen=True)
 class Definition:
-    """A message type. `text` is its definition with those of all that it has inside; made by `parse`."""
+    """Message type, created by `parse`. `text` is its definition including those of nested types."""
 
     name: str
     text: str
     fields: tuple[DefinitionField, ...]
     has_header: bool
-    """Whether its first field is a header: then the bytes begin with seq, secs and nsecs."""
+    """True if the first field is a header: the data then begins with seq, secs and nsecs."""
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
         return tuple(each.name for each in self.fields)
 
     def encode(self, payload: object) -> bytes:
-        """A map as bytes. Raises `EncodeError`, whose place is the field's path."""
+        """Encode a map. Raises `EncodeError` with the field path."""
         out = bytearray()
         try:
             _write_fields(self.name, self.fields, payload, "", out)
@@ -123,7 +121,7 @@ class Definition:
         return bytes(out)
 
     def decode(self, data: bytes | memoryview) -> dict[str, object]:
-        """Bytes as a map. Raises `DecodeError` with the path of the field that does not fit."""
+        """Decode a map. Raises `DecodeError` with the path of the invalid field."""
         reader = _Reader(data)
         try:
             made = _read_fields(self.fields, reader, "")
@@ -137,7 +135,7 @@ class Definition:
         return made
 
     def check(self, payload: object) -> None:
-        """Raises `EncodeError` for what is no map."""
+        """Raise `EncodeError` if the payload isn't a map."""
         if not isinstance(payload, Mapping):
             raise EncodeError(self.name, type(payload).__name__, _not_a_map(self.fields))
 
@@ -146,7 +144,7 @@ class Definition:
 
 
 def parse(name: str, text: str) -> Definition:
-    """The type `name` ("geometry_msgs/Twist") from its definition. Raises `NepError`."""
+    """Parse the definition of a type such as "geometry_msgs/Twist". Raises `NepError`."""
     sections = _SEPARATOR.split(text)
     texts = {name: sections[0]}
     for section in sections[1:]:
@@ -311,7 +309,7 @@ def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
 
 
 def _write_bool(value: object, path: str, out: bytearray) -> None:
-    is_bool = isinstance(value, bool) or type(value).__name__ in {"bool", "bool_"}  # numpy's, too
+    is_bool = isinstance(value, bool) or type(value).__name__ in {"bool", "bool_"}  # also numpy's
     number = int(bool(value)) if is_bool else _whole(value)
     if number not in {0, 1}:
         raise _wrong(path, value, "bool")
@@ -400,7 +398,7 @@ def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
                 out += struct.pack(f"<{len(values)}{letter}", *values)
                 return
             except (struct.error, OverflowError, TypeError, ValueError):
-                pass  # one by one, to say which
+                pass  # encode one by one to find the invalid item
         for number, each in enumerate(values):
             kind.write(each, f"{path}[{number}]", out)
 
@@ -451,7 +449,7 @@ def _write_fields(
         if each.name in payload:
             each.kind.write(payload[each.name], f"{path}.{each.name}" if path else each.name, out)
         else:
-            out += bytes(each.kind.least)  # empty and zero are zero bytes, whatever it is
+            out += bytes(each.kind.least)  # zero and empty values are zero bytes in every type
     if len(payload) > len(fields) or not payload.keys() <= {each.name for each in fields}:
         names = tuple(each.name for each in fields)
         raise _unknown(path, next(key for key in payload if key not in names), names)
@@ -475,7 +473,7 @@ def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str
 
 
 def _whole(value: object) -> int | None:
-    """A whole number of any class, None for what is none."""
+    # Accepts any integer class, such as numpy's; returns None for others.
     if isinstance(value, bool):
         return None
     if isinstance(value, int):

@@ -1,4 +1,4 @@
-"""The graph of a ROS master as nep shows it: its nodes, and what nep knows of those in this process."""
+"""Graph of a ROS master, with the statistics of nep nodes in this process."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _GENERATION = "ros"
 
 @dataclass(frozen=True)
 class OwnNode:
-    """A node of nep in this process: `ros_name` is that of the ROS node that it shares.
+    """nep node in this process; `ros_name` is the name of the process's ROS node.
 
-    `publishers` are (topic, type, whether it is latched, counts), `subscribers` (topic, type, counts),
-    `servers` and `clients` (service, counts).
+    `publishers` are (topic, type, is_latched, counts), `subscribers` (topic, type, counts), `servers` and
+    `clients` (service, counts).
     """
 
     node: NodeRecord
@@ -52,9 +52,9 @@ class OwnNode:
 
 
 def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
-    """What the master knows; in the place of this process's ROS node stand its nodes of nep.
+    """Return the graph, with this process's nep nodes in place of its ROS node.
 
-    Rates are not known: nobody counts for others in ROS.
+    Rates of other nodes are unknown: ROS doesn't report them.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
     for topic, name in _others(known.publishers, own, lambda each: each.publishers):
@@ -80,7 +80,7 @@ def _others(
     own: list[OwnNode],
     rows_of: Callable[[OwnNode], Sequence[tuple[object, ...]]],
 ) -> Iterator[tuple[str, str]]:
-    """What nodes have that are none of nep's in this process: (topic or service, name of the node)."""
+    # Yields (topic or service, node name) of nodes other than this process's nep nodes.
     mine = {(row[0], each.ros_name) for each in own for row in rows_of(each)}
     return ((each, node) for each, nodes in known.items() for node in nodes if (each, node) not in mine)
 
@@ -114,17 +114,17 @@ def _tell(graph: Graph, request: Request) -> None:
 
 
 def _node(name: str, uri: str) -> NodeRecord:
-    """A node of ROS: its name is its id, because a master has one of a name."""
+    # The name is the id: a ROS master has only one node per name.
     host = urlsplit(uri).hostname or "" if uri else ""
     return NodeRecord(name, name.lstrip("/"), host, None, language="", generation=_GENERATION)
 
 
 def publisher_id(node: str, topic: str) -> int:
-    """The id of the publisher of a topic in a node of ROS, both by their whole names."""
+    """Return the id of a ROS node's publisher of a topic, both by full name."""
     return _id(node, topic, "o")
 
 
 def _id(*words: str) -> int:
-    """The same number for the same words, in every process."""
+    # Stable across processes.
     digest = hashlib.sha256("\0".join(words).encode()).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1

@@ -1,8 +1,8 @@
-"""The library rospy: found when the first node asks for it, also in a venv beside Debian's Python.
+"""Access to rospy: loaded with the first node, also from a venv beside Debian's Python.
 
-pip has no rospy. Debian's packages lie where a venv does not look. They are found there by a finder that
-comes last and knows the names of ROS and of what ROS imports only: so nothing else of the system, such as
-its numpy, is ever found there, and whatever the venv has is taken from the venv.
+rospy isn't on PyPI, and a venv doesn't search the folder of Debian's packages. A finder at the end of
+`sys.meta_path` searches it for ROS and the dependencies of ROS only, so that no other system package, such as
+numpy, is imported, and packages of the venv take precedence.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _inherited: set[str] = set()
 
 
 class RosFinder(MetaPathFinder):
-    """Finds ROS, and `extra` packages of messages by their names, in the first of these folders."""
+    """Finder for ROS, and for the message packages in `extra`, in a list of folders."""
 
     def __init__(self, places: Sequence[str]) -> None:
         self._places = list(places)
@@ -47,9 +47,9 @@ class RosFinder(MetaPathFinder):
         self,
         name: str,
         path: Sequence[str] | None,
-        target: ModuleType | None = None,  # noqa: ARG002 - Python's contract
+        target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
-        """A top-level package of ROS; what is inside of one is found by itself."""
+        """Find a top-level package of ROS; submodules are found by the package itself."""
         if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_ENDINGS)):
             return None
         return importlib.machinery.PathFinder.find_spec(name, self._places)
@@ -59,14 +59,14 @@ _finder = RosFinder([place for place in PLACES if Path(place).is_dir()])
 
 
 def _forked() -> None:
-    """In a child: rospy's threads stayed behind, and it can be started once in a process only."""
+    # In a forked child rospy's threads don't exist, and it can be started only once per process.
     core = sys.modules.get("rospy.core")
     if core is None or not core.is_initialized():
         return
     _inherited.add("rospy")
     at_exit = getattr(core, "_ros_atexit", None)
     if at_exit is not None:
-        atexit.unregister(at_exit)  # it would unregister what is the parent's
+        atexit.unregister(at_exit)  # it would unregister the parent's publishers and subscribers
     topics = sys.modules["rospy.impl.registration"].get_topic_manager()
     for each in [*topics.pubs.values(), *topics.subs.values()]:
         for connection in each.connections:
@@ -77,10 +77,12 @@ def _forked() -> None:
 in_child(_forked)
 
 
-def library() -> Any:  # noqa: ANN401 - it has no types
-    """Rospy. Raises `BackendUnavailableError` where it is not installed.
+def library() -> Any:  # noqa: ANN401 - not typed
+    """Return rospy.
 
-    Raises `NepError` in a child that was forked from a program that uses it.
+    Raises:
+        BackendUnavailableError: rospy is not installed.
+        NepError: The process was forked from one that uses rospy.
     """
     if _inherited:
         raise NepError(
@@ -93,7 +95,7 @@ def library() -> Any:  # noqa: ANN401 - it has no types
 
 
 def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> ModuleType:
-    """Import rospy, so that it changes nothing for others. Raises `BackendUnavailableError`."""
+    """Import rospy without side effects on the program. Raises `BackendUnavailableError`."""
     if _finder not in sys.meta_path:
         sys.meta_path.append(_finder)
     logger_class = logging.getLoggerClass()
@@ -108,13 +110,13 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
             _("install it with 'sudo apt install python3-rospy python3-std-msgs python3-sensor-msgs'"),
         ) from error
     finally:
-        logging.setLoggerClass(logger_class)  # rospy sets its own for all that the program will log
+        logging.setLoggerClass(logger_class)  # rospy replaces the logger class for the whole program
     warnings.filterwarnings("ignore", category=DeprecationWarning, module=_OLD_WAYS)
     return made
 
 
 class ServiceTexts(NamedTuple):
-    """The definition of a service: of its request and its answer, and their MD5 sum."""
+    """Definitions of a service's request and response, and its MD5 sum."""
 
     request: str
     answer: str
@@ -122,14 +124,14 @@ class ServiceTexts(NamedTuple):
 
 
 def message_text(name: str) -> tuple[str, str] | None:
-    """Definition and MD5 sum of an installed type ("geometry_msgs/Twist"); None when there is none."""
+    """Return definition and MD5 sum of an installed message type; None if not installed."""
     found = _found(name, "msg")
     text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
 def service_texts(name: str) -> ServiceTexts | None:
-    """The definition of an installed type of services ("std_srvs/SetBool"); None when there is none."""
+    """Return the definition of an installed service type, such as "std_srvs/SetBool", or None."""
     found = _found(name, "srv")
     request, answer = (
         getattr(getattr(found, each, None), "_full_text", None)
@@ -142,13 +144,12 @@ def service_texts(name: str) -> ServiceTexts | None:
 
 
 def _found(name: str, folder: str) -> object:
-    """The class of an installed type; None when there is none."""
     package, _slash, kind = name.partition("/")
     if not package.isidentifier() or not kind.isidentifier():
         return None
     library()
     if not _has_folder(package, folder):
-        return None  # to import it would run whatever it is: the name may come from a stranger
+        return None  # importing runs code, and the name may be untrusted
     try:
         return getattr(importlib.import_module(f"{package}.{folder}"), kind, None)
     except ImportError:
@@ -156,7 +157,7 @@ def _found(name: str, folder: str) -> object:
 
 
 def _has_folder(package: str, folder: str) -> bool:
-    """Whether a package has messages or services, seen by its files; then it can be imported."""
+    # Checks for files, without importing the package.
     if any(Path(place, package, folder, "__init__.py").is_file() for place in PLACES):
         _finder.extra.add(package)
         return True

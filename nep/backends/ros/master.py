@@ -1,4 +1,4 @@
-"""RosMaster: what the ROS master is asked for, each time with a limit. No rospy is needed for it."""
+"""RosMaster: XML-RPC client for the ROS master, with timeouts. Doesn't need rospy."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ __all__ = ["Registered", "RosMaster", "RosMasterUnreachable", "RosNodes", "buses
 
 _CALLER = "/nep"
 _ASK_S = 1.0
-"""A master on a network answers within this time, or the attempt is over."""
+"""Timeout of one request to a master."""
 _AGAIN_S = 0.1
 _OF_ROSPY = ("/get_loggers", "/set_logger_level")
-"""Services that every node of ROS has."""
+"""Services that every ROS node has."""
 _FAILURES = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
 )  # fmt: skip
-"""What asking for something raises, also when somebody else than a master listens there."""
+"""Exceptions of a request, including those caused by other servers at the address."""
 
 
 class RosMasterUnreachable(MasterUnreachable):
-    """No ROS master answered at `address` within `waited_s` seconds."""
+    """Error when no ROS master answers at `address` within `waited_s` seconds."""
 
     def __init__(self, address: str, waited_s: float) -> None:
         self.address = address
@@ -45,8 +45,6 @@ class RosMasterUnreachable(MasterUnreachable):
 
 
 class _Transport(xmlrpc.client.Transport):
-    """Gives up after a time."""
-
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
         self._timeout_s = timeout_s
@@ -57,12 +55,11 @@ class _Transport(xmlrpc.client.Transport):
         return connection
 
 
-class _RefusedError(ValueError):
-    """It answered, and said no."""
+class _RefusedError(ValueError): ...
 
 
 def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noqa: ANN401 - any value
-    """What a master's or a node's method gives. Raises `_FAILURES`."""
+    # Raises `_FAILURES`.
     with xmlrpc.client.ServerProxy(uri, transport=_Transport(max(0.01, timeout_s))) as proxy:
         code, status, value = getattr(proxy, method)(*args)
     if code != 1:
@@ -71,7 +68,7 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
 
 
 def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
-    """The connections of a node: who is at the other end, "i" or "o", the topic. Empty when it is dead."""
+    """Return a node's connections: peer, direction ("i" or "o") and topic. Empty if it doesn't answer."""
     try:
         said = _call(uri, timeout_s, "getBusInfo", _CALLER)
         return [(str(each[1]), str(each[2]), str(each[4])) for each in said]
@@ -81,7 +78,7 @@ def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
 
 @dataclass(frozen=True)
 class RosNodes:
-    """Who publishes, subscribes and serves: name → nodes; the types of topics; where nodes are."""
+    """State of a master: node names by topic or service, types by topic, addresses by node."""
 
     publishers: Mapping[str, Sequence[str]]
     subscribers: Mapping[str, Sequence[str]]
@@ -92,7 +89,7 @@ class RosNodes:
 
 @dataclass(frozen=True)
 class Registered:
-    """What a node has registered: topics with their types, services with their addresses."""
+    """Registrations of a node: topics with types, services with addresses."""
 
     publications: Sequence[Sequence[str]]
     subscriptions: Sequence[Sequence[str]]
@@ -100,14 +97,14 @@ class Registered:
 
 
 class RosMaster:
-    """The master at an address. Every question raises `RosMasterUnreachable` when it has no answer."""
+    """ROS master at an address. Requests raise `RosMasterUnreachable` if it doesn't answer."""
 
     def __init__(self, address: str) -> None:
         self.address = address
         self.uri = f"http://{address}/"
 
     def wait(self, timeout_s: float | None) -> None:
-        """Wait until it answers, None without a limit."""
+        """Wait until the master answers; None waits forever."""
         started = time.monotonic()
         pause = threading.Event()
         while True:
@@ -123,13 +120,13 @@ class RosMaster:
             pause.wait(_AGAIN_S)
 
     def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Nodes that publish on a topic, and nodes that subscribe to it."""
+        """Return the nodes that publish a topic, and those that subscribe to it."""
         state = self._ask("getSystemState", timeout_s)
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
 
     def has_forgotten(self, name: str, timeout_s: float) -> bool:
-        """Whether it answers and knows no node of this name."""
+        """Return True if the master answers and doesn't know the node."""
         try:
             _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
         except _RefusedError:
@@ -139,7 +136,7 @@ class RosMaster:
         return False
 
     def register(self, name: str, uri: str, node: Registered, timeout_s: float) -> bool:
-        """Register all of a node that it has forgotten; whether it took it."""
+        """Register a node again after a restart of the master; return False on failure."""
         try:
             for topic, kind in node.publications:
                 _call(self.uri, timeout_s, "registerPublisher", name, topic, kind, uri)
@@ -153,14 +150,14 @@ class RosMaster:
         return True
 
     def uri_of(self, name: str, timeout_s: float) -> str:
-        """Where a node is; "" when nobody knows."""
+        """Return the address of a node, or ""."""
         try:
             return str(_call(self.uri, timeout_s, "lookupNode", _CALLER, name))
         except _FAILURES:
             return ""
 
     def nodes(self, timeout_s: float) -> RosNodes:
-        """Everybody."""
+        """Return the state of the master."""
         state = self._ask("getSystemState", timeout_s)
         publishers, subscribers, services = (
             {str(each): tuple(names) for each, names in part} for part in state[:3]
@@ -173,12 +170,12 @@ class RosMaster:
         return RosNodes(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
-        """The services that have a server."""
+        """Return the services that have a server."""
         services = self._ask("getSystemState", timeout_s)[2]
         return tuple(str(name) for name, _nodes in services if not str(name).endswith(_OF_ROSPY))
 
     def service_uri(self, name: str, timeout_s: float) -> str:
-        """Where a service is; "" when nobody knows."""
+        """Return the address of a service, or ""."""
         try:
             return str(_call(self.uri, timeout_s, "lookupService", _CALLER, name))
         except _FAILURES:

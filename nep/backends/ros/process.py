@@ -1,7 +1,7 @@
-"""The one ROS node of this process. All nodes of nep in it share it: rospy has one for a process, once.
+"""RosProcess: the one ROS node of this process, shared by all its nep nodes, because rospy allows only one.
 
-It is named after the first of them and lives until the process ends. Nodes that close only unregister their
-publishers and subscribers; after its end rospy could not be started again.
+It is named after the first nep node and lives until the process ends. Nodes that close only unregister their
+publishers and subscribers, because rospy can't be restarted.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _ASK_S = 0.5
 _WATCH_S = 1.0
-"""So often it is seen whether the master was started anew."""
+"""Interval for detecting a restart of the master."""
 _LEAST_S = 0.2
-"""A master that is well answers within this time, however little is left."""
+"""Minimum time in seconds for a request to the master, even when the timeout has almost passed."""
 
 
 def ros_topic(topic: str) -> str:
-    """`topic` itself when ROS allows it. Raises `BadTopicError`."""
+    """Return `topic` if ROS allows it. Raises `BadTopicError`."""
     if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith(("/", "~")):
         raise BadTopicError(
             topic, _("in ROS a topic begins with a letter or '/', and has letters, digits, '_' and '/' only")
@@ -53,7 +53,10 @@ def ros_topic(topic: str) -> str:
 
 
 class RosShutdownError(ClosedError):
-    """The ROS node of this program was shut down: by the program, by 'rosnode kill', by its name's next."""
+    """Error after rospy was shut down.
+
+    Causes are the program itself, 'rosnode kill', or a new node with the same name.
+    """
 
     def __init__(self) -> None:
         self.what = "rospy"
@@ -65,37 +68,37 @@ class RosShutdownError(ClosedError):
 
 
 class RosProcess:
-    """rospy, running. Its methods may be called from any thread."""
+    """Running rospy. Thread-safe."""
 
-    def __init__(self, rospy: Any, address: str) -> None:  # noqa: ANN401 - rospy has no types
+    def __init__(self, rospy: Any, address: str) -> None:  # noqa: ANN401 - rospy is not typed
         self.rospy = rospy
         self.master = RosMaster(address)
         self.name: str = rospy.get_name()
         self.uri: str = rospy.get_node_uri()
         self.changed = threading.Condition()
-        """Notified when somebody connects to a publisher."""
+        """Notified when a subscriber connects to a publisher."""
         self._lock = threading.RLock()
         self._seq_lock = threading.Lock()
         self._types: dict[str, tuple[str, int]] = {}
         self._classes: dict[str, type] = {}
         self._seqs: Counter[str] = Counter()
         self.subscribed: Counter[str] = Counter()
-        """How many subscribers of nep's there are here, by topic."""
+        """Number of nep subscribers in this process, by topic."""
         self._published: dict[str, dict[int, Any]] = {}
         self.handshakes = Handshakes()
         self.at_shutdown: set[Callable[[], None]] = set()
-        """Called when rospy is shut down before the program ends."""
+        """Callbacks for a shutdown of rospy before the end of the program."""
         self._ended = threading.Event()
         rospy.on_shutdown(self._shut_down)
         threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
 
     @property
     def is_over(self) -> bool:
-        """Whether rospy was shut down: nothing comes or goes any more."""
+        """True after rospy was shut down: no messages are sent or received any more."""
         return bool(self.rospy.core.is_shutdown_requested())
 
     def end(self) -> None:
-        """Unregister all and shut rospy down. For the end of the program."""
+        """Unregister everything and shut rospy down at the end of the program."""
         self._ended.set()
         try:
             self.master.wait(_ASK_S)
@@ -104,7 +107,6 @@ class RosProcess:
         self.rospy.signal_shutdown("the program ends")
 
     def _shut_down(self) -> None:
-        """Called by rospy, whoever asked for it."""
         if not self._ended.is_set():
             self._ended.set()
             _logger.warning("%s", RosShutdownError())
@@ -112,32 +114,37 @@ class RosProcess:
                 tell()
 
     def _watch(self) -> None:
-        """Until rospy ends, see whether the master was started anew; in a thread."""
+        # Thread that detects restarts of the master until rospy ends.
         while not self._ended.wait(_WATCH_S):
             if self.master.has_forgotten(self.name, _ASK_S) and self._register_anew():
                 _logger.warning("the ROS master at '%s' was started anew", self.master.address)
 
     def _register_anew(self) -> bool:
-        """Tell the master all that rospy told it, which rospy does not do again; whether it took it."""
+        # Repeats rospy's registrations, which rospy doesn't do after a restart of the master. Returns False
+        # on failure.
         registration = self.rospy.impl.registration
         topics, services = registration.get_topic_manager(), registration.get_service_manager().get_services()
-        with topics.lock:  # what is unregistered meanwhile must not be registered after that
+        with topics.lock:  # a registration removed meanwhile must not be restored
             known = Registered(topics.get_publications(), topics.get_subscriptions(), services)
             return bool(known.publications or known.subscriptions or services) and self.master.register(
                 self.name, self.uri, known, _ASK_S
             )
 
     def resolved(self, topic: str) -> str:
-        """The full name of a topic."""
+        """Return the full name of a topic."""
         return str(self.rospy.resolve_name(ros_topic(topic)))
 
     # ---- publishers
 
-    def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy has no types
-        """Rospy's publisher on a full name. Raises `NepError` when the process has another type on it."""
+    def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy is not typed
+        """Create rospy's publisher for a full name.
+
+        Raises `NepError` if the process uses another type on it.
+        """
         with self._lock:
             impl = self.rospy.impl.registration.get_topic_manager().get_publisher_impl(topic)
-            own = definition.name if impl is None else impl.type  # the program's, such as that of /rosout
+            # may be the program's own, such as that of /rosout
+            own = definition.name if impl is None else impl.type
             known, users = self._types.get(topic, (own, 0))
             if known != definition.name:
                 raise NepError(
@@ -153,20 +160,21 @@ class RosProcess:
             self._types[topic] = definition.name, users + 1
         return made
 
-    def publishes(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy has no types
-        """A publisher of nep's with this id is there, by what `advertise` made for it."""
+    def publishes(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
+        """Add a nep publisher, with the publisher returned by `advertise`."""
         with self._lock:
             self._published.setdefault(topic, {})[id_] = publisher
 
     def publishes_no_more(self, topic: str, id_: int) -> None:
-        """It is closed."""
+        """Remove a closed publisher."""
         with self._lock:
             self._published.get(topic, {}).pop(id_, None)
 
     def publisher_on(self, topic: str) -> int | None:
-        """The id of who publishes a topic in this process; None when it is not one publisher of nep's alone.
+        """Return the id of the only publisher of a topic in this process.
 
-        ROS tells of a message only which process it is from.
+        None if there are several, or others than nep's: ROS reports only the process that a message came
+        from.
         """
         with self._lock:
             found = self._published.get(topic, {})
@@ -176,8 +184,8 @@ class RosProcess:
             impl = publisher.impl
             return id_ if impl is not None and impl.ref_count == 1 else None
 
-    def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
-        """Unregister it."""
+    def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
+        """Unregister a publisher."""
         if self.is_over or not within(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
@@ -186,13 +194,13 @@ class RosProcess:
             if users == 1:
                 del self._types[topic]
 
-    def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy has no types
-        """Unregister it."""
+    def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
+        """Unregister a subscriber."""
         if not self.is_over:
             within(subscriber.unregister, timeout_s)
 
-    def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy has no types
-        """Wait until rospy has sent what it queued; how many connections have some left at `deadline`."""
+    def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
+        """Wait until rospy has sent its queue; return the number of connections with unsent messages."""
         impl = publisher.impl
         pause = threading.Event()
         while True:
@@ -202,9 +210,9 @@ class RosProcess:
             pause.wait(_POLL_S)
 
     def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueRoom) -> int:  # noqa: ANN401
-        """Publish a body; how many older ones were dropped, for a subscriber that takes none.
+        """Publish a body; return the number of older messages dropped because a subscriber doesn't read.
 
-        In a header it gets the next number of its topic, as rospy gives it.
+        A header gets the next sequence number of its topic, as rospy assigns it.
         """
         message = self._class_of(definition)()
         impl = publisher.impl
@@ -216,18 +224,18 @@ class RosProcess:
             message.body = body
             try:
                 publisher.publish(message)
-            except self.rospy.ROSException:  # it was shut down this moment
+            except self.rospy.ROSException:  # shut down just now
                 raise RosShutdownError from None
         return dropped
 
     def _class_of(self, definition: Definition) -> type:
-        """A class of messages that rospy sends as they are."""
+        # Creates a message class whose instances contain encoded bodies.
         made = self._classes.get(definition.name)
         if made is None:
             genpy = self.rospy.msg.genpy
             known = genpy.message.get_message_class(definition.name)
 
-            def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy has no types
+            def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy is not typed
                 buffer.write(message.body)
 
             made = self._classes[definition.name] = type(
@@ -243,8 +251,8 @@ class RosProcess:
 
     # ---- services
 
-    def serve(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy has no types
-        """Rospy's server on a full name. Raises `NepError` when the process has one of this name."""
+    def serve(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
+        """Create rospy's server for a full name. Raises `NepError` if the process already has one."""
         with self._lock:
             if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
                 raise NepError(
@@ -258,28 +266,28 @@ class RosProcess:
     # ---- connections
 
     def peer_subscribe(self, *_told: object) -> None:
-        """Called by rospy when somebody connected to a publisher."""
+        """Process a new connection to a publisher. Called by rospy."""
         with self.changed:
             self.changed.notify_all()
 
     def peer_unsubscribe(self, *_told: object) -> None:
-        """Called by rospy when somebody disconnected from a publisher."""
+        """Do nothing when a subscriber disconnects. Called by rospy."""
 
-    def hearers(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy has no types
-        """Names of the nodes that are connected to a publisher."""
+    def hearers(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy is not typed
+        """Return the names of the nodes connected to a publisher."""
         impl = publisher.impl
         return () if impl is None else tuple(str(each.endpoint_id) for each in impl.connections)
 
     def wait_for_hearers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
-        """Wait until all nodes whose subscribers are registered are connected."""
+        """Wait until all registered subscribers are connected, for up to `timeout_s` seconds."""
         expected = set(self.master.names(topic, _ASK_S)[1])
         with self.changed:
             self.changed.wait_for(lambda: expected <= set(self.hearers(publisher)), timeout_s)
 
     def wait_for_sources(self, topic: str, timeout_s: float) -> None:
-        """Wait until all nodes that publish on a topic say that this one is connected to them.
+        """Wait until all publishers of a topic report a connection to this node.
 
-        rospy's own side of a connection tells nothing: it is listed before it is there.
+        rospy lists its own side of a connection before it is established.
         """
         deadline = time.monotonic() + timeout_s
         pause = threading.Event()
@@ -300,21 +308,22 @@ class RosProcess:
 
 
 def within(call: Callable[[], object], timeout_s: float) -> bool:
-    """Call it in a thread, and wait so long, whether it ended: rospy asks a master without a limit."""
+    """Run `call` in a thread and wait; return False on timeout.
+
+    rospy's requests to a master have no timeout.
+    """
     thread = threading.Thread(target=call, name="nep-ros-unregister", daemon=True)
     try:
         thread.start()
-    except RuntimeError:  # Python 3.12 begins none while the program ends: then rospy itself unregisters all
+    except RuntimeError:  # Python 3.12 starts no threads at exit; rospy itself unregisters everything then
         return False
     thread.join(max(_LEAST_S, timeout_s))
     return not thread.is_alive()
 
 
-def _has_unsent(connection: Any) -> bool:  # noqa: ANN401 - rospy has no types
-    """Whether a connection's thread does anything else than wait for something to send.
-
-    rospy does not tell: what its thread took out of the queue is nowhere to be seen until it is sent.
-    """
+def _has_unsent(connection: Any) -> bool:  # noqa: ANN401 - rospy is not typed
+    # True unless the connection's thread waits for data: messages it has taken from the queue are visible
+    # nowhere else.
     data = getattr(connection, "_cond_data_available", None)
     if data is None or connection.done:
         return False
@@ -335,13 +344,13 @@ in_child(_forked)
 
 
 def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
-    """The process's ROS node, started for the node `name` if there is none yet.
+    """Return the process's ROS node; start it for the node `name` if needed.
 
-    Raises `MasterUnreachable`, and `NepError` when it is connected with another master or was shut down.
+    Raises `MasterUnreachable`, or `NepError` if it is connected to another master or was shut down.
     """
-    global _process  # noqa: PLW0603 - one for the process
+    global _process  # noqa: PLW0603 - one per process
     rospy = library()
-    RosMaster(address).wait(wait_s)  # rospy itself would wait for ever, and could not be asked again
+    RosMaster(address).wait(wait_s)  # rospy itself would wait forever
     with _lock:
         if rospy.core.is_shutdown_requested():
             raise RosShutdownError
@@ -363,7 +372,7 @@ def _is_same(one: str, other: str) -> bool:
 
 
 def _set_own_address(master: str) -> None:
-    """See that rospy gets along with what the user said where this computer is. Raises `NepError`."""
+    # Adapts the user's settings of this computer's address for rospy. Raises `NepError`.
     for name in ("ROS_IP", "ROS_HOSTNAME"):
         if os.environ.get(name) == "":
             del os.environ[name]  # rospy would print a line for each connection
@@ -381,8 +390,8 @@ def _set_own_address(master: str) -> None:
         os.environ["ROS_IP"] = "127.0.0.1"
 
 
-def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy has no types
-    if rospy.core.is_initialized():  # the program has started it itself
+def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy is not typed
+    if rospy.core.is_initialized():  # the program has started rospy itself
         found = RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
         _end_after_nodes(found)
         return found
@@ -391,7 +400,8 @@ def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401
     word = _NAME.sub("_", name).strip("_")
     word = word if word[:1].isalpha() else f"nep_{word}"
     configure = rospy.core.configure_logging
-    rospy.core.configure_logging = lambda *_args, **_keywords: None  # it would take over the program's log
+    # it would replace the program's log configuration
+    rospy.core.configure_logging = lambda *_args, **_keywords: None
     try:
         rospy.init_node(word[:100], anonymous=True, disable_signals=True)
     finally:
@@ -405,7 +415,7 @@ def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401
 
 
 def _end_after_nodes(process: RosProcess) -> None:
-    """By itself rospy would end before nodes have delivered, and would wait for a hung master."""
+    # rospy's own hook would run before nodes have flushed, and would wait for a hung master.
     at_exit = getattr(process.rospy.core, "_ros_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)
@@ -414,7 +424,7 @@ def _end_after_nodes(process: RosProcess) -> None:
     after_nodes(lambda: process.end() if os.getpid() == pid else None)
 
 
-def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy has no types
-    """The port at which its publishers are reached; it listens there from now on."""
+def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy is not typed
+    # Starts rospy's TCPROS server if needed.
     rospy.impl.tcpros_base.start_tcpros_server()
     return int(rospy.impl.tcpros_base.get_tcpros_server_address()[1])

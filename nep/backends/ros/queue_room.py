@@ -1,4 +1,4 @@
-"""What rospy's queues may hold. rospy bounds them by number only, and drops the oldest without a word."""
+"""Bound for rospy's queues in bytes. rospy bounds them by number only, and drops the oldest silently."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from nep.messages.queue import MAX_BYTES
 __all__ = ["QueueRoom"]
 
 _STEP_BYTES = 8 * 2**20
-"""Queues are measured after so much was published: each time would be slow for many small messages."""
+"""Published bytes after which queues are measured: measuring for each message would be slow."""
 
 
 class QueueRoom:
-    """The room for what one publisher sends, in the queue of each of its connections."""
+    """Bound for the queues of one publisher's connections."""
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self._max_bytes = max_bytes
         self._unmeasured = 0
 
     def make(self, connections: list[Any], size: int) -> int:
-        """Drop the oldest where `size` more bytes have no room; how many were dropped."""
+        """Drop the oldest messages to make room for `size` bytes; return the number of dropped messages."""
         self._unmeasured += size
         is_measured = self._unmeasured >= min(_STEP_BYTES, self._max_bytes)
         if is_measured:
@@ -29,12 +29,13 @@ class QueueRoom:
         return sum(_shorten(each, most) for each in connections)
 
 
-def _shorten(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401 - rospy has no types
-    queue_size = getattr(connection, "_queue_size", 0)  # the program's own may have no queue
+def _shorten(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401 - rospy is not typed
+    # connections of the program's own publishers may have no queue
+    queue_size = getattr(connection, "_queue_size", 0)
     if not queue_size:
         return 0
-    with connection._lock:  # noqa: SLF001 - rospy has no other way
-        queue: list[bytes] = connection._queue  # noqa: SLF001 - its thread takes all of it at once
+    with connection._lock:  # noqa: SLF001 - rospy has no API for it
+        queue: list[bytes] = connection._queue  # noqa: SLF001 - its thread removes all of it at once
         surplus = max(0, len(queue) - queue_size + 1)
         if max_bytes is not None and len(queue) > surplus:
             left = sum(map(len, queue)) - sum(map(len, queue[:surplus]))

@@ -1,4 +1,4 @@
-"""RosClient: calls a service of ROS, each call over a connection and in a thread of its own."""
+"""RosClient: calls a ROS service, with a connection and a thread per call."""
 
 from __future__ import annotations
 
@@ -32,8 +32,6 @@ Then = Callable[[Outcome], None]
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way."""
-
     number: int
     data: bytes
     timeout_s: float | None
@@ -47,7 +45,7 @@ class _Call:
 
 
 class RosClient(ClientCalls[_Call]):
-    """A client: its calls that are under way."""
+    """Client with its calls in flight."""
 
     def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
         super().__init__(spec)
@@ -61,11 +59,11 @@ class RosClient(ClientCalls[_Call]):
 
     @property
     def is_connected(self) -> bool:
-        """Whether there is a server; the master is asked."""
+        """True if the master knows a server."""
         return not self.is_closed and bool(self.process.master.service_uri(self.service, _LOOK_S))
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -80,21 +78,21 @@ class RosClient(ClientCalls[_Call]):
     # ---- server discovery, in one thread for all waiting calls
 
     def _seek(self, call: _Call) -> None:
-        """With the lock held."""
+        # Call with the lock held.
         self._waiting.append(call)
         if not self._is_looking:
             self._is_looking = True
             self._start(self._look)
 
     def _start(self, target: Callable[..., None], *arguments: object) -> None:
-        """A thread of the client's own. With the lock held."""
+        # Call with the lock held.
         name = f"nep-call-{self.spec.service}"
         thread = threading.Thread(target=target, args=arguments, name=name, daemon=True)
         self._threads = {each for each in self._threads if each.is_alive()} | {thread}
         thread.start()
 
     def _look(self) -> None:
-        """Until all calls that wait for a server have one, or waited too long."""
+        # Runs until each waiting call has a server or has expired.
         while True:
             uri = self.process.master.service_uri(self.service, _ASK_S)
             now = time.monotonic()
@@ -123,7 +121,7 @@ class RosClient(ClientCalls[_Call]):
         try:
             with self.process.handshakes.turn(uri, lambda: call.number not in self._calls, call.deadline):
                 connection = ServiceConnection(uri, self.service, self.process.name, call.deadline)
-        except OSError:  # it is registered no longer, or just ended
+        except OSError:  # no longer registered, or just closed
             self._look_again(call)
             return
         try:
@@ -138,7 +136,7 @@ class RosClient(ClientCalls[_Call]):
         self._end_with(call, outcome)
 
     def _look_again(self, call: _Call) -> None:
-        """After a while, so that one who is registered and cannot be reached is not tried all the time."""
+        # Waits first, so that a registered but unreachable server isn't tried continuously.
         left = call.deadline - time.monotonic()
         self._is_over.wait(max(0.0, min(_AGAIN_S, left)))
         if left <= 0.0:
@@ -161,7 +159,7 @@ class RosClient(ClientCalls[_Call]):
         kind = self._type_of(connection)
         with self._lock:
             if call.number not in self._calls:
-                return self._closed_error()  # to nobody
+                return self._closed_error()  # discarded
             call.connection = connection
         try:
             is_carried_out, answer = connection.ask(
@@ -173,7 +171,7 @@ class RosClient(ClientCalls[_Call]):
             return ServerGoneError(self.spec.service)
         if is_carried_out:
             return kind.reply_in(answer, self.spec.codec)
-        if kind is NEP_CALL:  # its servers tell of errors otherwise
+        if kind is NEP_CALL:  # servers of this type report errors differently
             return ServerGoneError(self.spec.service)
         return failure(CallKind.ERROR, "ServiceException", answer.decode("utf-8", "replace"))
 
@@ -184,7 +182,7 @@ class RosClient(ClientCalls[_Call]):
         return kind
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
+        """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
@@ -192,23 +190,23 @@ class RosClient(ClientCalls[_Call]):
                 self._end(known)
 
     def _end(self, call: _Call) -> None:
-        """End its thread. With the lock held."""
+        # Ends the call's thread. Call with the lock held.
         if call.connection is not None:
             call.connection.end()
 
     def known(self, timeout_s: float) -> tuple[str, ...]:
-        """The services that have a server now."""
+        """Return the names of services that have a server."""
         try:
             return tuple(sorted(self.process.master.services(timeout_s)))
         except RosMasterUnreachable:
             return ()
 
     def counts(self) -> SubscriberCount:
-        """The statistics for the graph."""
+        """Return the statistics for the graph."""
         return SubscriberCount(self.spec.id, self._answered, self._failed)
 
     def close(self, timeout_s: float = _ASK_S) -> None:
-        """Calls that are under way end."""
+        """Unregister; calls in flight fail with `ClosedError`."""
         with self._lock:
             if self.is_closed:
                 return

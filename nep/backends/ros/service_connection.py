@@ -1,4 +1,4 @@
-"""ServiceConnection: one call of a ROS service over TCP. rospy's own waits without a limit."""
+"""ServiceConnection: one call of a ROS service over TCP. rospy's own implementation has no timeout."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ _LENGTH = struct.Struct("<I")
 _HEADER_MAX_BYTES = 2**20
 _HANDSHAKE_S = 5.0
 _HANDSHAKES_MAX = 3
-"""So many at once with one server of this program's: rospy lets five wait, and loses more for seconds."""
+"""Limit of concurrent handshakes with one server: rospy's backlog is five, and more are delayed for seconds.
+"""
 _SLICE_S = 0.1
 
 
 class ServiceConnectionError(OSError):
-    """The other end is gone, or is no server of this service."""
+    """Error when the server has disconnected or doesn't offer this service."""
 
 
 class Handshakes:
-    """Bounds how many connections are being made with each server. May be used from any thread."""
+    """Limits the concurrent handshakes with each server. Thread-safe."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition(threading.Lock())
@@ -38,7 +39,7 @@ class Handshakes:
 
     @contextlib.contextmanager
     def turn(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
-        """Wait for one's turn. Raises `TimeoutError`, and `ServiceConnectionError` when `is_over`."""
+        """Wait for a turn. Raises `TimeoutError`, and `ServiceConnectionError` when `is_over`."""
         with self._changed:
             while self._counts[uri] >= _HANDSHAKES_MAX:
                 left = deadline - time.monotonic()
@@ -59,9 +60,9 @@ class Handshakes:
 
 
 class ServiceConnection:
-    """Connected to the server at `uri`. Each step ends at `deadline` with `TimeoutError`, or `OSError`.
+    """Connection to the server at `uri`. Steps raise `TimeoutError` at `deadline`, or `OSError`.
 
-    To be made takes 5 seconds at most.
+    Connecting takes up to 5 seconds.
     """
 
     def __init__(self, uri: str, service: str, caller: str, deadline: float) -> None:
@@ -101,7 +102,7 @@ class ServiceConnection:
         return header
 
     def ask(self, body: bytes) -> tuple[bool, bytes]:
-        """Whether it was carried out, and the body of the answer, or else why not."""
+        """Send a request; return True and the response, or False and the error."""
         self._send(body)
         is_carried_out = self._exactly(1) != b"\0"
         return is_carried_out, self._sized(PAYLOAD_MAX_BYTES + 2**20)
@@ -137,10 +138,10 @@ class ServiceConnection:
         self._socket.settimeout(left)
 
     def end(self) -> None:
-        """Whatever waits here ends at once; from any thread."""
+        """Interrupt the thread that uses the connection. Callable from any thread."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close it; in the thread that uses it."""
+        """Close the connection. Call in the thread that uses it."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""RosServer: serves a service of ROS. rospy has a thread for each connection; it waits for the answer."""
+"""RosServer: serves a ROS service. Each connection has a thread of rospy, which waits for the reply."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ __all__ = ["RosServer"]
 
 
 class _Waiting:
-    """A thread of rospy's that waits for the answer to its call."""
-
+    # Thread of rospy that waits for the reply to its call.
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -29,7 +28,7 @@ class _Waiting:
         self._reason = ""
 
     def end(self, body: bytes | None, reason: str = "") -> bool:
-        """With the body of an answer, or else with why there is none; whether it was the first to come."""
+        # Sets the response, or None and the error. Returns False if it was already set.
         with self._lock:
             if self._ended.is_set():
                 return False
@@ -38,13 +37,12 @@ class _Waiting:
             return True
 
     def wait(self) -> tuple[bytes | None, str]:
-        """What it ended with."""
         self._ended.wait()
         return self._body, self._reason
 
 
 class RosServer:
-    """A server: its queue."""
+    """Server with a call queue."""
 
     def __init__(self, process: RosProcess, spec: ServerSpec, forget: Callable[[RosServer], None]) -> None:
         self.spec = spec
@@ -65,12 +63,12 @@ class RosServer:
 
     @property
     def endpoints(self) -> tuple[str, ...]:
-        """Where it is reached."""
+        """Address of the server."""
         return (str(self._rospy_service.uri),)
 
     # ---- callbacks of rospy, in a thread per connection
 
-    def _handle(self, request: Any) -> Any:  # noqa: ANN401 - rospy has no types
+    def _handle(self, request: Any) -> Any:  # noqa: ANN401 - rospy is not typed
         waiting = _Waiting()
         with self._changed:
             self._waiting.add(waiting)
@@ -78,7 +76,7 @@ class RosServer:
             self._ask(request.body, waiting)
             body, reason = waiting.wait()
             if body is None:
-                raise self.process.rospy.ServiceException(reason)  # rospy tells it the other side
+                raise self.process.rospy.ServiceException(reason)  # rospy sends it to the client
             made = self._response()
             made.body = body
             return made
@@ -88,7 +86,7 @@ class RosServer:
                 self._changed.notify_all()
 
     def _ask(self, body: bytes, waiting: _Waiting) -> None:
-        """Let it be carried out, or answer at once."""
+        # Queues the call or rejects it.
         try:
             asked = self._type.call_in(body)
         except NepError as error:
@@ -106,7 +104,7 @@ class RosServer:
         if self._type is NEP_CALL or reply.kind == CallKind.ANSWER:
             try:
                 body = self._type.body_of_reply(reply)
-            except NepError as error:  # what the callback gave is no answer of this type
+            except NepError as error:  # the callback's result doesn't fit the type
                 reply = failure(CallKind.ERROR, type(error).__name__, str(error))
         self.tally.add(reply)
         if body is not None:
@@ -116,12 +114,12 @@ class RosServer:
     # ---- closing
 
     def counts(self) -> PublisherCount:
-        """The statistics for the graph."""
+        """Return the statistics for the graph."""
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister, and refuse the calls that wait."""
+        """Unregister, and reject queued calls."""
         with self._changed:
             if self._unregistering is not None:
                 return
@@ -133,7 +131,6 @@ class RosServer:
             call.answer(refusal(self.spec.service, is_closed=True))
 
     def _rospy_ends(self) -> None:
-        """No call will come any more."""
         self.is_closed = True
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
@@ -144,7 +141,7 @@ class RosServer:
                 self._rospy_service.shutdown()
 
     def close(self, timeout_s: float) -> None:
-        """The same, and end: what is answered within `timeout_s` is sent."""
+        """Close; replies within `timeout_s` seconds are sent."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         if self._unregistering is not None:
@@ -158,18 +155,17 @@ class RosServer:
         self._forget(self)
 
     def forked(self) -> None:
-        """In a child. See `ServerTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
         self.calls.forked()
 
 
-def _message_class(rospy: Any, name: str, kind: ServiceType) -> type:  # noqa: ANN401 - rospy has no types
-    """A class of messages that rospy sends and receives as they are."""
-
-    def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy has no types
+def _message_class(rospy: Any, name: str, kind: ServiceType) -> type:  # noqa: ANN401 - rospy is not typed
+    # Creates a message class whose instances contain encoded bodies.
+    def serialize(message: Any, buffer: Any) -> None:  # noqa: ANN401 - rospy is not typed
         buffer.write(message.body)
 
-    def deserialize(message: Any, body: bytes) -> Any:  # noqa: ANN401 - rospy has no types
+    def deserialize(message: Any, body: bytes) -> Any:  # noqa: ANN401 - rospy is not typed
         message.body = bytes(body)
         return message
 
@@ -183,7 +179,7 @@ def _message_class(rospy: Any, name: str, kind: ServiceType) -> type:  # noqa: A
     )  # fmt: skip
 
 
-def _service_class(rospy: Any, kind: ServiceType, response: type) -> type:  # noqa: ANN401 - rospy has no types
+def _service_class(rospy: Any, kind: ServiceType, response: type) -> type:  # noqa: ANN401 - rospy is not typed
     return type(
         "EncodedService",
         (),

@@ -1,4 +1,4 @@
-"""Types of ROS services: what is installed, and `nep_msgs/Call`, by which nep itself calls nep."""
+"""ROS service types: installed ones, and `nep_msgs/Call` for calls between nep nodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _types: dict[str, ServiceType] = {}
 
 @dataclass(frozen=True)
 class ServiceType(TypedService):
-    """A type of services, and its checksum."""
+    """Service type with its checksum."""
 
     md5sum: str = ""
 
@@ -29,14 +29,12 @@ NEP_CALL = ServiceType(
     parse("nep_msgs/CallRequest", CALL_REQUEST),
     parse("nep_msgs/CallResponse", CALL_ANSWER),
     is_nep=True,
-    md5sum=hashlib.md5(
-        (CALL_REQUEST + CALL_ANSWER).encode(), usedforsecurity=False
-    ).hexdigest(),  # as ROS does
+    md5sum=hashlib.md5((CALL_REQUEST + CALL_ANSWER).encode(), usedforsecurity=False).hexdigest(),  # as in ROS
 )
 
 
 def installed_service(name: str) -> ServiceType:
-    """A type of ROS, or `nep_msgs/Call`. Raises `NepError` that says what to install."""
+    """Return an installed service type, or `nep_msgs/Call`. Raises `NepError`, which names the package."""
     if name == NEP_CALL.name:
         return NEP_CALL
     if name not in _types:
@@ -49,7 +47,7 @@ def installed_service(name: str) -> ServiceType:
 
 
 def served_type(msg_type: str) -> ServiceType:
-    """The type of a server that is made for `msg_type`. Raises `NepError`."""
+    """Return the service type for a server's `msg_type`. Raises `NepError`."""
     if is_ros_type(msg_type):
         return installed_service(msg_type)
     if msg_type not in {"json", "msgpack"}:

@@ -1,4 +1,4 @@
-"""RospySubscriber: what rospy hears, in an inbox of nep's. Bodies are decoded by whoever reads them."""
+"""RospySubscriber: queues messages received by rospy. They are decoded by the reader."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ __all__ = ["RospySubscriber"]
 
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
-"""rospy reads so much at once; its own 64 KiB make pictures slow."""
+"""Receive buffer of rospy: its default of 64 KiB is slow for images."""
 _SOURCES = 1_000
 
 
 class RospyOwner(Protocol):
-    """What a subscriber needs of its transport."""
+    """Transport that owns a subscriber."""
 
     changed: threading.Condition
 
@@ -40,19 +40,16 @@ class RospyOwner(Protocol):
         """Wait for a message."""
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
 
     def forget(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
-        """It was closed."""
+        """Remove a closed object."""
 
 
 @dataclass
 class _Source:
-    """One publisher, as its connection tells. `seq` is that of its newest header.
-
-    `publisher` is its id; None for one of this process, of which `is_own` tells.
-    """
-
+    # Publisher, as described by its connection. `seq` is that of its newest header. `publisher` is its id;
+    # None with `is_own` for a publisher of this process.
     unpacker: Unpacker | None
     kind: MessageKind | None
     problem: str = ""
@@ -62,8 +59,9 @@ class _Source:
     is_own: bool = False
 
 
-def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
-    """Of an AnyMsg; of a message of a type when the program itself subscribed to the topic before."""
+def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
+    # An AnyMsg has the bytes; others are serialized again, if the program itself subscribed to the topic
+    # before.
     found = getattr(message, "_buff", None)
     if isinstance(found, bytes):
         return found
@@ -73,7 +71,7 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy has no types
 
 
 class RospySubscriber(WakingSubscriber):
-    """Takes messages of any type, so that one of a wrong type becomes a problem instead of silence."""
+    """Subscriber to messages of any type, so that a wrong type becomes a reported problem."""
 
     def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
@@ -94,7 +92,7 @@ class RospySubscriber(WakingSubscriber):
         self._subscriber: Any = None
 
     def begin(self) -> None:
-        """Subscribe. What comes goes into the inbox."""
+        """Subscribe."""
         with self._owner.changed:
             self.process.subscribed[self.topic] += 1
         self.process.at_shutdown.add(self._rospy_ends)
@@ -104,17 +102,17 @@ class RospySubscriber(WakingSubscriber):
 
     @property
     def refused(self) -> int:
-        """What came and could not be read as a message of its publisher's type, or is of a wrong one."""
+        """Number of messages rejected as malformed or of a wrong type."""
         return self.refusals.count
 
     @property
     def problem(self) -> str:
-        """Why a message could not be read; empty when all is well."""
+        """Problem of the newest message; empty if none."""
         return self._told or self.refusals.told()
 
     # ---- callbacks of rospy, in a thread per connection
 
-    def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy has no types
+    def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy is not typed
         header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it
         body = memoryview(_bytes_of(raw))
         with self._owner.changed:
@@ -122,7 +120,7 @@ class RospySubscriber(WakingSubscriber):
                 return
             source = self._source_of(header)
             if source.last is raw:
-                return  # latched: rospy hands out what a connection had last, and may just have handed it out
+                return  # latched: rospy may deliver a connection's last message twice
             source.last = raw if header.get("latching") == "1" else None
             try:
                 message = self._read(source, body)
@@ -136,7 +134,7 @@ class RospySubscriber(WakingSubscriber):
             self.tell_waiting()
 
     def _rospy_ends(self) -> None:
-        """Nothing will come any more: `poll` says so."""
+        # `poll` raises from now on.
         with self._owner.changed:
             self.tell_waiting()
         self._owner.wake()
@@ -187,7 +185,7 @@ class RospySubscriber(WakingSubscriber):
         return message
 
     def _number(self, source: _Source, seq: int) -> None:
-        """Numbers that rise by more than one tell of messages that were lost; others tell of a new start."""
+        # A gap counts as lost messages; a smaller number means that the publisher has restarted.
         gap = seq - source.seq - 1
         if source.seq and gap >= 0:
             self.lost = (self.lost or 0) + gap
@@ -203,11 +201,11 @@ class RospySubscriber(WakingSubscriber):
 
     @property
     def has_input(self) -> bool:
-        """See `WakingSubscriber.has_input`."""
+        """True if input is available or the subscriber is closed."""
         return self.is_closed or self.process.is_over or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
-        """The next message if one is there. Raises `RosShutdownError` when none can come any more."""
+        """Return the next message, or None. Raises `RosShutdownError` after rospy was shut down."""
         with self._owner.changed:
             message = None if self.is_closed else self.inbox.take()
         if message is None and self.process.is_over and not self.is_closed:
@@ -215,25 +213,25 @@ class RospySubscriber(WakingSubscriber):
         return message
 
     def receive(self, timeout_s: float) -> Message | None:
-        """The next message, waited for."""
+        """Return the next message; wait up to `timeout_s` seconds."""
         self._owner.wait((self,), timeout_s)
         return self.poll()
 
     def take_batch(self, most_bytes: int) -> list[Message]:
-        """What a sink gets at once."""
+        """Return the messages for one call of the sink."""
         with self._owner.changed:
             return self.inbox.take_all(most_bytes)
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph of this process."""
+        """Set the reader's problem, which the graph of this process shows."""
         self._told = problem
 
     def forked(self) -> None:
-        """In a child. See `SubscriberTransport.forked`."""
+        """Become closed in a forked child."""
         self.is_closed = True
 
     def close(self, timeout_s: float = 2.0) -> None:
-        """Unregister and forget what was not read."""
+        """Unregister and discard unread messages."""
         with self._owner.changed:
             if self.is_closed:
                 return

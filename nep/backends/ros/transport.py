@@ -1,4 +1,4 @@
-"""The back end `ros`: publishers and subscribers of nep on topics of ROS."""
+"""Transport of the back end `ros`: nep publishers, subscribers and services over rospy."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ __all__ = ["RospyPublisher", "RospyTransport"]
 _logger = logging.getLogger("nep")
 _QUEUES = {"image": 64, "bytes": 1000, "ros": 1000}
 _MOST = 10_000
-"""How many messages rospy queues for each connection, before it drops the oldest and tells nobody."""
+"""Queue length per connection: rospy then drops the oldest message silently."""
 _BATCH_BYTES = 64 * 2**20
-"""A sink works on so many bytes at once; with those that wait for it there are no more than the bound."""
-_BATCH_S = 0.005  # sinks are called 200 times a second at most
+"""Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
+"""
+_BATCH_S = 0.005  # at most 200 calls of a sink per second
 
 
 def _address(configuration: Configuration) -> str:
@@ -45,7 +46,7 @@ def _address(configuration: Configuration) -> str:
 
 
 class RospyPublisher:
-    """Publishes through rospy. Its number of messages is nep's; a header's seq counts for the whole topic."""
+    """Publisher over rospy. `count` is nep's; a header's seq counts the messages of the whole topic."""
 
     def __init__(self, transport: RospyTransport, process: RosProcess, spec: PublisherSpec) -> None:
         self.spec = spec
@@ -69,25 +70,25 @@ class RospyPublisher:
 
     @property
     def ros_type(self) -> str:
-        """The ROS message that carries what is published."""
+        """ROS message type."""
         return self._definition.name
 
     @property
     def subscribers(self) -> int:
-        """Nodes of ROS that are connected; for this process its subscribers."""
+        """Number of connected ROS nodes; this process counts with its number of subscribers."""
         hearers = () if self._is_closed else self.process.hearers(self._publisher)
         own = max(1, self.process.subscribed[self.topic]) if self.process.name in hearers else 0
         return sum(each != self.process.name for each in hearers) + own
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody is connected, or rospy was shut down: then `send` says so."""
+        """True if any node is connected, or after rospy was shut down: `send` then raises."""
         impl = self._publisher.impl
         return (impl is not None and bool(impl.connections)) or self.process.is_over
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Nodes of ROS that are registered as subscribers and have not connected."""
+        """Registered subscribers that aren't connected."""
         try:
             registered = self.process.master.names(self.topic, HANDSHAKE_S)[1]
         except RosMasterUnreachable:
@@ -96,23 +97,23 @@ class RospyPublisher:
         return tuple(each.lstrip("/") for each in registered if each not in hearers)
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: rospy has no shared memory."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._lock:
             self.count += 1
             self.last_stamp_ns = time.time_ns()
 
     def report(self, problem: str) -> None:
-        """Shown as an alert in the graph of this process."""
+        """Set the problem of a payload, which the graph of this process shows."""
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Hand it to rospy, which queues it for each connection. Raises as `to_ros`, and `ClosedError`.
+        """Queue a message at each connection. Raises as `to_ros` does, and `ClosedError`.
 
-        What a subscriber cannot take is dropped, the oldest first, and counted.
+        For subscribers without room the oldest messages are dropped and counted.
         """
         body = to_ros(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
@@ -135,12 +136,12 @@ class RospyPublisher:
                     self.spec.topic, self._drops.count, reason)  # fmt: skip
 
     def counts(self) -> PublisherCount:
-        """The statistics for the graph."""
+        """Return the statistics for the graph."""
         problem = self.problem or self._drops.told()
         return PublisherCount(self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, problem)
 
     def close(self, timeout_s: float) -> None:
-        """Let rospy send what it has queued, and unregister."""
+        """Wait until rospy has sent its queue, and unregister."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             if self._is_closed:
@@ -155,7 +156,7 @@ class RospyPublisher:
 
 
 class RospyTransport:
-    """One node's way to the others. Raises `BackendUnavailableError` where rospy is not installed."""
+    """Connection of one node. Raises `BackendUnavailableError` if rospy is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         library()
@@ -173,7 +174,7 @@ class RospyTransport:
         _transports.add(self)
 
     def publisher(self, spec: PublisherSpec) -> RospyPublisher:
-        """A publisher, when all nodes with registered subscribers have connected, or half a second later."""
+        """Create a publisher; waits up to `HANDSHAKE_S` for registered subscribers."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         publisher = RospyPublisher(self, process, spec)
         with self._lock:
@@ -187,7 +188,7 @@ class RospyTransport:
         return publisher
 
     def subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
-        """A subscriber, when all publishers that are registered have connected, or half a second later."""
+        """Create a subscriber; waits up to `HANDSHAKE_S` for registered publishers."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         batch = 0 if spec.sink is None else _BATCH_BYTES
         subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
@@ -209,7 +210,7 @@ class RospyTransport:
             raise ClosedError(f"node '{self.node.name}'")
 
     def forget(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
-        """It was closed."""
+        """Remove a closed object."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -219,7 +220,7 @@ class RospyTransport:
     # ---- services
 
     def server(self, spec: ServerSpec) -> RosServer:
-        """A server. Raises as `publisher`, and `NepError` for a type of services that is not there."""
+        """Create a server. Raises as `publisher` does, and `NepError` for a type that isn't installed."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         server = RosServer(process, spec, self.forget)
         with self._lock:
@@ -228,7 +229,7 @@ class RospyTransport:
         return server
 
     def client(self, spec: ClientSpec) -> RosClient:
-        """A client."""
+        """Create a client."""
         process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
         client = RosClient(process, spec, self.forget)
         with self._lock:
@@ -247,9 +248,9 @@ class RospyTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in one of `subscribers`, a call in one of `calls`, or for `wake`.
+        """Wait for a message in `subscribers`, a call in `calls`, or `wake`.
 
-        Raises `RosShutdownError` when no call can come any more.
+        Raises `RosShutdownError` for servers after rospy was shut down.
         """
         mine = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
@@ -264,20 +265,21 @@ class RospyTransport:
             raise RosShutdownError
 
     def wake(self) -> None:
-        """End all waits."""
+        """End all waits in progress."""
         with self.changed:
             self._wakes += 1
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Who is there, as the ROS master knows it. Raises `MasterUnreachable`."""
+        """Return the graph known to the ROS master. Raises `MasterUnreachable`."""
         address = _address(configuration)
         known = RosMaster(address).nodes(timeout_s)
-        own = [each.own(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001 - of its kind
+        # of the same class
+        own = [each.own(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
         return view_of(known, own)
 
     def own(self, address: str) -> OwnNode:
-        """What the graph tells of this node beyond what the master knows."""
+        """Return this node's part of the graph, with its statistics."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
         ]
@@ -304,12 +306,12 @@ class RospyTransport:
         )
 
     def begin_close(self) -> None:
-        """What is queued goes on by itself; calls that wait are refused."""
+        """Reject queued calls. Messages are flushed by `close`."""
         for server in self._servers:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister all and end the thread. The process's ROS node stays."""
+        """Unregister everything and join the threads. The process's ROS node stays."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._is_closed = True
@@ -345,7 +347,7 @@ class RospyTransport:
                 if messages and subscriber.spec.sink is not None:
                     try:
                         subscriber.spec.sink(messages)
-                    except BaseException:  # also SystemExit, which would end all sinks' thread
+                    except BaseException:  # also SystemExit: the sinks' thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
             self._closing.wait(_BATCH_S)
 
