@@ -1,7 +1,7 @@
-"""The back end `nanomsg`: nodes that carry their messages by the library pynng.
+"""Back end `nanomsg`: messages over the library pynng.
 
-Direct connections speak with programs of libnanomsg; hybrid ones are found through the master. `library`
-finds pynng, `direct` has the frames of the original NEP, `publisher` and `sub_socket` the native wire.
+Direct connections are compatible with libnanomsg; hybrid ones use the master. `library` loads pynng, `direct`
+has the frames of the original NEP, `publisher` and `sub_socket` the native wire.
 """
 
 from nep.backends.base import Backend

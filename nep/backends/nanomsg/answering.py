@@ -1,6 +1,6 @@
-"""NanomsgServer: answers calls over SP's REP, and questions of surveys over its RESPONDENT, without a master.
+"""NanomsgServer: replies to calls (REP socket) and surveys (RESPONDENT socket) without a master.
 
-Each call has a context of pynng's of its own, until it is answered: so any number of them may wait.
+Each call has its own pynng context until its reply is sent, so any number of calls can be queued.
 """
 
 from __future__ import annotations
@@ -22,44 +22,45 @@ __all__ = ["ANSWER_S", "NanomsgServer", "close_context", "heard", "in_one", "in_
 
 _logger = logging.getLogger("nep")
 ANSWER_S = 2.0
-"""So long a client may take to take an answer."""
+"""Timeout for sending a reply to a client that doesn't read."""
 _JOIN_S = 2.0
 _LINGER_S = 0.2
-"""pynng throws away what it has queued when it is closed: the last answer gets so long, unless nobody is
-connected any more."""
+"""pynng discards its queue when a socket is closed. Time after the last reply to flush it, unless all clients
+have disconnected.
+"""
 
 
 def in_one(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
-    """A call or answer as one message of SP: the native header and the payload, or the payload alone."""
+    """Return a call or reply as one message: the native header and the payload, or the payload alone."""
     return b"".join(parts) if framing is NATIVE else bytes(parts[-1])
 
 
 def in_parts(framing: Framing, message: bytes) -> list[bytes]:
-    """The parts that `framing` reads."""
+    """Split a message into the parts that `framing` reads."""
     return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
 
 
-def heard(context: Any) -> bytes | None:  # noqa: ANN401 - pynng has no types
-    """The next that comes; None when its time is up, or it is closed."""
+def heard(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
+    """Return the next message, or None on timeout or after closing."""
     try:
         data: bytes = context.recv()
-    except (library().NNGException, TypeError):  # the latter is what pynng says of one that was closed before
+    except (library().NNGException, TypeError):  # pynng raises TypeError for a context closed before
         return None
     return data
 
 
-def close_context(context: Any) -> None:  # noqa: ANN401 - pynng has no types
-    """Close it, whoever does so, too."""
+def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    """Close a context (idempotent)."""
     with contextlib.suppress(library().NNGException, TypeError):
         context.close()
 
 
 class NanomsgServer:
-    """Owns a socket that is attached already, and a thread that hears calls. See `ServerTransport`."""
+    """Server on an attached socket, with a thread that receives calls. Implements `ServerTransport`."""
 
     def __init__(
         self,
-        socket: Any,  # noqa: ANN401 - pynng has no types
+        socket: Any,  # noqa: ANN401 - pynng is not typed
         endpoint: str,
         spec: ServerSpec,
         framing: Framing,
@@ -77,13 +78,13 @@ class NanomsgServer:
         self._lock = threading.Lock()
         self._answered_at = 0.0
         self._contexts: set[Any] = set()
-        """Those that hear a call, or whose call has no answer yet."""
+        """Contexts that wait for a call, or whose call has no reply yet."""
         self._is_alone = threading.Event()
         socket.add_post_pipe_remove_cb(self._went)
         self._thread = threading.Thread(target=self._hear, name=f"nep-{spec.service}", daemon=True)
         self._thread.start()
 
-    def _went(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _went(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         if self.is_closed and not self._socket.pipes:
             self._is_alone.set()
 
@@ -99,7 +100,7 @@ class NanomsgServer:
             if not self.calls.put(incoming):
                 incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _leave_out(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng has no types
+    def _leave_out(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
         with self._lock:
             self._contexts.discard(context)
         close_context(context)
@@ -107,8 +108,8 @@ class NanomsgServer:
         if self._refusals.add(error.reason):
             _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
 
-    def _new_context(self) -> Any:  # noqa: ANN401 - pynng has no types
-        """None when it is closed."""
+    def _new_context(self) -> Any:  # noqa: ANN401 - pynng is not typed
+        # Returns None when closed.
         with self._lock:
             if self.is_closed:
                 return None
@@ -126,7 +127,7 @@ class NanomsgServer:
                 self._answered_at = time.monotonic()
             try:
                 context.send(in_one(self._framing, self._framing.answer(number, fit)))
-            except (library().NNGException, TypeError) as error:  # nobody waits for it any more
+            except (library().NNGException, TypeError) as error:  # the client no longer waits
                 _logger.debug("an answer of '%s' could not be sent: %s", self.spec.service, error)
                 return False
             finally:
@@ -141,12 +142,12 @@ class NanomsgServer:
         return answer
 
     def begin_close(self) -> None:
-        """Refuse the calls that wait and those that still come."""
+        """Reject queued and new calls."""
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
-        """The same, and end. May be called twice."""
+        """Close the server. Idempotent."""
         self.begin_close()
         with self._lock:
             if self.is_closed:
@@ -158,13 +159,13 @@ class NanomsgServer:
             self._is_alone.wait(left)
         with self._lock:
             contexts, self._contexts = tuple(self._contexts), set()
-        for context in contexts:  # before the socket: pynng cannot do so afterwards
+        for context in contexts:  # before the socket: afterwards pynng can't close them
             close_context(context)
         self._socket.close()
         self._thread.join(_JOIN_S)
 
     def forked(self) -> None:
-        """In a child that was forked: nothing of nng may be touched."""
+        """Become closed in a forked child, without touching nng."""
         self.is_closed = True
         self._lock = threading.Lock()
         self.calls.forked()

@@ -1,8 +1,8 @@
-"""NanomsgClient: calls a server over SP's REQ, without a master.
+"""NanomsgClient: calls a server over a REQ socket, without a master.
 
-Each call has a context of pynng's, and a thread that waits for the answer. pynng would send
-a call again when nobody answers it or its connection ends. It is told not to: the call ends then, and whoever
-made it knows that nobody can know whether it was carried out.
+Each call has its own pynng context, and a thread that waits for the reply. Automatic resending, when no reply
+arrives or the connection ends, is disabled: the call fails instead, because it is unknown whether the server
+has executed it.
 """
 
 from __future__ import annotations
@@ -29,15 +29,13 @@ _logger = logging.getLogger("nep")
 _JSON = 1
 _JOIN_S = 2.0
 _LEFT_MAX = 100
-"""So many answers for which nobody waits any more are still heard."""
+"""Maximum number of timed-out calls whose replies are still received."""
 
 Then = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
 class _Call:
-    """A call that is under way."""
-
     number: int
     data: bytes | memoryview
     timeout_s: float | None
@@ -53,11 +51,11 @@ class _Call:
 
 
 class NanomsgClient(ClientCalls[_Call]):
-    """Owns a REQ that is made already. See `ClientTransport`."""
+    """Client on a REQ socket. Implements `ClientTransport`."""
 
     def __init__(
         self,
-        socket: Any,  # noqa: ANN401 - pynng has no types
+        socket: Any,  # noqa: ANN401 - pynng is not typed
         spec: ClientSpec,
         framing: Framing,
         deadlines: Deadlines,
@@ -72,26 +70,26 @@ class NanomsgClient(ClientCalls[_Call]):
         self._on_close = on_close
         self._pipes: set[int] = set()
         self._left: dict[int, _Call] = {}
-        """Those for which nobody waits any more, oldest first: what still comes is counted."""
+        """Calls that timed out or were canceled, oldest first; their replies are counted as late."""
         self._threads: set[threading.Thread] = set()
         socket.add_post_pipe_connect_cb(self._came)
         socket.add_post_pipe_remove_cb(self._went)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.add(pipe.id)
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.discard(pipe.id)
 
     @property
     def is_connected(self) -> bool:
-        """Whether a server is there."""
+        """True if a server is connected."""
         return not self.is_closed and bool(self._pipes)
 
     # ---- calling
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
-        """See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -121,13 +119,13 @@ class NanomsgClient(ClientCalls[_Call]):
             self._threads.discard(threading.current_thread())
 
     def _outcome(self, call: _Call) -> Outcome | None:
-        """How it ended; None when somebody has closed its context, who tells why."""
+        # Returns None if the context was closed; the call has its outcome then.
         nng = library()
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
         try:
-            call.context.send(in_one(self._framing, parts))  # as soon as there is a server
-            call.is_sent, call.data = True, b""  # it is heard for a while after its time
+            call.context.send(in_one(self._framing, parts))  # blocks until a server is connected
+            call.is_sent, call.data = True, b""  # the context outlives the timeout: free the payload
             parts.clear()
             data = call.context.recv()
         except nng.ConnectionReset:
@@ -148,7 +146,7 @@ class NanomsgClient(ClientCalls[_Call]):
             self._tell(call, outcome)
 
     def forget(self, call: OpenCall) -> None:
-        """Nobody waits for it any more."""
+        """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
@@ -157,7 +155,7 @@ class NanomsgClient(ClientCalls[_Call]):
             self._leave(known)
 
     def _leave(self, call: _Call) -> None:
-        """Nobody waits any more for a call that is not under way. Without the lock."""
+        # Keeps receiving the reply of a call that is no longer in flight. Call without the lock.
         with self._lock:
             if call.is_sent:
                 self._left[call.number] = call
@@ -167,7 +165,7 @@ class NanomsgClient(ClientCalls[_Call]):
             close_context(closed.context)
 
     def expire(self, now: float) -> float:
-        """End what waited too long; when to do so again."""
+        """Fail expired calls; return the next deadline."""
         with self._lock:
             late = [each for each in tuple(self._calls.values()) if each.deadline <= now and self._take(each)]
             due = min((each.deadline for each in self._calls.values()), default=math.inf)
@@ -177,14 +175,14 @@ class NanomsgClient(ClientCalls[_Call]):
             self._tell(call, kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
-    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - nobody is asked
-        """None: there is no master."""
+    def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
+        """Return an empty tuple: without a master the servers are unknown."""
         return ()
 
     # ---- closing
 
     def close(self) -> None:
-        """Calls that are under way end. May be called twice."""
+        """Close; calls in flight fail with `ClosedError`. Idempotent."""
         with self._lock:
             if self.is_closed:
                 return
@@ -206,7 +204,7 @@ class NanomsgClient(ClientCalls[_Call]):
         self._socket.close()
 
     def forked(self) -> None:
-        """In a child that was forked: nothing of nng may be touched."""
+        """Become closed in a forked child, without touching nng."""
         self.is_closed = True
         self._lock = threading.Lock()
         for call in (*self._calls.values(), *self._left.values()):

@@ -1,4 +1,4 @@
-"""Direct connections: the frames of the original NEP over SP's PUB and SUB, as libnanomsg speaks them."""
+"""Direct connections: frames of the original NEP over PUB and SUB sockets, compatible with libnanomsg."""
 
 from __future__ import annotations
 
@@ -28,14 +28,15 @@ __all__ = ["DirectPublisher", "DirectSubSocket", "attach", "check_direct", "dial
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
-"""pynng throws away what it has queued when it is closed, and tells nobody when that is sent: it gets so long
-after the last message."""
+"""pynng discards its queue when a socket is closed and doesn't report when it is sent. Time after the last
+message to flush it.
+"""
 _LARGEST = 2**20
-"""libnanomsg takes no larger messages unless it is told to, and says nothing."""
+"""libnanomsg silently rejects larger messages by default."""
 
 
 def check_direct(direct: Direct) -> None:
-    """Raises `NepError` for what SP has no form for."""
+    """Raise `NepError` for a mode or wire that nanomsg doesn't support."""
     if direct.mode == "many2many":
         raise NepError(
             _("the back end 'nanomsg' has no direct connections of mode 'many2many'; use 'one2many'")
@@ -48,8 +49,8 @@ def check_direct(direct: Direct) -> None:
         )
 
 
-def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng's
-    """Listen or dial as the mode says; the endpoint. Raises `AddressInUseError`, `NepError`."""
+def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng is not typed
+    """Listen or dial according to the mode; return the endpoint. Raises `AddressInUseError`, `NepError`."""
     address = f"{direct.ip}:{direct.port}"
     if is_publisher == (direct.mode == "one2many"):
         listen(socket, address, what)
@@ -57,8 +58,8 @@ def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str
     return dial(socket, address)
 
 
-def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng's
-    """Connect to `HOST:PORT`, as soon as somebody listens there; the endpoint. Raises `NepError`."""
+def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
+    """Connect to `HOST:PORT`, whether it is bound yet or not; return the endpoint. Raises `NepError`."""
     try:
         address = in_numbers(address)
         socket.dial(f"tcp://{address}", block=False)
@@ -72,7 +73,7 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng's
 
 
 class DirectPublisher:
-    """Owns a PUB. SP does not tell who subscribes to what: everybody who is connected counts."""
+    """Publisher on a PUB socket. Subscriptions are unknown, so every connection counts as a subscriber."""
 
     def __init__(
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
@@ -89,7 +90,7 @@ class DirectPublisher:
         self._sent_at = 0.0
         self._changed = threading.Condition(threading.RLock())
         self.fd = -1
-        """There is nothing to be read."""
+        """-1: there is no input."""
         self._socket: Any = new_socket("Pub0", send_buffer_size=queue_of(spec.codec.name))
         self._socket.add_post_pipe_connect_cb(self._came)
         self._socket.add_post_pipe_remove_cb(self._went)
@@ -103,43 +104,43 @@ class DirectPublisher:
 
     @property
     def subscribers(self) -> int:
-        """How many connections there are."""
+        """Number of connections."""
         return len(self._pipes)
 
     @property
     def is_heard(self) -> bool:
-        """Whether there are any."""
+        """True if there are any connections."""
         return bool(self._pipes)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
             self._changed.notify_all()
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait until somebody is connected."""
+        """Wait for a connection, for up to `timeout_s` seconds."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
     def report(self, problem: str) -> None:
-        """There is no graph that could show it."""
+        """Ignore the problem: a direct connection has no graph."""
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: nanomsg has no shared memory."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._changed:
             self.count += 1
 
     def send(self, encoded: Encoded) -> None:
-        """Publish one frame; nobody can know if a full queue dropped it. Warns of the first large one."""
+        """Publish one frame; drops for full queues can't be detected. Warns once about a large message."""
         frame = to_frame(
             self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
         )
@@ -159,33 +160,33 @@ class DirectPublisher:
                 ).format(topic=self.spec.topic, size=len(frame), most=_LARGEST)
             )
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - there is nothing to do
-        """Nothing comes here."""
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - no input
+        """Do nothing: nothing is received."""
         return Rest(is_quiet=True)
 
     def close(self, timeout_s: float) -> None:
-        """Deliver what is on its way, as far as `finish` can, and close. Once; called by its publisher."""
+        """Flush as far as `finish` can, and close. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Nothing is published any more."""
+        """Stop accepting messages."""
         with self._changed:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """Let pynng send what it has queued, for `_LINGER_S` at most; SP has no way to ask whether it has."""
+        """Wait up to `_LINGER_S` for pynng to send its queue, which it doesn't report."""
         until = min(deadline, self._sent_at + _LINGER_S)
         with self._changed:
             wait_until(self._changed, lambda: not self._pipes, until - time.monotonic())
 
     def release(self) -> None:
-        """Close the socket, without the lock: pynng waits for its threads then."""
+        """Close the socket. Call without the lock, because pynng waits for its callbacks."""
         self.say_bye()
         self._socket.close()
 
 
 class DirectSubSocket(ReadOneByOne):
-    """A SUB that takes the frames of both generations. Nobody numbers them: `lost` is not known."""
+    """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
@@ -197,7 +198,7 @@ class DirectSubSocket(ReadOneByOne):
         self._codec = codec_for(spec.msg_type).name
         self._sub = QuickSub(self._codec)
         self.fd = self._sub.fd
-        self._sub.socket.subscribe(b"")  # of another generation no topic stands in front
+        self._sub.socket.subscribe(b"")  # frames of generation B don't start with the topic
         try:
             self.endpoint = attach(
                 self._sub.socket, direct, is_publisher=False, what=f"a subscriber of '{spec.topic}'"
@@ -208,11 +209,11 @@ class DirectSubSocket(ReadOneByOne):
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read."""
+        """True if a message can be read."""
         return self._sub.has_input
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
-        """The next message of this topic."""
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+        """Return the next message of this topic, or None."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)
@@ -225,7 +226,7 @@ class DirectSubSocket(ReadOneByOne):
         return None
 
     def dropped(self, count: int) -> None:
-        """Dropped here for lack of room: the only losses that can be known."""
+        """Count messages dropped here for lack of room: the only losses that can be known."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

@@ -1,7 +1,7 @@
-"""DirectServices: one node's servers, clients, respondents and surveyors that need no master, by pynng.
+"""DirectServices: servers, clients and surveyors of one node without a master.
 
-A server binds the port that it is given, and its clients connect there, whatever the mode says. Respondents
-connect, and the surveyor binds. Part of `NanomsgTransport`.
+Part of `NanomsgTransport`. A server binds its port and clients connect, independent of the mode. A surveyor
+binds and respondents connect.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ _LARGEST = PAYLOAD_MAX_BYTES + HEADER_BYTES
 _ANSWER_MS = round(ANSWER_S * 1000)
 _FOR_EVER = -1
 _AGAIN = {"reconnect_time_min": 10, "reconnect_time_max": 500}
-"""Milliseconds after which a server that was not there is looked for again: the first time, and later."""
+"""Reconnection interval in milliseconds: the initial and the largest one."""
 
 
 class DirectServices:
-    """Makes them, and ends them with the node. May be used from any thread."""
+    """Servers, clients and surveyors of one node. Thread-safe."""
 
     def __init__(self, node_name: str) -> None:
         self._node_name = node_name
@@ -46,7 +46,7 @@ class DirectServices:
         self._is_closed = False
 
     def surveyor(self, spec: ClientSpec, direct: Direct, wait_s: float) -> NanomsgSurveyor:
-        """A new one; waits for somebody who is connected."""
+        """Create a surveyor; waits for a connection."""
         self._check_open()
         surveyor = NanomsgSurveyor(spec, direct, self._surveyors.discard)
         with self._lock:
@@ -60,7 +60,7 @@ class DirectServices:
         return surveyor
 
     def respondent(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
-        """A new one."""
+        """Create a respondent."""
 
         def attached(socket: object) -> str:
             return attach(socket, direct, is_publisher=False, what=f"a respondent of '{spec.service}'")
@@ -68,7 +68,7 @@ class DirectServices:
         return self._serving(spec, "Respondent0", ORIGINAL, attached)
 
     def server(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
-        """A new one, which binds. Raises `AddressInUseError`."""
+        """Create a server and bind its port. Raises `AddressInUseError`."""
 
         def attached(socket: object) -> str:
             listen(socket, f"{direct.ip}:{direct.port}", f"a server of '{spec.service}'")
@@ -96,7 +96,7 @@ class DirectServices:
         return server
 
     def client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
-        """A new one, which connects; a server need not be there yet."""
+        """Create a client and start to connect; the server may start later."""
         self._check_open()
         socket = new_socket("Req0", resend_time=_FOR_EVER, recv_max_size=_LARGEST, **_AGAIN)
         try:
@@ -120,7 +120,7 @@ class DirectServices:
             raise ClosedError(f"node '{self._node_name}'")
 
     def begin_close(self) -> None:
-        """Nothing is answered any more; who waits is told."""
+        """Reject queued and new calls."""
         with self._lock:
             self._is_closed = True
             servers = tuple(self._servers)
@@ -128,7 +128,7 @@ class DirectServices:
             server.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """End all of them."""
+        """Close everything."""
         with self._lock:
             surveyors, servers, clients = tuple(self._surveyors), tuple(self._servers), tuple(self._clients)
         for surveyor in surveyors:
@@ -141,7 +141,7 @@ class DirectServices:
         self._deadlines.close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
         for surveyor in self._surveyors:

@@ -1,7 +1,7 @@
-"""Where a publisher is reached: `nanomsg://HOST:PORT/PORT`, its messages first, then where it is greeted.
+"""Endpoints of publishers, `nanomsg://HOST:PORT/PORT` for messages and hellos, and the message format.
 
-The scheme keeps ZeroMQ's subscribers away. And where the parts of a native message lie in one of nanomsg's:
-one behind the other, the extension behind as many bytes of payload as the header says.
+The scheme keeps subscribers over ZeroMQ from connecting. A nanomsg message is the concatenation of a native
+message's parts; the payload has the size stated in the header, and the extension follows.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCI
 
 
 def endpoint(host: str, messages: int, hellos: int) -> str:
-    """The endpoint with these two ports."""
+    """Return the endpoint with these two ports."""
     return f"nanomsg://{host}:{messages}/{hellos}"
 
 
 def places_of(endpoint: str) -> tuple[str, str] | None:
-    """`HOST:PORT` of its messages and `HOST:PORT` for hellos; None for an endpoint of another back end."""
+    """Return the addresses (`HOST:PORT`) for messages and for hellos, or None for another back end."""
     found = _ENDPOINT.fullmatch(endpoint)
     if found is None or not all(0 < int(port) < 65536 for port in found.groups()[1:]):
         return None
@@ -32,12 +32,12 @@ def places_of(endpoint: str) -> tuple[str, str] | None:
 
 
 def own_part(subscriber: int, topic: str) -> bytes:
-    """What a message for this subscriber alone begins with."""
+    """Return the prefix of messages for this subscriber alone."""
     return hello_part(subscriber, topic) + b"\0"
 
 
 def split_one(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
-    """What follows the first part, in parts: header, payload and extension, or for a notice the header alone.
+    """Return the parts after the first one: header, payload and extension; of a notice only the header.
 
     Raises `WireError`.
     """

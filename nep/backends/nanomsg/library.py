@@ -1,4 +1,4 @@
-"""The library pynng: found when the first node asks for it, and what all its sockets here have in common."""
+"""Access to pynng: loaded with the first node, unusable after a fork; and helpers for its sockets."""
 
 from __future__ import annotations
 
@@ -31,22 +31,24 @@ __all__ = [
 ]
 
 MOST = 8192
-"""The largest queue that pynng allows, in messages. Its own ones are so small that a burst overruns them."""
+"""Largest queue that pynng allows, in messages. Its defaults are too small for bursts."""
 _QUEUES = {"image": 64, "bytes": 1000}
 SOCKET_FILES = 6
-"""A socket, its port, its signals, and a connection."""
+"""File descriptors per socket: the socket, its port, its signals, and a connection."""
 _TRIES = 100
 _MODULE = "pynng.nng"
 _at_exit: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
 _inherited: set[str] = set()
-"""The names of libraries that came with a fork: nng's threads stayed behind, and it waits for them."""
+"""Names of libraries in use before a fork: nng would wait for its threads, which don't exist in the child."""
 
 
-def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - it has no types
-    """Pynng. Raises `BackendUnavailableError` where it is not installed or its library does not load.
+def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not typed
+    """Return the module pynng.
 
-    Raises `NepError` in a child that was forked from a program that uses it.
+    Raises:
+        BackendUnavailableError: pynng is not installed or can't be loaded.
+        NepError: The process was forked from one that uses pynng.
     """
     if _inherited:
         raise NepError(
@@ -66,33 +68,33 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
 
 
 def _end_after_nodes() -> None:
-    """Let nng end after the nodes that use it, once: pynng's own hook would come first."""
-    global _at_exit  # noqa: PLW0603 - there is one a process
+    # pynng's own exit hook would run before the nodes are closed.
+    global _at_exit  # noqa: PLW0603 - one per process
     at_exit = getattr(sys.modules.get(_MODULE), "_pynng_atexit", None)
     if at_exit is not None and _at_exit is None:
         _at_exit = at_exit
         after_nodes(at_exit)
 
 
-def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - it has no types
-    """One of pynng's sockets, such as "Pub0", with these options."""
+def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
+    """Create a socket of pynng, such as "Pub0", with these options."""
     made = getattr(library(), kind)(**options)
     _sockets.add(made)
     return made
 
 
-def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - pynng has no types
-    """Let nobody forget it, not even the end of the interpreter."""
+def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    """Prevent the finalizer of an object, also at exit."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 
 def _forked() -> None:
-    """In a child: nothing of nng may be closed, not even when the interpreter ends: that would never end."""
+    # In a forked child no socket may be closed, not even at exit: that would block forever.
     if _MODULE not in sys.modules:
         return
     _inherited.add("pynng")
     for socket in _sockets:
-        keep_for_ever(socket)  # one that is forgotten closes itself
+        keep_for_ever(socket)  # the finalizer would close it
     at_exit = getattr(sys.modules[_MODULE], "_pynng_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)
@@ -103,17 +105,17 @@ in_child(_forked)
 
 
 def queue_of(codec: str) -> int:
-    """How many messages pynng shall queue for each connection. It bounds them by their number only."""
+    """Return the queue length per connection, in messages. pynng doesn't bound the bytes."""
     return _QUEUES.get(codec, MOST)
 
 
-def bound_port(listener: Any) -> int:  # noqa: ANN401 - it has no types
-    """The port at which it listens."""
+def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
+    """Return the port of a listener."""
     return int(str(listener.local_address).rpartition(":")[2])
 
 
-def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - it has no types
-    """Let a socket listen at `HOST:PORT`, with port 0 at a free one that is none of the original NEP's.
+def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not typed
+    """Listen at `HOST:PORT`; port 0 selects a free one, except those of the original NEP.
 
     Raises `AddressInUseError`, `TooManyFilesError`.
     """

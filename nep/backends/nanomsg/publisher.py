@@ -1,8 +1,8 @@
-"""NanomsgPublisher: a publisher that subscribers find through the master.
+"""NanomsgPublisher: publisher that subscribers find through the master.
 
-SP's PUB hears nothing of its subscribers. So they greet it at a second port, and say from which address their
-connection comes: as soon as that one is there they get what is latched and an echo by it, as on the native
-wire. Messages are sent in the publisher's thread, hellos are read in the node's.
+A PUB socket doesn't report its subscribers. They therefore send a hello to a second port, with the local
+address of their connection. When both are known, the publisher sends the history and an echo, as on the
+native wire. Messages are sent in the publishing thread, hellos are read in the I/O thread.
 """
 
 from __future__ import annotations
@@ -45,9 +45,10 @@ _BYE_AGAIN_S = 0.05
 
 
 class NanomsgPublisher(GreetedPublisher):
-    """Owns a PUB and the PULL at which it is greeted. Nothing of pynng is closed under its lock.
+    """Publisher with a PUB socket, and a PULL socket for hellos.
 
-    pynng tells of connections in threads of its own and waits for these when it closes something.
+    Never close objects of pynng with the lock held: closing waits for callbacks in other threads, which take
+    the lock.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class NanomsgPublisher(GreetedPublisher):
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        queue = max(queue_of(spec.codec.name), 2 * spec.history)  # it goes out at once
+        queue = max(queue_of(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
         self._out: Any = new_socket("Pub0", send_buffer_size=queue)
         self._in: Any = new_socket(
             "Pull0", recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES
@@ -78,9 +79,9 @@ class NanomsgPublisher(GreetedPublisher):
         self._is_closed = False
         self._is_released = False
         self._pipes: dict[int, str] = {}
-        """The addresses from which connections come."""
+        """Remote addresses of connections."""
         self._hellos: dict[str, int] = {}
-        """Who said hello, by the address of its connection, which may not be there yet."""
+        """Subscriber ids by the address of their connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
         self._refusals = Refusals()
         super().__init__(threading.Condition(threading.Lock()), {})
@@ -91,23 +92,23 @@ class NanomsgPublisher(GreetedPublisher):
 
     @property
     def subscribers(self) -> int:
-        """How many said hello and have not gone."""
+        """Number of subscribers that have said hello and not left."""
         return len(self._seen)
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody is connected, with or without a hello."""
+        """True if any subscriber is connected, with or without a hello."""
         return bool(self._pipes)
 
     def counts(self) -> PublisherCount:
-        """The statistics for a renewal."""
+        """Return the statistics for a renewal."""
         with self._changed:
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self._problem
             )
 
-    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - it is reached on this computer only
-        """Listen, at the first call; the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - loopback only
+        """Listen at the first call; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
         if not self._endpoint:
             what = f"a publisher of '{self.spec.topic}'"
             messages, hellos = (listen(each, f"{LOOPBACK}:0", what) for each in (self._out, self._in))
@@ -115,26 +116,26 @@ class NanomsgPublisher(GreetedPublisher):
         return (self._endpoint,)
 
     def leave_local(self) -> None:
-        """It has no name beside its port."""
+        """Do nothing: there are no Unix socket names."""
 
     # ---- sending
 
     def report(self, problem: str) -> None:
-        """The publisher's trouble with a payload, for the next renewal."""
+        """Set the problem of a payload, which is sent with the next renewal."""
         self._problem = problem
 
     def lend(self, _size_bytes: int) -> memoryview | None:
-        """See `PublisherTransport.lend`: none here."""
+        """Return None: nanomsg has no shared memory."""
         return None
 
     def skip(self) -> None:
-        """Count a message that nobody wants."""
+        """Count a message that is not sent because the topic has no subscribers."""
         with self._changed:
             self.count += 1
             self._last_stamp_ns = time.time_ns()
 
     def send(self, encoded: Encoded) -> None:
-        """Publish, in one message of nanomsg. Raises `WireError` for an extension that has no form."""
+        """Publish one message. Raises `WireError` for an extension that can't be encoded."""
         data, beside = encoded
         extension = extension_part(beside) if beside else b""
         flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if beside else 0)
@@ -155,8 +156,8 @@ class NanomsgPublisher(GreetedPublisher):
 
     # ---- subscribers, in the node's thread
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - it has nothing to do later
-        """Read hellos, and see who came and went."""
+    def serve(self, now: float) -> Rest:  # noqa: ARG002 - nothing to schedule
+        """Process hellos, connects and disconnects."""
         with self._changed:
             while self._events:
                 self._note(*self._events.popleft())
@@ -168,22 +169,22 @@ class NanomsgPublisher(GreetedPublisher):
                 self._hello(said)
         return Rest()
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, str(pipe.remote_address)))
         self._serve_soon(self)
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, ""))
         self._serve_soon(self)
 
     def _note(self, pipe: int, address: str) -> None:
-        """A connection is there, or with no address it is gone. With the lock held."""
+        # `address` is "" for a closed connection. Call with the lock held.
         if address:
             self._pipes[pipe] = address
             self._greet(address)
             return
         gone = self._hellos.pop(self._pipes.pop(pipe, ""), None)
-        if gone is not None and gone not in self._hellos.values():  # else it has connected anew
+        if gone is not None and gone not in self._hellos.values():  # otherwise it has reconnected
             self._seen.pop(gone, None)
             self._changed.notify_all()
 
@@ -202,12 +203,12 @@ class NanomsgPublisher(GreetedPublisher):
             self._greet(place)
 
     def _forget_lone_hellos(self) -> None:
-        """Those whose connection never came, or went before they were read. With the lock held."""
+        # Hellos whose connection was never established, or is closed. Call with the lock held.
         there = set(self._pipes.values())
         self._hellos = {place: each for place, each in self._hellos.items() if place in there}
 
     def _greet(self, address: str) -> None:
-        """What was latched, then the echo: from here on the subscriber counts. With the lock held."""
+        # The history, then the echo: from here on the subscriber counts losses. Call with the lock held.
         subscriber = self._hellos.get(address)
         if subscriber is None or self._is_released:
             return
@@ -224,21 +225,21 @@ class NanomsgPublisher(GreetedPublisher):
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, deliver what is on its way, and close the sockets. Once; called by its publisher."""
+        """Unregister, flush and close the sockets. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
     def say_bye(self) -> None:
-        """Nothing is published any more; every subscriber disconnects when it has read everything."""
+        """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
         with self._changed:
             self._is_closed = True
             self._bye()
 
     def finish(self, deadline: float) -> None:
-        """Wait until all have disconnected; log what was not delivered at `deadline`, and to how many."""
+        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
-                    self._bye()  # a full queue drops it like anything else
+                    self._bye()  # a full queue drops the bye like any message
             owed = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
             if any(owed):
                 _logger.warning(
@@ -250,7 +251,7 @@ class NanomsgPublisher(GreetedPublisher):
             self._seen.clear()
 
     def release(self) -> None:
-        """Close the sockets; the node's thread has let go of them."""
+        """Close the sockets. The I/O thread must not serve them any more."""
         with self._changed:
             if self._is_released:
                 return

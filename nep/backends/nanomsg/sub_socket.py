@@ -1,4 +1,7 @@
-"""NanomsgSubSocket: a SUB with its publishers, each greeted at its second port. No lock: see `Readable`."""
+"""NanomsgSubSocket: a SUB socket and its publishers, each greeted at its second port.
+
+Not thread-safe, see `Readable`.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ _HELLO_QUEUE = 8
 
 
 class QuickSub:
-    """A SUB whose descriptor can be polled and that is read without an exception's cost to its owner."""
+    """SUB socket with a descriptor to poll; an empty one returns None instead of raising."""
 
     def __init__(self, codec: str) -> None:
         nng = library()
@@ -45,32 +48,31 @@ class QuickSub:
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read."""
+        """True if a message can be read."""
         return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
 
     def make_room(self, history: int) -> None:
-        """So many messages may come at once."""
+        """Enlarge the queue for a history of this length."""
         room = 2 * min(history, MAX_HISTORY)
         if room > self._room:
             self._room = self.socket.recv_buffer_size = room
 
     def recv(self, *, may_wait: bool) -> bytes | None:
-        """What comes next; None when there is nothing, with `may_wait` within `SHORT_WAIT_S`."""
+        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
         try:
             return bytes(self.socket.recv(block=may_wait))
         except self._nothing:
             return None
 
     def close(self) -> None:
-        """Close it."""
+        """Close the socket."""
         self._is_closed = True
         self.socket.close()
 
 
 @dataclass
 class _Link:
-    """A connection to a publisher, and the PUSH that greets it."""
-
+    # Connection to a publisher, with the PUSH socket for the hello.
     endpoint: str
     place: str
     greeter: Any
@@ -83,7 +85,7 @@ class _Link:
 
 
 class NanomsgSubSocket(ReadOneByOne):
-    """Only publishers of this back end are connected to; another one's endpoint becomes a problem."""
+    """Subscriber socket for publishers of this back end; other endpoints are reported as problems."""
 
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = HeardPublishers()
@@ -97,34 +99,34 @@ class NanomsgSubSocket(ReadOneByOne):
         self._parser = CarefulParser(spec, self._own, self.sources, self.leave, lambda _publisher, _seq: None)
         self._links: dict[int, _Link] = {}
         self._greeters: dict[str, Any] = {}
-        """Through what to greet the publisher at a place; pynng's threads read it."""
+        """Sockets for the hello by a publisher's address. Also read by pynng's threads."""
         self._sub.socket.subscribe(self._topic)
         self._sub.socket.subscribe(self._own)
         self._sub.socket.add_post_pipe_connect_cb(self._connected)
 
     @property
     def received(self) -> int:
-        """Messages that arrived."""
+        """Number of messages received."""
         return self.sources.received
 
     @property
     def lost(self) -> int:
-        """Messages that did not."""
+        """Number of messages lost."""
         return self.sources.lost
 
     @property
     def problem(self) -> str:
-        """What is wrong with a publisher that the master lists; empty when nothing is."""
+        """Problem of a listed publisher; empty if none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
         return next((each.problem for each in listed), "")
 
     @property
     def has_input(self) -> bool:
-        """Whether something can be read."""
+        """True if a message can be read."""
         return self._sub.has_input
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher; twice is once. Silent ones that it replaces are left."""
+        """Connect to a publisher (idempotent). Removes silent publishers that it replaces."""
         for old in self.sources.replaced_by(remote):
             self.sources.settle(old)
             self.leave(old)
@@ -153,11 +155,11 @@ class NanomsgSubSocket(ReadOneByOne):
             _logger.warning("subscribing to '%s': %s", self._name, source.problem)
 
     def _link(self, publisher: int, endpoint: str, place: str, hellos: str) -> str:
-        """Connect, and greet as soon as the connection is there; why that cannot be, or ""."""
+        # The hello is sent once the connection is established. Returns the error, or "".
         nng = library()
         try:
             check_room(2 * SOCKET_FILES, f"a subscriber of '{self._name}'")
-            # It queues, so that pynng's threads never wait in it.
+            # with a queue, sending never blocks pynng's threads
             link = _Link(endpoint, place, new_socket("Push0", send_buffer_size=_HELLO_QUEUE))
             self._links[publisher] = link
             self._greeters[place] = link.greeter
@@ -168,20 +170,20 @@ class NanomsgSubSocket(ReadOneByOne):
             return str(error)
         return ""
 
-    def _connected(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
-        """In one of pynng's threads: say hello, and from where the connection comes."""
+    def _connected(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+        # Runs in a thread of pynng. Sends the hello with the local address of the connection.
         greeter = self._greeters.get(str(pipe.remote_address))
         if greeter is not None:
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
     def connect_again(self) -> None:
-        """Nothing: nodes of this back end meet on one computer only."""
+        """Do nothing: this back end works on one computer only."""
 
     def reconnect(self, publisher: int) -> None:
         """Do nothing: nanomsg connects again after every failure."""
 
     def leave(self, publisher: int) -> None:
-        """Disconnect from a publisher and forget it."""
+        """Disconnect from a publisher and remove it."""
         self.sources.pop(publisher)
         self._unlink(publisher)
 
@@ -191,8 +193,8 @@ class NanomsgSubSocket(ReadOneByOne):
             self._greeters.pop(link.place, None)
             link.close()
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - each comes alone
-        """The next message; None when there is nothing more, with `may_wait` within `SHORT_WAIT_S`."""
+    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+        """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
         while (came := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = came.startswith(self._own)
             first = self._own if is_alone else self._topic
@@ -207,7 +209,7 @@ class NanomsgSubSocket(ReadOneByOne):
         return None
 
     def dropped(self, count: int) -> None:
-        """So many messages that had been received were dropped for lack of room."""
+        """Count received messages that were dropped for lack of room."""
         self.sources.dropped(count)
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""NanomsgSurveyor: asks without a master, by SP's SURVEYOR, as the original NEP and libnanomsg have it.
+"""NanomsgSurveyor: surveys over a SURVEYOR socket without a master, as in the original NEP.
 
-The surveyor binds the port. A question and an answer are JSON with nothing around it; what a callback raises
-travels as the answer `{"nep_error": …}`, as with the original's services.
+The surveyor binds the port. Requests and replies are plain JSON; an exception of a callback is sent as the
+reply `{"nep_error": …}`, as in the original's services.
 """
 
 from __future__ import annotations
@@ -33,8 +33,7 @@ Then = Callable[[Outcome], None]
 
 @dataclass(eq=False)
 class _Question:
-    """A question that is open: `context` of pynng hears its answers, in a thread of its own."""
-
+    # Open survey; its pynng context receives the replies in a thread.
     number: int
     context: Any
     left: int
@@ -44,7 +43,7 @@ class _Question:
 
 
 class NanomsgSurveyor:
-    """Owns a SURVEYOR. See `SurveyTransport`."""
+    """Surveyor on a SURVEYOR socket. Implements `SurveyTransport`."""
 
     def __init__(
         self, spec: ClientSpec, direct: Direct, on_close: Callable[[NanomsgSurveyor], object]
@@ -54,7 +53,7 @@ class NanomsgSurveyor:
         self.spec = spec
         self.is_closed = False
         self.late = 0
-        """Nobody can know: pynng drops them."""
+        """Always 0: pynng drops late replies."""
         self._on_close = on_close
         self._changed = threading.Condition(threading.Lock())
         self._pipes: set[int] = set()
@@ -71,25 +70,25 @@ class NanomsgSurveyor:
 
     @property
     def respondents(self) -> int:
-        """How many are connected."""
+        """Number of connected respondents."""
         return len(self._pipes)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng has no types
+    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
 
     def wait_for_any(self, timeout_s: float) -> None:
-        """Wait until somebody is connected."""
+        """Wait for a connection, for up to `timeout_s` seconds."""
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
     def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
-        """Ask. An item for each that is connected, all of them the same question."""
+        """Send a request. The list has an item per connected respondent, all of them the same survey."""
         with self._changed:
             if self.is_closed:
                 raise self._closed_error()
@@ -105,8 +104,8 @@ class NanomsgSurveyor:
                 target=self._hear, args=(question,), name=f"nep-{self.spec.service}", daemon=True
             )
             self._questions[question.number] = question
-        # Without the lock: pynng's threads take it when somebody connects, and sending may wait for them.
-        with contextlib.suppress(library().NNGException):  # it is closed just now
+        # Without the lock: callbacks in pynng's threads take it, and sending may wait for them.
+        with contextlib.suppress(library().NNGException):  # just closed
             question.context.send(bytes(data))
             question.thread.start()
         return [question] * count
@@ -119,7 +118,7 @@ class NanomsgSurveyor:
             question.then(ORIGINAL.read_answer([b"", data]).reply)
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
-        """The question is over."""
+        """Cancel the survey."""
         for call in calls[:1]:
             with self._changed:
                 question = self._questions.pop(call.number, None)
@@ -134,7 +133,7 @@ class NanomsgSurveyor:
             thread.join(_JOIN_S)
 
     def close(self) -> None:
-        """End; questions that are open end with `ClosedError`. May be called twice."""
+        """Close; open surveys fail with `ClosedError`. Idempotent."""
         with self._changed:
             if self.is_closed:
                 return
@@ -147,7 +146,7 @@ class NanomsgSurveyor:
         self._socket.close()
 
     def forked(self) -> None:
-        """In a child that was forked: nothing of nng may be touched."""
+        """Become closed in a forked child, without touching nng."""
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         for question in self._questions.values():

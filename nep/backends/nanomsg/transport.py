@@ -1,6 +1,6 @@
-"""The back end `nanomsg`: messages by pynng, the master as with `zeromq`.
+"""Transport of the back end `nanomsg`: messages over pynng, with the master as in `zeromq`.
 
-It is that back end's transport with other sockets: sessions, threads, waiting and the end are the same.
+Derived from the `zeromq` transport with other sockets; sessions, threads, waiting and closing are the same.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ __all__ = ["NanomsgTransport"]
 
 
 class NanomsgTransport(ZeromqTransport):
-    """One node's way to the others. Raises `BackendUnavailableError` where pynng is not installed."""
+    """Connection of one node. Raises `BackendUnavailableError` if pynng is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         library()
@@ -49,7 +49,7 @@ class NanomsgTransport(ZeromqTransport):
         super().__init__(node)
 
     def server(self, spec: ServerSpec) -> ServerTransport:
-        """Without a master by REP or RESPONDENT; through one, and by plain TCP, as over zeromq."""
+        """Create a server: direct ones use REP or RESPONDENT, others are those of `zeromq`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and spec.service.startswith(SURVEY):
             check_direct(direct)
@@ -59,32 +59,32 @@ class NanomsgTransport(ZeromqTransport):
         return super().server(spec)
 
     def client(self, spec: ClientSpec) -> ClientTransport:
-        """Without a master by REQ; through one, and by plain TCP, as over zeromq."""
+        """Create a client: direct ones use REQ, others are those of `zeromq`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and direct.wire != "tcp":
             return self._direct_services.client(spec, direct)
         return super().client(spec)
 
     def survey(self, spec: ClientSpec) -> SurveyTransport:
-        """A surveyor without a master is nanomsg's; others are those of the back end zeromq."""
+        """Create a surveyor: direct ones use SURVEYOR, others are those of `zeromq`."""
         if isinstance(spec.configuration, Direct):
             check_direct(spec.configuration)
             return self._direct_services.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
         return super().survey(spec)
 
     def begin_close(self) -> None:
-        """See `Transport.begin_close`."""
+        """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
         super().begin_close()
         self._direct_services.begin_close()
 
     def close(self, timeout_s: float) -> None:
-        """See `Transport.close`."""
+        """Close everything. See `Transport.close`."""
         deadline = time.monotonic() + timeout_s
         self._direct_services.close(timeout_s)
         super().close(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
-        """In a child. See `nep.system.forks`."""
+        """Become closed in a forked child, see `nep.system.forks`."""
         self._direct_services.forked()
         super().forked()
 
