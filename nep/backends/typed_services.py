@@ -44,7 +44,7 @@ class AskedCall(NamedTuple):
 class CallBody(Protocol):
     """Codec of a request or response body: maps to and from bytes."""
 
-    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - whatever was given
+    def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - any payload
         """Encode a map. Raises `EncodeError`."""
 
     def decode(self, data: bytes) -> dict[str, Any]:

@@ -406,7 +406,7 @@ _inherited: list[SharedContext] = []
 
 def shared_context() -> SharedContext:
     """Return the context of this process; create it if needed. Raises `TooManyFilesError`."""
-    global _shared  # noqa: PLW0603 - there is one a process
+    global _shared  # noqa: PLW0603 - one per process
     with _lock:
         if _shared is None:
             _shared = SharedContext()
@@ -415,13 +415,13 @@ def shared_context() -> SharedContext:
 
 
 def _forget(ended: SharedContext) -> None:
-    global _shared  # noqa: PLW0603 - there is one a process
+    global _shared  # noqa: PLW0603 - one per process
     if _shared is ended:
         _shared = None
 
 
 def _forked() -> None:
-    global _lock, _shared  # noqa: PLW0603 - there is one a process
+    global _lock, _shared  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
     if _shared is not None:
         _inherited.append(_shared)

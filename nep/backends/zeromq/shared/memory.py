@@ -65,7 +65,7 @@ class _Opened:
         self.library = importlib.import_module(_MODULE)
         self.node = _new_node(self.library, _own_folder())
 
-    def service(self, publisher: int, generation: int) -> Any:  # noqa: ANN401 - iceoryx2 has no types
+    def service(self, publisher: int, generation: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
         name = self.library.ServiceName.new(f"nep/{publisher:016x}/{generation}")
         return (
             self.node.service_builder(name)
@@ -113,7 +113,7 @@ def _open() -> _Opened | None:
         return opened
 
 
-def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - it has no types
+def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - not typed
     library.set_log_level(library.LogLevel.Fatal)
     configuration = library.config.default()
     configuration.global_cfg.root_path = library.Path.new(str(folder))
@@ -200,7 +200,7 @@ class _Slots:
 class Loan:
     """Slot that a payload is written into before it is published. Released with its last reference."""
 
-    def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 has no types
+    def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
         self._forks = _forks
         self._port = port  # the memory is valid while the port exists
@@ -286,7 +286,7 @@ class SharedWriter:
         self._loans[made.address] = made
         return made
 
-    def _sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 has no types
+    def _sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
         if self._port is None or size > self._slot_bytes or not self._room.has(size):
             return None
         try:
