@@ -245,7 +245,7 @@ class ClientCalls(Generic[C]):
         self.spec = spec
         self.is_closed = False
         self.late = 0
-        """Number of replies that arrived after their call had timed out or was canceled."""
+        """Number of replies that arrived after their call had timed out or was cancelled."""
         self._lock = threading.Lock()
         self._calls: dict[int, C] = {}
         self._bytes = 0
@@ -257,7 +257,7 @@ class ClientCalls(Generic[C]):
         try:
             call.then(outcome)
         except Exception:  # a failing callback must not affect other calls
-            _logger.exception("the end of a call of '%s' could not be told", self.spec.service)
+            _logger.exception("result callback for '%s' raised", self.spec.service)
 
     def _take(self, call: C) -> bool:
         if self._calls.pop(call.number, None) is None:
@@ -315,7 +315,7 @@ class ClientTransport(Protocol):
 
     @property
     def late(self) -> int:
-        """Number of replies that arrived after their call had timed out or was canceled."""
+        """Number of replies that arrived after their call had timed out or was cancelled."""
 
     @property
     def is_closed(self) -> bool:
@@ -358,7 +358,7 @@ class SurveyTransport(Protocol):
 
     @property
     def late(self) -> int:
-        """Number of replies that arrived after their call had timed out or was canceled."""
+        """Number of replies that arrived after their call had timed out or was cancelled."""
 
     @property
     def is_closed(self) -> bool:

@@ -78,7 +78,7 @@ class _Call:
         try:
             self.then(outcome)
         except Exception:  # a failing callback must not affect other calls
-            _logger.exception("the end of a call of '%s' could not be told", self.client.spec.service)
+            _logger.exception("result callback for '%s' raised", self.client.spec.service)
 
 
 class MemoryServer:

@@ -106,7 +106,7 @@ class NanomsgServer:
         close_context(context)
         self.tally.add_unreadable()
         if self._refusals.add(error.reason):
-            _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+            _logger.warning("malformed call to '%s': %s", self.spec.service, error)
 
     def _new_context(self) -> Any:  # noqa: ANN401 - pynng is not typed
         # Returns None when closed.
@@ -128,7 +128,7 @@ class NanomsgServer:
             try:
                 context.send(in_one(self._framing, self._framing.answer(number, fit)))
             except (library().NNGException, TypeError) as error:  # the client no longer waits
-                _logger.debug("an answer of '%s' could not be sent: %s", self.spec.service, error)
+                _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False
             finally:
                 with self._lock:

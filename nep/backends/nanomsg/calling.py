@@ -70,7 +70,7 @@ class NanomsgClient(ClientCalls[_Call]):
         self._on_close = on_close
         self._pipes: set[int] = set()
         self._left: dict[int, _Call] = {}
-        """Calls that timed out or were canceled, oldest first; their replies are counted as late."""
+        """Calls that timed out or were cancelled, oldest first; their replies are counted as late."""
         self._threads: set[threading.Thread] = set()
         socket.add_post_pipe_connect_cb(self._came)
         socket.add_post_pipe_remove_cb(self._went)
@@ -110,7 +110,7 @@ class NanomsgClient(ClientCalls[_Call]):
         try:
             outcome = self._outcome(call)
         except Exception as error:
-            _logger.exception("a call of '%s' could not be carried out", self.spec.service)
+            _logger.exception("call of '%s' failed", self.spec.service)
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
         close_context(call.context)
         if outcome is not None:

@@ -194,8 +194,8 @@ class NanomsgPublisher(GreetedPublisher):
         if hello is not None and len(self._hellos) >= _MOST_HELLOS:
             self._forget_lone_hellos()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MOST_HELLOS:
-            if self._refusals.add(f"{len(said)} bytes that are no hello to it"):
-                _logger.info("'%s' was sent %s", self.spec.topic, self._refusals.told())
+            if self._refusals.add(f"an invalid hello of {len(said)} bytes"):
+                _logger.info("'%s' received %s", self.spec.topic, self._refusals.told())
             return
         place = address.decode("ascii", "replace")
         self._hellos[place] = hello.subscriber
@@ -243,7 +243,8 @@ class NanomsgPublisher(GreetedPublisher):
             owed = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
             if any(owed):
                 _logger.warning(
-                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    "'%s' was closed before %d subscriber(s) received everything: "
+                    "up to %d messages not delivered",
                     self.spec.topic,
                     sum(map(bool, owed)),
                     max(owed),

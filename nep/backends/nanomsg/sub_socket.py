@@ -152,7 +152,7 @@ class NanomsgSubSocket(ReadOneByOne):
             shown=ascii(endpoint[:100])[1:-1], name=remote.node_name, why=why or _("it is none of 'nanomsg'")
         )
         if self.refusals.add(source.problem):
-            _logger.warning("subscribing to '%s': %s", self._name, source.problem)
+            _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
     def _link(self, publisher: int, endpoint: str, place: str, hellos: str) -> str:
         # The hello is sent once the connection is established. Returns the error, or "".
@@ -202,7 +202,7 @@ class NanomsgSubSocket(ReadOneByOne):
                 message = self._parser.parse(first, split_one(came, first, is_alone=is_alone))
             except WireError as error:
                 if self.refusals.add(error.reason):
-                    _logger.warning("on '%s' came what is no message: %s", self._name, error)
+                    _logger.warning("malformed message on '%s': %s", self._name, error)
                 continue
             if message is not None:
                 return message

@@ -104,7 +104,7 @@ class RosProcess:
             self.master.wait(_ASK_S)
         except RosMasterUnreachable:
             return
-        self.rospy.signal_shutdown("the program ends")
+        self.rospy.signal_shutdown("the program exits")
 
     def _shut_down(self) -> None:
         if not self._ended.is_set():
@@ -117,7 +117,7 @@ class RosProcess:
         # Thread that detects restarts of the master until rospy ends.
         while not self._ended.wait(_WATCH_S):
             if self.master.has_forgotten(self.name, _ASK_S) and self._register_anew():
-                _logger.warning("the ROS master at '%s' was started anew", self.master.address)
+                _logger.warning("the ROS master at '%s' was restarted; registered again", self.master.address)
 
     def _register_anew(self) -> bool:
         # Repeats rospy's registrations, which rospy doesn't do after a restart of the master. Returns False

@@ -129,7 +129,7 @@ class RosClient(ClientCalls[_Call]):
         except NepError as error:
             outcome = error
         except Exception as error:
-            _logger.exception("a call of '%s' could not be carried out", self.spec.service)
+            _logger.exception("call of '%s' failed", self.spec.service)
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
         finally:
             connection.close()

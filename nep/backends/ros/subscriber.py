@@ -195,7 +195,7 @@ class RospySubscriber(WakingSubscriber):
 
     def _refuse(self, reason: str) -> None:
         if self.refusals.add(reason):
-            _logger.warning("on '%s' came what is no message: %s", self.spec.topic, reason)
+            _logger.warning("malformed message on '%s': %s", self.spec.topic, reason)
 
     # ---- reading
 

@@ -151,7 +151,9 @@ class RospyPublisher:
         self.process.publishes_no_more(self.topic, self.spec.id)
         left = self.process.unsent(self._publisher, deadline)
         if left:
-            _logger.warning("'%s' is closed before %d subscriber(s) took everything", self.spec.topic, left)
+            _logger.warning(
+                "'%s' was closed before %d subscriber(s) received everything", self.spec.topic, left
+            )
         self.process.withdraw(self.topic, self._publisher, deadline - time.monotonic())
 
 

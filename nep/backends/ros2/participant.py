@@ -333,7 +333,7 @@ class Participant:
         try:
             info: Any = self.types.decode(_INFO, cdr)
         except DecodeError as error:
-            _logger.debug("what came on ros_discovery_info cannot be read: %s", error)
+            _logger.debug("malformed message on ros_discovery_info: %s", error)
             return
         gid = info["gid"]["data"][:16]
         if gid == self.gid or (gid not in self._others and len(self._others) >= _MOST_PARTICIPANTS):
@@ -490,7 +490,7 @@ def _tried(step: Callable[[], None]) -> None:
     try:
         step()
     except Exception:
-        _logger.exception("what came over ROS 2 cannot be read")
+        _logger.exception("error while processing ROS 2 data")
 
 
 def _read_states(reader: Any, ready: Any, hear: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above

@@ -206,7 +206,7 @@ class Ros2Publisher:
             # `wait_for_acks` raises on timeout (cyclonedds 11.0.1)
             wait = self._writer._wait_for_acks  # noqa: SLF001
             if wait(self._writer._ref, int(min(timeout_s, 3600.0) * 1e9)):  # noqa: SLF001
-                _logger.warning("'%s' is closed before all its subscribers took everything", self.spec.topic)
+                _logger.warning("'%s' was closed before all subscribers received everything", self.spec.topic)
         with self._participant.changed:
             if not self._is_closed:
                 self._is_closed = True

@@ -164,7 +164,7 @@ class Ros2Subscriber(WakingSubscriber):
             self.problem = error.reason
             if is_logged(self.refused):
                 _logger.warning(
-                    "on '%s' came what is no message (%d so far): %s", self.spec.topic, self.refused, error
+                    "malformed message on '%s' (%d so far): %s", self.spec.topic, self.refused, error
                 )
             return []
         message = arrived(source.kind, data, info.source_timestamp, 0, source.id)

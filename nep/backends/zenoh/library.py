@@ -66,7 +66,7 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # zenoh panics if closing takes ten seconds; the exception isn't derived from `Exception`
         if type(error).__name__ not in {"PanicException", "ZError"}:
             raise
-        _logger.warning("zenoh could not close a session: %s", error)
+        _logger.warning("zenoh failed to close a session: %s", error)
     finally:
         if session in _sessions:
             _sessions.remove(session)

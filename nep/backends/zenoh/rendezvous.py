@@ -72,7 +72,10 @@ class Rendezvous:
         with (self._folder / "lock").open("ab") as file:
             is_held = _lock(file.fileno())
             if not is_held:
-                _logger.warning("somebody else opens a session at %s and does not end", self._folder)
+                _logger.warning(
+                    "another process holds the session lock at %s and doesn't respond; continuing",
+                    self._folder,
+                )
             try:
                 yield
             finally:
@@ -91,7 +94,7 @@ class Rendezvous:
                 path.unlink(missing_ok=True)
             elif status in _STOPPED:
                 _logger.warning(
-                    "the halted program %d cannot be connected to; make new nodes later", entry.pid
+                    "skipping process %d, which is suspended; nodes created now can't reach it", entry.pid
                 )
             else:
                 found.append(entry)

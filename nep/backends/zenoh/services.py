@@ -92,7 +92,7 @@ class ZenohServer:
             query.drop()
             self.tally.add_unreadable()
             if self._refusals.add(error.reason):
-                _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+                _logger.warning("malformed call to '%s': %s", self.spec.service, error)
             return
         with self._lock:
             is_closed = self.is_closed
@@ -120,7 +120,7 @@ class ZenohServer:
             with query:
                 query.reply(self._key, data, attachment=header)
         except library().ZError as error:  # the session was closed meanwhile
-            _logger.debug("an answer of '%s' could not be sent: %s", self.spec.service, error)
+            _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
             return False
         return True
 
@@ -256,7 +256,7 @@ class ZenohClient(ClientCalls[_Call]):
                 key, parts, heard_s, lambda reply: self._replied(call, reply), lambda: self._over(call)
             )
         except library().ZError as error:  # the session was closed meanwhile
-            _logger.debug("a call of '%s' could not be sent: %s", self.spec.service, error)
+            _logger.debug("can't send a call of '%s': %s", self.spec.service, error)
             self._end(call, self._closed_error())
 
     def _replied(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
@@ -271,7 +271,7 @@ class ZenohClient(ClientCalls[_Call]):
                 raise WireError(_("it is no answer of a service"))
         except WireError as error:
             if self._refusals.add(error.reason):
-                said = "the server of '%s' says what nobody understands: %s"
+                said = "malformed reply from the server of '%s': %s"
                 _logger.warning(said, self.spec.service, error)
             return
         if not self._end(call, outcome):

@@ -176,7 +176,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._take_early(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
-                _logger.warning("on '%s' came what is no message: %s", self.spec.topic, error)
+                _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
 
     def _is_early(self, ear: _Ear, rest: list[bytes]) -> bool:
         header = read_header(rest[0])

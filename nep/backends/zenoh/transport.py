@@ -209,7 +209,8 @@ class ZenohTransport:
             owed = sum(call_key(each.node_id) in silent and each.id in there for each in farewell.expected)
             if owed:
                 _logger.warning(
-                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    "'%s' was closed before %d subscriber(s) received everything: "
+                    "up to %d messages not delivered",
                     publisher.spec.topic,
                     owed,
                     publisher.count,

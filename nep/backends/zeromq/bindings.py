@@ -68,7 +68,7 @@ def _bind_beside(owner: Socket, endpoint: str) -> str:
         try:
             owner.bind(name)
         except zmq.ZMQError as error:
-            _logger.debug("'%s' could not be bound: %s", name, error)
+            _logger.debug("can't bind '%s': %s", name, error)
             return ""
     return name
 
@@ -80,7 +80,7 @@ def _is_reached(name: str) -> bool:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
                 probe.connect("\0" + name.removeprefix("ipc://@"))
         except OSError as error:
-            _logger.debug("'%s' could not be reached: %s", name, error)
+            _logger.debug("can't connect to '%s': %s", name, error)
             return False
         _reached.add(True)
     return True
@@ -165,4 +165,4 @@ class Bindings:
         try:
             self._socket.unbind(endpoint)
         except zmq.ZMQError as error:  # the address has disappeared, and with it the binding
-            _logger.debug("'%s' could not be unbound: %s", endpoint, error)
+            _logger.debug("can't unbind '%s': %s", endpoint, error)

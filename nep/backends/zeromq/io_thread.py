@@ -170,7 +170,7 @@ class IoThread:
                 self._turn()
             except Exception:
                 if not self._is_closing:
-                    _logger.exception("the sockets of this program could not be polled; they are polled anew")
+                    _logger.exception("polling failed; rebuilding the poller")
                     self._begin_anew()
         self._release()
         for _what, _served, done in self._orders:
@@ -198,7 +198,7 @@ class IoThread:
                 self._polled.clear()
                 self._selector.register(self._waker.fd, selectors.EVENT_READ)
             except Exception:
-                _logger.exception("the sockets of this program cannot be polled; trying again")
+                _logger.exception("can't poll the sockets of this program; retrying")
                 self._pause.wait(_RETRY_S)
                 continue
             self._doubtful = set(self._served)
@@ -224,14 +224,14 @@ class IoThread:
         try:
             rest = served.serve(now)
         except Exception:  # one broken socket must not block the others
-            _logger.exception("a socket could not be served")
+            _logger.exception("error while serving a socket; retrying")
             rest = Rest(is_quiet=True, due=now + _RETRY_S)
         if served not in self._served or self._is_closing:
             return  # removed while it was served
         try:
             self._poll(served, _events(rest))
         except (OSError, ValueError, KeyError) as error:
-            _logger.error("a socket cannot be polled, it is served each second: %s", error)  # noqa: TRY400
+            _logger.error("can't poll a socket, serving it every second instead: %s", error)  # noqa: TRY400
             self._polled.pop(served, None)
             self._doubtful.add(served)
             rest = Rest(is_quiet=True, due=now + _RETRY_S)

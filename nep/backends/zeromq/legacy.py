@@ -234,7 +234,8 @@ class OriginalPublisher:
             self._end.poll(self._left_ms() + _TOLD_MS)
             if self.count and self._filters and not self._left_ms():
                 _logger.warning(
-                    "'%s' is closed before %d subscriber(s) took everything: up to %d messages not delivered",
+                    "'%s' was closed before %d subscriber(s) received everything: "
+                    "up to %d messages not delivered",
                     self.spec.topic,
                     self._filters,
                     self.count,

@@ -157,7 +157,7 @@ class HeardPublishers:
         if last is not None and seq - last > GAP_MAX:
             if not source.leapt_to or source.leapt_to != seq - 1:
                 source.leapt_to = seq
-                raise WireError(f"its number leaps from {last} to {seq}", code="seq-leap")
+                raise WireError(f"its sequence number jumps from {last} to {seq}", code="seq-leap")
             source.leapt_to, source.promised, source.last = 0, 0, seq
             self.received += 1
             return True

@@ -310,7 +310,7 @@ class MasterSession:
         try:
             self._calls.wait(self._leaving, max(0.0, left))
         except (MasterUnreachable, RequestRefusedError, ClosedError):
-            _logger.debug("the master at '%s' did not hear that a node leaves", self.address)
+            _logger.debug("no reply from the master at '%s' while leaving", self.address)
 
     def close(self) -> None:
         """Close the connection."""

@@ -148,7 +148,7 @@ class PatternSubscriber(WakingSubscriber):
                 self._lack = str(error)
                 self._failures += 1
                 if is_logged(self._failures):
-                    _logger.warning("'%s' does not hear '%s': %s", self.spec.topic, topic, error)
+                    _logger.warning("'%s' can't subscribe to '%s': %s", self.spec.topic, topic, error)
                 return None
             self._lack = ""
             is_registered = self._closed_early is None
@@ -159,7 +159,7 @@ class PatternSubscriber(WakingSubscriber):
 
     def _new_member(self, topic: str) -> NativeSubscriber:
         if len(self._members) >= _MEMBERS_MAX:
-            raise NepError(f"it hears {_MEMBERS_MAX} topics already")
+            raise NepError(f"it is already subscribed to {_MEMBERS_MAX} topics")
         spec = replace(
             self.spec,
             topic=topic,

@@ -548,7 +548,7 @@ class NativePublisher(GreetedPublisher):
                 owed = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
                 if any(owed):  # otherwise only the bye is missing
                     _logger.warning(
-                        "'%s' is closed before %d subscriber(s) took everything: "
+                        "'%s' was closed before %d subscriber(s) received everything: "
                         "up to %d messages not delivered",
                         self.spec.topic,
                         sum(map(bool, owed)),

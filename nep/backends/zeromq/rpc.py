@@ -262,7 +262,7 @@ class RpcClient:
     def _refuse(self, error: WireError) -> None:
         if self.refusals.add(error.reason):
             _logger.warning(
-                "the master at '%s' says what nobody understands (%d times so far): %s",
+                "malformed message from the master at '%s' (%d so far): %s",
                 self.address,
                 self.refusals.count,
                 error,

@@ -266,7 +266,7 @@ class FarConnection:
                 if connection.getpeername() == self.peer:
                     connection.shutdown(socket.SHUT_RDWR)
         except OSError as error:
-            _logger.debug("the connection to %s:%d had ended: %s", *self.peer, error)
+            _logger.debug("the connection to %s:%d was already closed: %s", *self.peer, error)
 
 
 def _peer_of(fd: int) -> tuple[str, int] | None:

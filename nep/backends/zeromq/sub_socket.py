@@ -309,7 +309,7 @@ class SubSocket:
             shown=shown, name=name, why=why
         )
         if self.refusals.add(source.problem):
-            _logger.warning("subscribing to '%s': %s", self._name, source.problem)
+            _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
     @property
     def problem(self) -> str:

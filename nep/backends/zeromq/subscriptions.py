@@ -108,7 +108,7 @@ class Subscriptions:
 
     def _note_hello(self, hello: Hello, what: bytes, count: int) -> bytes | None:
         if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
-            self._refuse(f"the hello of one more than {MAX_SUBSCRIBERS} subscribers")
+            self._refuse(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
             return None
         if hello.one_part:  # its plain filter was counted before
             left = self.apart.pop(self._topic, 0) - 1
@@ -152,7 +152,7 @@ class Subscriptions:
     def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
         # XPUB_VERBOSE reports every subscribe, but only the last unsubscribe.
         if not self._topic.startswith(what):
-            self._refuse(f"{len(what)} bytes that are no subscription of it")
+            self._refuse(f"an invalid subscription of {len(what)} bytes")
             return
         if is_wanted:
             self.apart[what] = self.apart.get(what, 0) + 1
@@ -161,4 +161,4 @@ class Subscriptions:
 
     def _refuse(self, reason: str) -> None:
         if self.refusals.add(reason):
-            _logger.info("'%s' was sent %s", self._name, self.refusals.told())
+            _logger.info("'%s' received %s", self._name, self.refusals.told())

@@ -170,12 +170,10 @@ def test_a_halted_subscriber_costs_half_a_second_and_is_named(
         for n in range(1000):
             pub.publish(n)  # nobody waits for it
         pub.close(timeout_s=0.2)
-        assert (
-            "'to/peer' is closed before 1 subscriber(s) took everything: up to 1000 messages" in caplog.text
-        )
+        assert "'to/peer' was closed before 1 subscriber(s) received everything: up to 1000" in caplog.text
         late = make("late")
         late.new_sub("t")
-        assert "the halted program" in caplog.text
+        assert "which is suspended" in caplog.text
         peer.signal(signal.SIGCONT)
 
 

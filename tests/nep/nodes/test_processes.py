@@ -273,7 +273,7 @@ def test_what_could_not_be_delivered_is_said(master: Master) -> None:
             program.say("go")
             _out, error = program.end()
             assert monotonic() - started > 1.9
-    assert "closed before 1 subscriber(s) took everything: up to 20 messages not delivered" in error
+    assert "closed before 1 subscriber(s) received everything: up to 20 messages not delivered" in error
 
 
 def test_ctrl_c_ends_a_blocking_listen(master: Master) -> None:

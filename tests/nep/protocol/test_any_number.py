@@ -181,7 +181,7 @@ def test_a_message_with_a_number_that_cannot_be_breaks_nobodys_graph(master: Mas
             assert sub.listen(30.0) == (True, b"2")
             assert sub.lost == 0
             (alert,) = eventually_alerts(hearer)
-            assert f"its number leaps from 1 to {seq}" in alert
+            assert f"its sequence number jumps from 1 to {seq}" in alert
             assert hearer.graph().topics["/t"].lost == 0
         xpub.close()
         context.term()

@@ -238,7 +238,7 @@ def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCapture
     fine.waker.wake()
     assert fine.served.acquire(timeout=30.0)
     io.close()
-    assert "a socket could not be served" in caplog.text
+    assert "error while serving a socket" in caplog.text
     for each in (broken, fine):
         each.waker.close()
 
@@ -295,7 +295,7 @@ def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
     sources = HeardPublishers()
     sources.reached(1, 0)
     assert sources.arrived(1, 1, is_alone=False)
-    with pytest.raises(nep.errors.WireError, match="its number leaps from 1 to 18446744073709551615"):
+    with pytest.raises(nep.errors.WireError, match="its sequence number jumps from 1 to 184467440737095516"):
         sources.arrived(1, 2**64 - 1, is_alone=False)
     assert not sources.reached(1, 2**64 - 1)
     sources.get(1).has_echoed = True
@@ -360,7 +360,7 @@ def test_the_io_thread_outlives_errors_of_its_poll(caplog: pytest.LogCaptureFixt
     io.remove(bell)
     io.close()
     bell.waker.close()
-    assert "could not be polled; they are polled anew" in caplog.text
+    assert "polling failed; rebuilding the poller" in caplog.text
     for each in made:
         each.close()
 
@@ -382,7 +382,7 @@ def test_what_cannot_be_polled_is_served_each_second_and_the_others_at_once(
     fine.waker.wake()
     assert fine.served.acquire(timeout=30.0)
     io.close()
-    assert "a socket cannot be polled" in caplog.text
+    assert "can't poll a socket" in caplog.text
     for each in (bad, fine):
         each.waker.close()
 

@@ -71,7 +71,7 @@ class Ros2Server:
             asked = self._type.call_in(heard.cdr)
         except NepError as error:
             if self._refusals.add(str(error)):
-                _logger.warning("to '%s' came what is no call: %s", self.spec.service, error)
+                _logger.warning("malformed call to '%s': %s", self.spec.service, error)
             self._answer(heard, failure(CallKind.REFUSED, "", str(error)))
             return
         deadline = None if asked.timeout_s is None else time.monotonic() + asked.timeout_s
@@ -95,7 +95,7 @@ class Ros2Server:
         try:
             self._write(heard.id, cdr, reply)
         except (NepError, self._participant.dds.core.DDSException) as error:
-            _logger.warning("an answer of '%s' could not be sent: %s", self.spec.service, error)
+            _logger.warning("can't send a reply of '%s': %s", self.spec.service, error)
             return False
         return True
 

@@ -131,7 +131,7 @@ class SocketClient:
         self._numbers = itertools.count(1)
         self._calls: dict[int, _Call] = {}
         self._unanswered: dict[int, int] = {}
-        """Sizes of the calls sent over this connection by number, oldest first, including canceled ones:
+        """Sizes of the calls sent over this connection by number, oldest first, including cancelled ones:
         replies without a number come in this order, and it limits what is sent to a server that hangs.
         """
         self._bytes = self._unanswered_bytes = 0
@@ -168,7 +168,7 @@ class SocketClient:
 
     @property
     def late(self) -> int:
-        """Number of replies that arrived after their call had timed out or was canceled."""
+        """Number of replies that arrived after their call had timed out or was cancelled."""
         return self._late
 
     @property
@@ -342,7 +342,7 @@ class SocketClient:
                 number, outcome = self._framing.read_answer(parts)
             except WireError as error:
                 if self._refusals.add(error.reason):
-                    _logger.warning("the server of '%s' says what nobody understands: %s", self._name, error)
+                    _logger.warning("malformed reply from the server of '%s': %s", self._name, error)
                 if not self._framing.in_order:
                     continue
                 outcome = error
@@ -419,7 +419,7 @@ class SocketClient:
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)
         except (OSError, zmq.ZMQError, NepError) as error:
-            _logger.warning("a server of '%s' cannot be reached at '%s': %s", self._name, endpoint, error)
+            _logger.warning("can't connect to a server of '%s' at '%s': %s", self._name, endpoint, error)
         self._try_at = now + min(_FIRST_TRY_S * 2 ** min(self._tries, 10), _LAST_TRY_S)
 
     def _disconnect(self) -> None:
@@ -459,7 +459,7 @@ class SocketClient:
             try:
                 then(outcome)
             except Exception:  # a failing callback must not affect other calls
-                _logger.exception("the end of a call of '%s' could not be told", self._name)
+                _logger.exception("result callback for '%s' raised", self._name)
 
     # ---- closing
 

@@ -71,7 +71,7 @@ class CallReader:
         self._tally.add_unreadable()
         if self._refusals.add(error.reason):
             _logger.warning(
-                "'%s' was called in a way that nobody understands (%d times so far): %s",
+                "malformed call to '%s' (%d so far): %s",
                 self._service,
                 self._refusals.count,
                 error,
@@ -182,7 +182,9 @@ class RouterServer:
             if self._is_closed:
                 return False
             if len(reply.data) >= _LARGE_BYTES and not self._has_room(len(reply.data)):
-                _logger.warning("an answer of '%s' is left out: nobody reads the others", self.spec.service)
+                _logger.warning(
+                    "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
+                )
                 return False
             is_sent = self._send(route, self._framing.answer(number, reply))
             has_input = bool(int(self.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)

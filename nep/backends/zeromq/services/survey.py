@@ -55,7 +55,7 @@ class SurveyClient:
 
     @property
     def late(self) -> int:
-        """Number of replies that arrived after their call had timed out or was canceled."""
+        """Number of replies that arrived after their call had timed out or was cancelled."""
         with self._lock:
             return self._late + sum(each.late for each in self._all())
 
@@ -122,7 +122,7 @@ class SurveyClient:
             self._clients[respondent] = self._ask_at(endpoints[0])
         except NepError as error:
             _logger.warning(
-                "a respondent of '%s' at '%s' cannot be asked: %s", self.spec.service, endpoints[0], error
+                "can't connect to a respondent of '%s' at '%s': %s", self.spec.service, endpoints[0], error
             )
 
     def _part(self, respondent: int) -> None:

@@ -88,7 +88,7 @@ class TcpServer:
         self._turned_away += 1
         if is_logged(self._turned_away):
             _logger.warning(
-                "a client of '%s' was turned away (%d so far): there is no room for more connections",
+                "rejected a client of '%s' (%d so far): too many connections",
                 self.spec.service,
                 self._turned_away,
             )
@@ -162,7 +162,9 @@ class TcpServer:
             if peer not in self._peers or stream.is_broken:
                 return False
             if stream.backlog + len(reply.data) > _UNREAD_MAX_BYTES and stream.backlog:
-                _logger.warning("an answer of '%s' is left out: nobody reads the others", self.spec.service)
+                _logger.warning(
+                    "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
+                )
                 return False
             stream.send(NATIVE.answer(number, reply))
             is_served = stream.backlog > 0 or stream.is_over

@@ -132,7 +132,7 @@ def _own_folder() -> Path:
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     found = folder.lstat()
     if not stat.S_ISDIR(found.st_mode) or (sys.platform != "win32" and found.st_uid != os.getuid()):
-        raise PermissionError(f"'{folder}' is somebody else's")
+        raise PermissionError(f"'{folder}' belongs to another user")
     return folder
 
 
@@ -389,7 +389,7 @@ class SharedReader:
         try:
             sample = self._port.receive()
         except Exception as error:  # noqa: BLE001 - counts as lost
-            _logger.debug("a payload in shared memory was not read: %s", error)
+            _logger.debug("can't read a payload from shared memory: %s", error)
             return None
         if sample is None:
             return None
