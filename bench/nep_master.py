@@ -4,7 +4,7 @@
 
 The master is a process of its own. A second process plays the nodes: a DEALER socket each, which joins with
 its share of publishers and with a subscriber for each of another node's topics. Each renews with counters
-that grow, when a node of the library does (`Pace`): every second, or when the master says.
+that grow, when a node of the library does (`RenewalTimer`): every second, or when the master says.
 
     at rest       processor time of the master while all nodes renew, as a share of one core
     answer        from sending `look` to having the whole reply, by a bare socket, ten times a second
@@ -44,7 +44,7 @@ with nep.master("127.0.0.1:0", learn_s=0.0) as master:
 
 NODES = """
 import os, sys, time, zmq
-from nep.backends.zeromq.master_session import Pace
+from nep.backends.zeromq.master_session import RenewalTimer
 from nep.protocol.encoding import decode_answer, encode_request
 from nep.protocol.requests import (NodeRecord, PublisherCount, PublisherRecord,
     SubscriberCount, SubscriberRecord)
@@ -62,7 +62,7 @@ for n in range(count):
     socket.connect("tcp://" + os.environ["NEP_MASTER"])
     sockets.append(socket)
     poller.register(socket, zmq.POLLIN)
-revisions, paces = [0] * count, [Pace() for _ in range(count)]
+revisions, paces = [0] * count, [RenewalTimer() for _ in range(count)]
 epoch = 0
 def read(ms):
     # Read answers; whoever is not known, or not any more, joins.
@@ -75,7 +75,7 @@ def read(ms):
             if isinstance(answer, Found | Renewed):
                 revisions[n] = answer.revision
             if isinstance(answer, Renewed):
-                paces[n].told(answer.next_s, time.monotonic())
+                paces[n].set_interval(answer.next_s, time.monotonic())
                 if answer.again:
                     join(n)
 def ids(n):
@@ -115,7 +115,7 @@ while True:
     outs = tuple(PublisherCount(1_000_000 + t, seen, seen * 100, seen, time.time_ns()) for t in mine)
     ins = tuple(SubscriberCount(2_000_000 + t, seen, 0) for t in others)
     sockets[n].send(encode_request(Renew(f"{n:016x}", epoch, revisions[n], outs, ins), 2))
-    paces[n].renews(time.monotonic())
+    paces[n].start(time.monotonic())
 """
 
 

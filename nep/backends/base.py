@@ -26,22 +26,6 @@ from nep.system.addresses import master_address
 from nep.system.descriptors import check_room
 from nep.system.plugins import discover, discover_own
 
-__all__ = [
-    "HANDSHAKE_S",
-    "Backend",
-    "GivesPayloads",
-    "PublisherSpec",
-    "PublisherTransport",
-    "PublishesQuickly",
-    "QuickPublish",
-    "Sink",
-    "SubscriberSpec",
-    "SubscriberTransport",
-    "Transport",
-    "Wakes",
-    "backend_named",
-]
-
 HANDSHAKE_S = 0.5
 """Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
 
@@ -132,14 +116,14 @@ class QuickPublish(NamedTuple):
         slowly: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
     """
 
-    owner: Closes
+    owner: Closable
     kind: type | None
     ordinary: Callable[[Any], bytes]
     look: Callable[[Any], object] | None
     slowly: Callable[..., object]
 
 
-class Closes(Protocol):
+class Closable(Protocol):
     """Object that can be closed."""
 
     is_closed: bool

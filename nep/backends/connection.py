@@ -9,8 +9,6 @@ from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 from nep.text import quotable
 
-__all__ = ["Configuration", "Direct", "Hybrid", "Mode", "checked_mode", "checked_port", "for_messages"]
-
 Mode = Literal["one2many", "many2one", "many2many"]
 
 _MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many2many": "many2many"}

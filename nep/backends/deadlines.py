@@ -7,8 +7,6 @@ import threading
 import time
 from typing import Protocol
 
-__all__ = ["Deadlines", "Expiring"]
-
 
 class Expiring(Protocol):
     """Client whose pending calls can expire."""

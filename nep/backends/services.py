@@ -18,28 +18,6 @@ from nep.i18n import _
 from nep.messages.codecs import Codec
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, failure
 
-__all__ = [
-    "CALLS_MAX",
-    "CALLS_MAX_BYTES",
-    "CallQueue",
-    "ClientCalls",
-    "ClientSpec",
-    "ClientTransport",
-    "IncomingCall",
-    "OpenCall",
-    "Outcome",
-    "ServerSpec",
-    "ServerTransport",
-    "ServiceTransport",
-    "SurveyTransport",
-    "Tally",
-    "check_calls",
-    "fitting",
-    "refusal",
-    "too_large",
-    "woken_by",
-]
-
 _logger = logging.getLogger("nep")
 CALLS_MAX = 1000
 """Maximum number of calls queued in a server or in flight in a client."""

@@ -17,8 +17,6 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
 
-__all__ = ["BACKEND"]
-
 
 class TcpTransport(ZeromqTransport):
     """Transport for direct servers and clients on the "tcp" wire; everything else raises `NepError`."""

@@ -25,8 +25,6 @@ from nep.i18n import _
 from nep.messages.codecs import CODECS, Codec, codec_numbered
 from nep.protocol.service_wire import CallKind, Reply
 
-__all__ = ["CALL_ANSWER", "CALL_REQUEST", "AskedCall", "CallBody", "TypedService"]
-
 CALL_REQUEST = "uint16 codec\nuint32 timeout_ms\nuint8[] data"
 CALL_ANSWER = "uint8 kind\nuint16 codec\nuint8[] data"
 _KINDS = (CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED)

@@ -7,8 +7,6 @@ from abc import ABC, abstractmethod
 
 from nep.backends.base import Wakes
 
-__all__ = ["WakingSubscriber"]
-
 
 class WakingSubscriber(ABC):
     """Subscriber that wakes waiting threads itself; `changed` guards its input."""

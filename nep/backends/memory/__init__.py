@@ -39,8 +39,6 @@ from nep.protocol.wire import extension_part
 from nep.system import forks
 from nep.system.cpu import CpuLoad
 
-__all__ = ["BACKEND"]
-
 _logger = logging.getLogger("nep")
 
 _BATCH_BYTES = 64 * 2**20

@@ -38,8 +38,6 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
-__all__ = ["MemoryClient", "MemoryServer", "MemoryServices", "ServiceHub"]
-
 _logger = logging.getLogger("nep")
 
 Then = Callable[[Outcome], None]

@@ -7,8 +7,6 @@ has the frames of the original NEP, `publisher` and `sub_socket` the native wire
 from nep.backends.base import Backend
 from nep.backends.nanomsg.transport import NanomsgTransport
 
-__all__ = ["BACKEND"]
-
 BACKEND = Backend(
     "nanomsg", NanomsgTransport, needs="pynng", aliases=("nn",), has_history=True, has_patterns=True
 )

@@ -14,11 +14,9 @@ from typing import Any
 
 from nep.backends.nanomsg.library import keep_for_ever, library
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import WireError
 from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
-
-__all__ = ["ANSWER_S", "NanomsgServer", "close_context", "heard", "in_one", "in_parts"]
 
 _logger = logging.getLogger("nep")
 ANSWER_S = 2.0
@@ -74,7 +72,7 @@ class NanomsgServer:
         self._socket = socket
         self._framing = framing
         self._on_close = on_close
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         self._lock = threading.Lock()
         self._answered_at = 0.0
         self._contexts: set[Any] = set()

@@ -23,8 +23,6 @@ from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutE
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL, Framing
 
-__all__ = ["NanomsgClient"]
-
 _logger = logging.getLogger("nep")
 _JSON = 1
 _JOIN_S = 2.0

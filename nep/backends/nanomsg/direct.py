@@ -12,19 +12,17 @@ from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.library import library, listen, new_socket, queue_of
 from nep.backends.nanomsg.sub_socket import QuickSub
-from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
-from nep.backends.zeromq.sockets import Refusals, wait_until
-from nep.backends.zeromq.sub_socket import Into
-from nep.backends.zeromq.subscriber import ReadOneByOne
+from nep.backends.zeromq.sockets import RejectionLog, wait_until
+from nep.backends.zeromq.sub_socket import MessageBuffer
+from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import ClosedError, NepError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 from nep.system.addresses import in_numbers
-
-__all__ = ["DirectPublisher", "DirectSubSocket", "attach", "check_direct", "dial"]
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -160,9 +158,9 @@ class DirectPublisher:
                 ).format(topic=self.spec.topic, size=len(frame), most=_LARGEST)
             )
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - no input
+    def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
         """Do nothing: nothing is received."""
-        return Rest(is_quiet=True)
+        return PollState(pause_reading=True)
 
     def close(self, timeout_s: float) -> None:
         """Flush as far as `finish` can, and close. Called once, by the publisher."""
@@ -185,12 +183,12 @@ class DirectPublisher:
         self._socket.close()
 
 
-class DirectSubSocket(ReadOneByOne):
+class DirectSubSocket(UnbatchedReader):
     """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
-        self.refusals = Refusals()
+        self.refusals = RejectionLog()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""
@@ -212,7 +210,7 @@ class DirectSubSocket(ReadOneByOne):
         """True if a message can be read."""
         return self._sub.has_input
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message of this topic, or None."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:

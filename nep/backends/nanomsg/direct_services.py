@@ -24,8 +24,6 @@ from nep.protocol.service_wire import HEADER_BYTES, NATIVE, ORIGINAL, PAYLOAD_MA
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["DirectServices"]
-
 _LARGEST = PAYLOAD_MAX_BYTES + HEADER_BYTES
 _ANSWER_MS = round(ANSWER_S * 1000)
 _FOR_EVER = -1

@@ -12,8 +12,6 @@ from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.wire import EXTENSION, HEADER_BYTES, LATCHED, hello_part, read_header
 
-__all__ = ["endpoint", "own_part", "places_of", "split_one"]
-
 _ENDPOINT = re.compile(r"nanomsg://([\w.-]{1,253}):(\d{1,5})/(\d{1,5})", re.ASCII)
 
 

@@ -19,17 +19,6 @@ from nep.system.descriptors import check_room
 from nep.system.exits import after_nodes, not_after_nodes
 from nep.system.forks import in_child
 
-__all__ = [
-    "MOST",
-    "SOCKET_FILES",
-    "bound_port",
-    "keep_for_ever",
-    "library",
-    "listen",
-    "new_socket",
-    "queue_of",
-]
-
 MOST = 8192
 """Largest queue that pynng allows, in messages. Its defaults are too small for bursts."""
 _QUEUES = {"image": 64, "bytes": 1000}

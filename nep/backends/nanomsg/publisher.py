@@ -17,9 +17,9 @@ from typing import Any
 from nep.backends.base import PublisherSpec
 from nep.backends.nanomsg.endpoints import endpoint, own_part
 from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_of
-from nep.backends.zeromq.io_thread import Rest, Served
+from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import GreetedPublisher
-from nep.backends.zeromq.sockets import LOOPBACK, Refusals, wait_until
+from nep.backends.zeromq.sockets import LOOPBACK, RejectionLog, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
@@ -35,8 +35,6 @@ from nep.protocol.wire import (
     parse_hello,
     topic_part,
 )
-
-__all__ = ["NanomsgPublisher"]
 
 _logger = logging.getLogger("nep")
 _MOST_HELLOS = 10_000
@@ -55,7 +53,7 @@ class NanomsgPublisher(GreetedPublisher):
         self,
         spec: PublisherSpec,
         on_close: Callable[[NanomsgPublisher, float], None],
-        serve_soon: Callable[[Served], None],
+        serve_soon: Callable[[Pollable], None],
     ) -> None:
         nng = library()
         self._again = nng.TryAgain
@@ -83,7 +81,7 @@ class NanomsgPublisher(GreetedPublisher):
         self._hellos: dict[str, int] = {}
         """Subscriber ids by the address of their connection, which may not be established yet."""
         self._events: deque[tuple[int, str]] = deque()
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         super().__init__(threading.Condition(threading.Lock()), {})
         self._out.add_post_pipe_connect_cb(self._came)
         self._out.add_post_pipe_remove_cb(self._went)
@@ -115,7 +113,7 @@ class NanomsgPublisher(GreetedPublisher):
             self._endpoint = endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
         return (self._endpoint,)
 
-    def leave_local(self) -> None:
+    def unbind_local(self) -> None:
         """Do nothing: there are no Unix socket names."""
 
     # ---- sending
@@ -156,7 +154,7 @@ class NanomsgPublisher(GreetedPublisher):
 
     # ---- subscribers, in the node's thread
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - nothing to schedule
+    def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
         """Process hellos, connects and disconnects."""
         with self._changed:
             while self._events:
@@ -167,7 +165,7 @@ class NanomsgPublisher(GreetedPublisher):
                 except self._again:
                     break
                 self._hello(said)
-        return Rest()
+        return PollState()
 
     def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, str(pipe.remote_address)))
@@ -195,7 +193,7 @@ class NanomsgPublisher(GreetedPublisher):
             self._forget_lone_hellos()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MOST_HELLOS:
             if self._refusals.add(f"an invalid hello of {len(said)} bytes"):
-                _logger.info("'%s' received %s", self.spec.topic, self._refusals.told())
+                _logger.info("'%s' received %s", self.spec.topic, self._refusals.recent_message())
             return
         place = address.decode("ascii", "replace")
         self._hellos[place] = hello.subscriber

@@ -14,10 +14,10 @@ import zmq
 from nep.backends.base import SubscriberSpec
 from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
 from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
-from nep.backends.zeromq.loss import HeardPublishers
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals
-from nep.backends.zeromq.sub_socket import CarefulParser, Into
-from nep.backends.zeromq.subscriber import ReadOneByOne
+from nep.backends.zeromq.loss import PublisherTracker
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog
+from nep.backends.zeromq.sub_socket import CarefulParser, MessageBuffer
+from nep.backends.zeromq.subscriber import UnbatchedReader
 from nep.errors import TooManyFilesError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -26,8 +26,6 @@ from nep.messages.message import Message
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import hello_part, topic_part
 from nep.system.descriptors import check_room
-
-__all__ = ["NanomsgSubSocket", "QuickSub"]
 
 _logger = logging.getLogger("nep")
 _HELLO_QUEUE = 8
@@ -84,12 +82,12 @@ class _Link:
         self.greeter.close()
 
 
-class NanomsgSubSocket(ReadOneByOne):
+class NanomsgSubSocket(UnbatchedReader):
     """Subscriber socket for publishers of this back end; other endpoints are reported as problems."""
 
     def __init__(self, spec: SubscriberSpec) -> None:
-        self.sources = HeardPublishers()
-        self.refusals = Refusals()
+        self.sources = PublisherTracker()
+        self.refusals = RejectionLog()
         self._sub = QuickSub(codec_for(spec.msg_type).name)
         self.fd = self._sub.fd
         self._name = spec.topic
@@ -117,7 +115,7 @@ class NanomsgSubSocket(ReadOneByOne):
     @property
     def problem(self) -> str:
         """Problem of a listed publisher; empty if none."""
-        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
+        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
     @property
@@ -132,7 +130,7 @@ class NanomsgSubSocket(ReadOneByOne):
             self.leave(old)
         source = self.sources.listed(remote)
         self._sub.make_room(remote.publisher.history)
-        source.is_lapsed = False
+        source.is_silent = False
         source.ends_at = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         link = self._links.get(remote.publisher.id)
@@ -176,7 +174,7 @@ class NanomsgSubSocket(ReadOneByOne):
         if greeter is not None:
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Do nothing: this back end works on one computer only."""
 
     def reconnect(self, publisher: int) -> None:
@@ -193,7 +191,7 @@ class NanomsgSubSocket(ReadOneByOne):
             self._greeters.pop(link.place, None)
             link.close()
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
         while (came := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = came.startswith(self._own)

@@ -22,8 +22,6 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
 
-__all__ = ["NanomsgSurveyor"]
-
 _JSON = 1
 _LONGEST_MS = 2**31 - 1
 _JOIN_S = 2.0

@@ -37,8 +37,6 @@ from nep.protocol.requests import NodeRecord
 from nep.protocol.service_wire import SURVEY
 from nep.system.addresses import is_loopback
 
-__all__ = ["NanomsgTransport"]
-
 
 class NanomsgTransport(ZeromqTransport):
     """Connection of one node. Raises `BackendUnavailableError` if pynng is not installed."""
@@ -110,7 +108,7 @@ class NanomsgTransport(ZeromqTransport):
         publisher = DirectPublisher(spec, direct, self._publisher_closer(lambda: None))
         with closed_on_error(publisher.release):
             self._attached[spec.id] = publisher.endpoint
-            self._hold(publisher)
+            self._add_publisher(publisher)
         try:
             publisher.wait_for_any(DIRECT_WAIT_S)
         except BaseException:
@@ -124,7 +122,7 @@ class NanomsgTransport(ZeromqTransport):
         subscriber: SocketSubscriber[Readable] = SocketSubscriber(readable, io, spec, self._forget_subscriber)
         with closed_on_error(readable.close):
             self._attached[spec.id] = readable.endpoint
-            self._keep(subscriber)
+            self._add_subscriber(subscriber)
         try:
             self._serve(io, subscriber)
         except BaseException:

@@ -11,8 +11,6 @@ from nep.backends.ros.address import address_of
 from nep.backends.ros.carried import codec_of
 from nep.protocol.requests import NodeRecord
 
-__all__ = ["BACKEND"]
-
 
 def _open(node: NodeRecord) -> Transport:
     from nep.backends.ros.transport import RospyTransport  # noqa: PLC0415 - XML-RPC is slow to import and only for ROS

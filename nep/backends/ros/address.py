@@ -10,8 +10,6 @@ from nep.i18n import _
 from nep.system.addresses import checked_host, host_of
 from nep.text import quotable
 
-__all__ = ["address_of", "is_own_computer"]
-
 _PORT = 11311
 
 

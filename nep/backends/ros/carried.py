@@ -31,18 +31,6 @@ from nep.messages.encoded import Encoded
 from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_layout
 from nep.text import escaped, shortened
 
-__all__ = [
-    "STAMP",
-    "another_version",
-    "codec_of",
-    "installed",
-    "is_ros_type",
-    "not_installed",
-    "ros_type_of",
-    "to_ros",
-    "unpacker",
-]
-
 STAMP = struct.Struct("<III")
 """Start of a message with a header: seq, secs, nsecs."""
 _LENGTH = struct.Struct("<I")

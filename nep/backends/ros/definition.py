@@ -18,8 +18,6 @@ from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 from nep.text import escaped, shortened
 
-__all__ = ["Definition", "DefinitionField", "FieldKind", "parse"]
-
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
 _HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
 _CONSTANT = re.compile(r"[\w/]+\s+\w+\s*=")

@@ -24,8 +24,6 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-__all__ = ["OwnNode", "publisher_id", "view_of"]
-
 _CODECS = {
     "std_msgs/String": "json",
     "std_msgs/UInt8MultiArray": "bytes",

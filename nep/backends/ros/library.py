@@ -24,8 +24,6 @@ from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["PLACES", "RosFinder", "library", "load_rospy", "message_text", "service_texts"]
-
 PLACES = ("/opt/ros/noetic/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
 _NAMES = frozenset({
     "rospy", "rosgraph", "roslib", "rospkg", "roscpp", "genpy", "genmsg", "catkin", "catkin_pkg",

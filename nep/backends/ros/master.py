@@ -14,8 +14,6 @@ from xml.parsers.expat import ExpatError
 from nep.errors import MasterUnreachable, NepError
 from nep.i18n import _
 
-__all__ = ["Registered", "RosMaster", "RosMasterUnreachable", "RosNodes", "buses_of"]
-
 _CALLER = "/nep"
 _ASK_S = 1.0
 """Timeout of one request to a master."""

@@ -29,8 +29,6 @@ from nep.system.exits import after_nodes
 from nep.system.forks import give_up, in_child
 from nep.text import escaped, shortened
 
-__all__ = ["RosProcess", "RosShutdownError", "process_with", "ros_topic", "within"]
-
 _logger = logging.getLogger("nep")
 
 _NAME = re.compile(r"\W+", re.ASCII)

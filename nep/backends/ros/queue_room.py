@@ -6,8 +6,6 @@ from typing import Any
 
 from nep.messages.queue import MAX_BYTES
 
-__all__ = ["QueueRoom"]
-
 _STEP_BYTES = 8 * 2**20
 """Published bytes after which queues are measured: measuring for each message would be slow."""
 

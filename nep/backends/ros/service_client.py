@@ -20,8 +20,6 @@ from nep.i18n import _
 from nep.protocol.requests import SubscriberCount
 from nep.protocol.service_wire import CallKind, failure
 
-__all__ = ["RosClient"]
-
 _logger = logging.getLogger("nep")
 _ASK_S = 0.5
 _AGAIN_S = 0.1

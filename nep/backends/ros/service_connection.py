@@ -15,8 +15,6 @@ from urllib.parse import urlsplit
 from nep.i18n import _
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 
-__all__ = ["Handshakes", "ServiceConnection", "ServiceConnectionError"]
-
 _LENGTH = struct.Struct("<I")
 _HEADER_MAX_BYTES = 2**20
 _HANDSHAKE_S = 5.0

@@ -16,8 +16,6 @@ from nep.i18n import _
 from nep.protocol.requests import PublisherCount
 from nep.protocol.service_wire import CallKind, Reply, failure, read_failure
 
-__all__ = ["RosServer"]
-
 
 class _Waiting:
     # Thread of rospy that waits for the reply to its call.

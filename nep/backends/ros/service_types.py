@@ -12,8 +12,6 @@ from nep.backends.typed_services import CALL_ANSWER, CALL_REQUEST, TypedService
 from nep.errors import NepError
 from nep.i18n import _
 
-__all__ = ["NEP_CALL", "ServiceType", "installed_service", "served_type"]
-
 _types: dict[str, ServiceType] = {}
 
 

@@ -16,14 +16,12 @@ from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, un
 from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.waking import WakingSubscriber
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
 from nep.messages.message import NOTHING, Message, MessageKind, arrived
 from nep.messages.queue import Inbox
 from nep.text import escaped, shortened
-
-__all__ = ["RospySubscriber"]
 
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
@@ -84,7 +82,7 @@ class RospySubscriber(WakingSubscriber):
         self.ready: deque[Message] = deque()
         self.received = 0
         self.lost: int | None = None
-        self.refusals = Refusals()
+        self.refusals = RejectionLog()
         self.is_closed = False
         self._owner = owner
         self._told = ""
@@ -108,7 +106,7 @@ class RospySubscriber(WakingSubscriber):
     @property
     def problem(self) -> str:
         """Problem of the newest message; empty if none."""
-        return self._told or self.refusals.told()
+        return self._told or self.refusals.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
 

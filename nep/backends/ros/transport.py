@@ -20,14 +20,12 @@ from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.encoded import Encoded
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
-
-__all__ = ["RospyPublisher", "RospyTransport"]
 
 _logger = logging.getLogger("nep")
 _QUEUES = {"image": 64, "bytes": 1000, "ros": 1000}
@@ -61,7 +59,7 @@ class RospyPublisher:
         self._lock = threading.RLock()
         self._is_closed = False
         self._room = QueueRoom()
-        self._drops = Refusals()
+        self._drops = RejectionLog()
         queue = _QUEUES.get(spec.codec.name, _MOST)
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue=queue
@@ -137,7 +135,7 @@ class RospyPublisher:
 
     def counts(self) -> PublisherCount:
         """Return the statistics for the graph."""
-        problem = self.problem or self._drops.told()
+        problem = self.problem or self._drops.recent_message()
         return PublisherCount(self.spec.id, self.count, self.bytes, self.count, self.last_stamp_ns, problem)
 
     def close(self, timeout_s: float) -> None:

@@ -11,8 +11,6 @@ from typing import Literal
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 
-__all__ = ["PARTICIPANTS_MAX", "configuration", "distribution", "domain", "is_loopback_only"]
-
 _DOMAINS = 233
 """Number of domains; higher ones have no valid ports."""
 _EVERYWHERE = frozenset({"SUBNET", "SYSTEM_DEFAULT"})

@@ -10,16 +10,6 @@ from typing import Any, Protocol
 from nep.i18n import _
 from nep.text import escaped
 
-__all__ = [
-    "PLACEHOLDER",
-    "RosField",
-    "RosFieldError",
-    "Types",
-    "from_message",
-    "read_definition",
-    "to_message",
-]
-
 _BASE, _NAME, _ARRAY = 1, 2, 3
 PLACEHOLDER = "structure_needs_at_least_one_member"
 """Member of an empty message in DDS."""

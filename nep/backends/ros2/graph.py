@@ -43,8 +43,6 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-__all__ = ["graph_of"]
-
 _MOST = 10_000
 """Maximum number of foreign writers and readers shown."""
 

@@ -16,8 +16,6 @@ from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["Dds", "dds", "has_forked", "keep_to_loopback", "typesys"]
-
 _PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
 _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
 _DESCRIPTORS = "/proc/self/fd"

@@ -15,8 +15,6 @@ from nep.backends.ros2.message_types import MessageTypes
 from nep.backends.ros2.topics import DdsTopics, sample_of
 from nep.errors import DecodeError
 
-__all__ = ["GID_BYTES", "PREFIX_BYTES", "Matches", "matched_gids"]
-
 GID_BYTES, PREFIX_BYTES = 16, 12
 """Length of a GUID, and of the prefix shared by all GUIDs of a participant."""
 _TOPIC = "nep_matches"

@@ -26,8 +26,6 @@ from nep.backends.ros2.names import type_name
 from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 
-__all__ = ["FOLDERS", "MessageTypes", "message_types"]
-
 FOLDERS = "NEP_ROS_MSG_PATH"
 """Environment variable with folders of .msg files."""
 _LARGEST_FILE = 2**20

@@ -13,8 +13,6 @@ from nep.backends.ros2.participant import DdsEndpoint
 from nep.i18n import _
 from nep.protocol.graph_view import Alert
 
-__all__ = ["Party", "mismatches"]
-
 _NAMES = 3
 """Maximum number of nodes named in an alert."""
 _MOST = 100

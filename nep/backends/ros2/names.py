@@ -9,22 +9,6 @@ from nep.errors import BadTopicError, NepError
 from nep.i18n import _
 from nep.text import quotable
 
-__all__ = [
-    "dds_service",
-    "dds_topic",
-    "dds_type",
-    "is_type_name",
-    "ros_service",
-    "ros_topic",
-    "ros_type",
-    "service_type_name",
-    "service_type_of",
-    "split_node_name",
-    "type_name",
-    "user_data",
-    "user_data_of",
-]
-
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)

@@ -36,8 +36,6 @@ from nep.protocol.requests import (
 from nep.system import forks
 from nep.system.descriptors import check_room
 
-__all__ = ["DdsEndpoint", "Local", "Participant", "RosNode", "join", "leave", "policy"]
-
 _logger = logging.getLogger("nep")
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _INFO_TOPIC = "ros_discovery_info"

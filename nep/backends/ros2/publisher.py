@@ -20,8 +20,6 @@ from nep.i18n import _
 from nep.messages.encoded import Encoded
 from nep.protocol.requests import PublisherCount, PublisherRecord
 
-__all__ = ["Ros2Publisher", "told_of", "wait_for_others"]
-
 _logger = logging.getLogger("nep")
 _PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
 _GREETING_S = 0.1

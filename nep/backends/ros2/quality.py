@@ -18,8 +18,6 @@ from nep.backends.ros2.library import Dds
 from nep.backends.ros2.participant import policy
 from nep.backends.ros2.type_mapping import CDR
 
-__all__ = ["QUALITIES", "depth_of", "qualities"]
-
 QUALITIES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
 _BLOCKING_NS = 100_000_000

@@ -30,8 +30,6 @@ from nep.messages.queue import Inbox
 from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
 from nep.system.log_rarely import is_logged
 
-__all__ = ["Ros2Subscriber", "id_of"]
-
 _logger = logging.getLogger("nep")
 _BATCH = 256
 _BATCH_BYTES = 64 * 2**20

@@ -13,8 +13,6 @@ from nep.backends.ros2.library import Dds
 from nep.backends.ros2.message_types import MessageTypes
 from nep.backends.ros2.names import dds_type, user_data
 
-__all__ = ["DdsTopics", "sample_of"]
-
 _BLOCKING_NS = 100_000_000
 _NAMES = {"byte": "uint8"}
 

@@ -25,8 +25,6 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
 from nep.system.cpu import CpuLoad
 
-__all__ = ["Ros2Transport"]
-
 _logger = logging.getLogger("nep")
 _BATCH_S = 0.005  # at most 200 calls of a sink per second
 

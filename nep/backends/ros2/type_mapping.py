@@ -30,8 +30,6 @@ from nep.messages.image_files import examine
 from nep.messages.message import MessageKind
 from nep.protocol.wire import extension_part
 
-__all__ = ["CDR", "TypeMapping", "codec_for", "mapping_for"]
-
 CDR = "cdr"
 """Codec of messages that are ROS messages for their readers."""
 _STRING = "std_msgs/msg/String"

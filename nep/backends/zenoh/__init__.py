@@ -9,8 +9,6 @@ from nep.backends.base import Backend
 from nep.backends.zenoh.places import place_name
 from nep.backends.zenoh.transport import ZenohTransport
 
-__all__ = ["BACKEND"]
-
 BACKEND = Backend(
     "zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name, has_history=True, has_patterns=True
 )

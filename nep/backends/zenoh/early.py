@@ -11,7 +11,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Generic, TypeVar
 
-from nep.backends.zeromq.loss import HeardPublishers
+from nep.backends.zeromq.loss import PublisherTracker
 from nep.messages.history import HISTORY_BYTES
 from nep.protocol.wire import Header
 
@@ -26,7 +26,7 @@ class EarlyMessages(Generic[T]):
     """Early messages of one subscriber, guarded by its lock. `sources` are its publishers."""
 
     def __init__(
-        self, sources: HeardPublishers, max_messages: int, clock: Callable[[], float] = time.monotonic
+        self, sources: PublisherTracker, max_messages: int, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._sources = sources
         self._max_messages = max_messages

@@ -10,8 +10,6 @@ from typing import Protocol
 from nep.backends.base import Sink
 from nep.messages.message import Message
 
-__all__ = ["Inboxes", "Poured"]
-
 _logger = logging.getLogger("nep")
 _BATCH_S = 0.005  # at most 200 calls of a sink per second
 _LOOK_S = 0.1

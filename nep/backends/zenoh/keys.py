@@ -22,26 +22,6 @@ from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.service_wire import PREFIX, SERVICE_TYPE, service_of
 from nep.protocol.service_wire import topic_of as topic_of_service
 
-__all__ = [
-    "ALL_CALLS",
-    "ALL_LIVE",
-    "Alive",
-    "call_key",
-    "client_key",
-    "data_key",
-    "data_keys",
-    "hello_key",
-    "hellos_key",
-    "hellos_keys",
-    "node_key",
-    "parse_live",
-    "publisher_key",
-    "serve_key",
-    "server_key",
-    "subscriber_key",
-    "topic_of",
-]
-
 _ROOT = "nep/v1"
 _LIVE = f"{_ROOT}/live/"
 ALL_CALLS = f"{_ROOT}/call/*"

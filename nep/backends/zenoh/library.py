@@ -14,8 +14,6 @@ from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.forks import in_child
 
-__all__ = ["callback", "close_session", "keep_for_ever", "library", "open_session"]
-
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
 _inherited: set[str] = set()

@@ -14,8 +14,6 @@ from nep.backends.zenoh.services import ZenohClient, ZenohServer
 from nep.backends.zenoh.session import ZenohSession
 from nep.errors import ClosedError
 
-__all__ = ["ZenohServices"]
-
 Sessions = Callable[[Configuration, float | None], ZenohSession]
 
 

@@ -23,8 +23,6 @@ from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 from nep.system.descriptors import check_room
 
-__all__ = ["CONFIG_VARIABLE", "Opened", "open_place", "place_name"]
-
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
 """Environment variable with the default place: a file, or any other value of `master`."""
 _LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)

@@ -17,8 +17,6 @@ from nep.messages.history import History
 from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_part
 
-__all__ = ["ZenohPublisher"]
-
 
 class ZenohPublisher:
     """Publisher of a session. Zenoh drops messages for subscribers without room, which count the losses.

@@ -27,8 +27,6 @@ from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 
-__all__ = ["Rendezvous", "SessionPort", "free_port"]
-
 _logger = logging.getLogger("nep")
 _LOCK_S = 5.0
 _LOOK_S = 0.002

@@ -10,8 +10,6 @@ from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, RemoteP
 from nep.protocol.service_wire import service_of, topic_of
 from nep.protocol.topic_pattern import is_pattern, matches
 
-__all__ = ["Roster"]
-
 _Record = TypeVar("_Record", PublisherRecord, SubscriberRecord)
 _MOST = 100_000
 """Maximum number of tokens: any program in the network can create them."""

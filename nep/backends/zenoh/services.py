@@ -33,7 +33,7 @@ from nep.backends.services import (
 from nep.backends.zenoh.keys import serve_key
 from nep.backends.zenoh.library import keep_for_ever, library
 from nep.backends.zenoh.session import ZenohSession
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.requests import (
@@ -44,8 +44,6 @@ from nep.protocol.requests import (
     as_count,
 )
 from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, Reply, topic_of
-
-__all__ = ["ZenohClient", "ZenohServer"]
 
 _logger = logging.getLogger("nep")
 _LATE_S = 30.0
@@ -69,7 +67,7 @@ class ZenohServer:
         self.is_closed = False
         self._session = session
         self._on_close = on_close
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         self._lock = threading.Lock()
         self._queries: set[Any] = set()
         self._key = serve_key(spec.service, time.time_ns(), spec.id)
@@ -190,7 +188,7 @@ class ZenohClient(ClientCalls[_Call]):
         self._session = session
         self._deadlines = deadlines
         self._on_close = on_close
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         session.check(self.record)
 
     # ---- calling

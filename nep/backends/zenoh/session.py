@@ -51,8 +51,6 @@ from nep.protocol.requests import (
 from nep.protocol.service_wire import service_of
 from nep.system.cpu import CpuLoad
 
-__all__ = ["Inquiry", "ListedClient", "ListedServer", "ZenohSession"]
-
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
 """Extra time in seconds before a query times out here; normally zenoh reports the timeout."""

@@ -13,8 +13,8 @@ from nep.backends.waking import WakingSubscriber
 from nep.backends.zenoh.early import EarlyMessages
 from nep.backends.zenoh.inboxes import Inboxes
 from nep.backends.zenoh.keys import topic_of
-from nep.backends.zeromq.loss import HeardPublishers
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.loss import PublisherTracker
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.backends.zeromq.sub_socket import CarefulParser
 from nep.errors import WireError
 from nep.i18n import _
@@ -23,8 +23,6 @@ from nep.messages.queue import Inbox
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
-
-__all__ = ["ZenohSubscriber"]
 
 _logger = logging.getLogger("nep")
 _EARS_MAX = 10_000
@@ -55,8 +53,8 @@ class ZenohSubscriber(WakingSubscriber):
         self._inboxes = inboxes
         self._on_close = on_close
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
-        self._sources = HeardPublishers()
-        self._refusals = Refusals()
+        self._sources = PublisherTracker()
+        self._refusals = RejectionLog()
         self._early = EarlyMessages[tuple[_Ear, list[bytes]]](self._sources, spec.max_messages)
         self._problem = ""
         self._ear = self._new_ear(spec.topic)
@@ -135,7 +133,7 @@ class ZenohSubscriber(WakingSubscriber):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics for the graph."""
-        problem = self._problem or self._refusals.told()
+        problem = self._problem or self._refusals.recent_message()
         return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
 
     # ---- callbacks in zenoh's threads
@@ -205,14 +203,14 @@ class ZenohSubscriber(WakingSubscriber):
         with self._inboxes.changed:
             for old in self._sources.replaced_by(remote):
                 self._sources.pop(old)
-            self._sources.listed(remote).is_lapsed = False
+            self._sources.listed(remote).is_silent = False
 
     def lapsed(self, publisher: int) -> None:
         """Mark a publisher as silent; it is kept, because it may only be unreachable."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
-                source.is_lapsed = True
+                source.is_silent = True
             for each in self._sources.ended(0.0):
                 self._sources.pop(each)
 

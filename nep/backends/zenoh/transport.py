@@ -27,8 +27,6 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import Expected, NodeRecord, RemovePublisher, SubscriberRecord
 from nep.system.forks import give_up, watch
 
-__all__ = ["ZenohTransport"]
-
 _logger = logging.getLogger("nep")
 _LEAVE_S = 0.3
 _FLUSH_MOST_S = 60.0

@@ -3,6 +3,4 @@
 from nep.backends.base import Backend
 from nep.backends.zeromq.transport import ZeromqTransport
 
-__all__ = ["BACKEND"]
-
 BACKEND = Backend("zeromq", ZeromqTransport, aliases=("zmq",), has_history=True, has_patterns=True)

@@ -26,17 +26,15 @@ from nep.protocol.requests import RemotePublisher
 from nep.system.addresses import endpoint_of, is_loopback, nearest
 from nep.system.descriptors import has_room
 
-__all__ = ["SMALL", "Bindings", "has_local_names", "in_reach", "local_of", "may_stay"]
-
 _logger = logging.getLogger("nep")
-SMALL = frozenset({"json", "string", "msgpack"})
+SMALL_CODECS = frozenset({"json", "string", "msgpack"})
 """Codecs whose messages are usually small: commands, replies, states."""
 _TCP = f"tcp://{LOOPBACK}:"
 _LOCAL = "ipc://@nep-"
-_ROOM_TO_BIND = 384
-_ROOM_TO_STAY = 192
+_FILES_TO_BIND_LOCAL = 384
+_FILES_TO_STAY_LOCAL = 192
 """Free descriptors to keep: enough for the connections that can arrive between two checks."""
-_reached: set[bool] = set()
+_probed: set[bool] = set()
 """Contains True after the first successful probe; later probes are skipped."""
 
 
@@ -45,23 +43,23 @@ def has_local_names() -> bool:
     return sys.platform == "linux" and zmq.has("ipc")
 
 
-def may_stay() -> bool:
+def has_room_for_local() -> bool:
     """Return True if this process has enough free descriptors to accept connections on a Unix socket.
 
     libzmq 4.3 aborts the process when it has none left; TCP connections wait in the kernel instead.
     """
-    return has_room(_ROOM_TO_STAY)
+    return has_room(_FILES_TO_STAY_LOCAL)
 
 
-def local_of(endpoint: str) -> str:
+def local_name(endpoint: str) -> str:
     """Return the Unix socket name for a loopback endpoint; "" for other endpoints."""
     return f"{_LOCAL}{endpoint.removeprefix(_TCP)}" if endpoint.startswith(_TCP) else ""
 
 
-def _bind_beside(owner: Socket, endpoint: str) -> str:
+def _bind_local_name(owner: Socket, endpoint: str) -> str:
     name = (
-        local_of(endpoint)
-        if has_local_names() and has_room(_ROOM_TO_BIND) and os.environ.get("NEP_LOCAL", "") != "0"
+        local_name(endpoint)
+        if has_local_names() and has_room(_FILES_TO_BIND_LOCAL) and os.environ.get("NEP_LOCAL", "") != "0"
         else ""
     )
     if name:
@@ -73,20 +71,20 @@ def _bind_beside(owner: Socket, endpoint: str) -> str:
     return name
 
 
-def _is_reached(name: str) -> bool:
+def _is_reachable(name: str) -> bool:
     # A sandbox may block Unix sockets. The first success is cached.
-    if not _reached:
+    if not _probed:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
                 probe.connect("\0" + name.removeprefix("ipc://@"))
         except OSError as error:
             _logger.debug("can't connect to '%s': %s", name, error)
             return False
-        _reached.add(True)
+        _probed.add(True)
     return True
 
 
-def in_reach(remote: RemotePublisher, master: str) -> RemotePublisher:
+def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
     """Reduce a publisher's endpoints to the one to connect to from a node that knows its master as `master`.
 
     On the master's computer this is the publisher's Unix socket, if it has one.
@@ -96,8 +94,8 @@ def in_reach(remote: RemotePublisher, master: str) -> RemotePublisher:
         return remote
     chosen = nearest(publisher.endpoints, master)
     if publisher.local and has_local_names() and is_loopback(master):
-        name = local_of(chosen)
-        chosen = name if name and _is_reached(name) else chosen
+        name = local_name(chosen)
+        chosen = name if name and _is_reachable(name) else chosen
     return replace(remote, publisher=replace(publisher, endpoints=(chosen,) if chosen else ()))
 
 
@@ -135,14 +133,14 @@ class Bindings:
         left.
         """
         for host in [known for known in self._bound if known not in hosts]:
-            self._leave(host)
+            self._unbind_host(host)
         problem: AddressInUseError | TooManyFilesError | None = None
         for host in hosts:
             if host not in self._bound:
                 try:
                     keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
                     self._bound[host] = bind_free_port(self._socket, host)
-                    name = _bind_beside(self._socket, self._bound[host]) if self._may_be_local else ""
+                    name = _bind_local_name(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:
                         self._local[host] = name
                 except (AddressInUseError, TooManyFilesError) as error:
@@ -151,13 +149,13 @@ class Bindings:
             raise problem
         return tuple(self._bound[host] for host in hosts if host in self._bound)
 
-    def leave_local(self) -> None:
+    def unbind_local(self) -> None:
         """Unbind the Unix socket names; existing connections stay open."""
         for name in self._local.values():
             self._unbind(name)
         self._local.clear()
 
-    def _leave(self, host: str) -> None:
+    def _unbind_host(self, host: str) -> None:
         for endpoint in filter(None, (self._bound.pop(host), self._local.pop(host, ""))):
             self._unbind(endpoint)
 

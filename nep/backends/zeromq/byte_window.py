@@ -9,21 +9,19 @@ from __future__ import annotations
 from collections import deque
 from typing import Protocol
 
-__all__ = ["BACKLOG_STEP_BYTES", "STEP_BYTES", "WINDOW_BYTES", "WINDOW_LEAST_BYTES", "Backlog", "SendWindow"]
-
 WINDOW_BYTES = 192 * 2**20
 """Maximum number of unacknowledged bytes per subscriber. With the batch in its sink this makes 256 MB."""
-WINDOW_LEAST_BYTES = 24 * 2**20
+MIN_WINDOW_BYTES = 24 * 2**20
 """Smallest window that a subscriber may request: two steps, so that messages don't wait for each
 acknowledgement.
 """
-STEP_BYTES = 12 * 2**20
+ACK_STEP_BYTES = 12 * 2**20
 """Bytes after which a subscriber is asked for an acknowledgement."""
 BACKLOG_STEP_BYTES = 2**20
 """Bytes after which a message is tracked for subscribers without acknowledgements."""
 _ENTRY_BYTES = 2**20
 """Small messages share an entry up to this size; it is acknowledged with its newest message."""
-_ASK_AGAIN_S = 0.5
+_ACK_RETRY_S = 0.5
 """Interval to repeat a request while a subscriber has no room: libzmq drops requests when its queue is full.
 """
 
@@ -32,20 +30,20 @@ class SendWindow:
     """Unacknowledged messages of one subscriber. Guarded by the publisher's lock."""
 
     def __init__(self) -> None:
-        self.under_way = 0
+        self.unacked_bytes = 0
         """Unacknowledged bytes."""
         self._bound = WINDOW_BYTES
         self._sent: deque[tuple[int, int]] = deque()
-        self._unasked = 0
-        self._asked_at = float("-inf")
-        self._has_missed = False
+        self._bytes_since_request = 0
+        self._requested_at = float("-inf")
+        self._has_drops = False
 
     def has_room(self, size_bytes: int) -> bool:
         """Return True if a message of this size can be sent.
 
         One larger than the window waits for an almost empty one.
         """
-        return self.under_way <= STEP_BYTES or self.under_way + size_bytes <= self._bound
+        return self.unacked_bytes <= ACK_STEP_BYTES or self.unacked_bytes + size_bytes <= self._bound
 
     def sent(self, seq: int, size_bytes: int) -> None:
         """Count `size_bytes` that were sent up to and including message `seq`."""
@@ -53,32 +51,34 @@ class SendWindow:
             self._sent.append((seq, self._sent.pop()[1] + size_bytes))
         else:
             self._sent.append((seq, size_bytes))
-        self.under_way += size_bytes
-        self._unasked += size_bytes
+        self.unacked_bytes += size_bytes
+        self._bytes_since_request += size_bytes
 
-    def missed(self) -> None:
+    def note_drop(self) -> None:
         """Note that a message was dropped for lack of room."""
-        self._has_missed = True
+        self._has_drops = True
 
-    def is_to_tell(self) -> bool:
+    def should_notify(self) -> bool:
         """Return True, once, if the subscriber has room again after a drop and should be notified."""
-        if not self._has_missed or self.under_way > STEP_BYTES:
+        if not self._has_drops or self.unacked_bytes > ACK_STEP_BYTES:
             return False
-        self._has_missed = False
+        self._has_drops = False
         return True
 
-    def read(self, seq: int, bound_bytes: int) -> None:
+    def acknowledge(self, seq: int, bound_bytes: int) -> None:
         """Process an acknowledgement of everything up to `seq`, and adopt `bound_bytes` as the window."""
-        self._bound = max(WINDOW_LEAST_BYTES, min(bound_bytes, WINDOW_BYTES))
+        self._bound = max(MIN_WINDOW_BYTES, min(bound_bytes, WINDOW_BYTES))
         while self._sent and self._sent[0][0] <= seq:
-            self.under_way -= self._sent.popleft()[1]
+            self.unacked_bytes -= self._sent.popleft()[1]
 
-    def is_to_ask(self, now: float, *, has_room: bool) -> bool:
+    def should_request_ack(self, now: float, *, has_room: bool) -> bool:
         """Return True, and reset the interval, if the subscriber should be asked for an acknowledgement."""
-        if self._unasked < STEP_BYTES and (has_room or now < self._asked_at + _ASK_AGAIN_S):
+        if self._bytes_since_request < ACK_STEP_BYTES and (
+            has_room or now < self._requested_at + _ACK_RETRY_S
+        ):
             return False
-        self._unasked = 0
-        self._asked_at = now
+        self._bytes_since_request = 0
+        self._requested_at = now
         return True
 
 

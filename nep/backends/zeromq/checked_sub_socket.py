@@ -18,8 +18,6 @@ from nep.backends.zeromq.sub_socket import SubSocket
 from nep.i18n import _
 from nep.protocol.wire import HEADER_BYTES, unpack_at, unpack_quickly
 
-__all__ = ["CHECKED_TYPES", "CheckedSubSocket"]
-
 CHECKED_TYPES = frozenset({"robot/answer"})
 """Message types that are accepted only from their own publisher: the confirmation of a robot's stop."""
 
@@ -34,37 +32,37 @@ class CheckedSubSocket(SubSocket):
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         super().__init__(socket, spec)
         self._recv = self._receive_checked
-        self._following: list[zmq.Frame] = []
+        self._pending_parts: list[zmq.Frame] = []
         """Remaining parts of the current message, received together with the first one."""
 
     def _receive_checked(self, flags: int = 0, copy: bool = True) -> bytes | zmq.Frame:
-        while not self._following:
+        while not self._pending_parts:
             parts: list[zmq.Frame] = [self._socket.recv(flags, copy=False)]
             while parts[-1].more:
                 parts.append(self._socket.recv(_DONTWAIT, copy=False))
-            if self._is_honest(parts):
-                self._following = parts
+            if self._is_authentic(parts):
+                self._pending_parts = parts
             else:
                 self.refusals.add(_("a message does not come from the publisher that it names"))
-        frame = self._following.pop(0)
+        frame = self._pending_parts.pop(0)
         return frame.bytes if copy else frame
 
     def _has_more(self) -> bool:
-        return bool(self._following)
+        return bool(self._pending_parts)
 
-    def _is_honest(self, parts: list[zmq.Frame]) -> bool:
+    def _is_authentic(self, parts: list[zmq.Frame]) -> bool:
         first = parts[0].bytes
         if len(first) >= self._body and first.startswith(self._topic):
-            publisher = unpack_at(first, self._cut)[-1]
+            publisher = unpack_at(first, self._topic_length)[-1]
         elif len(parts) > 1 and len(parts[1]) == HEADER_BYTES:
             publisher = unpack_quickly(parts[1].bytes)[-1]
         else:
             return False
         source = self.sources.by_id.get(publisher)
-        return source is not None and bool(source.endpoint) and _leads_to(parts[0], source.endpoint)
+        return source is not None and bool(source.endpoint) and _is_connection_to(parts[0], source.endpoint)
 
 
-def _leads_to(frame: zmq.Frame, endpoint: str) -> bool:
+def _is_connection_to(frame: zmq.Frame, endpoint: str) -> bool:
     try:
         connection = sockets.socket(fileno=frame.get(_SRCFD))
     except (OSError, ValueError, zmq.ZMQError):  # closed since: the peer is unknown

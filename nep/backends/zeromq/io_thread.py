@@ -38,8 +38,6 @@ from nep.system.descriptors import SPARE, check_room, has_room, is_lack, limit, 
 from nep.system.forks import watch
 from nep.system.wakeup import Waker
 
-__all__ = ["IoThread", "Rest", "Served", "SharedContext", "shared_context"]
-
 _logger = logging.getLogger("nep.io")
 _RETRY_S = 1.0
 
@@ -49,15 +47,15 @@ _CONTEXT_FILES = 12
 _SOCKET_FILES = 4
 """Descriptors per socket: the socket, its port, its Unix socket name and a connection."""
 _IDLE_WAKERS = 8
-_LOOKS, _LOOK_S = 10, 0.01
-_Ready = tuple[selectors.SelectorKey, int]
-_ROUNDED_S = 0.001
-_ROUNDING = getattr(selectors, "EpollSelector", ())
-_SELECT_MOST = 1024
+_ROOM_CHECKS, _ROOM_CHECK_S = 10, 0.01
+_ReadyKey = tuple[selectors.SelectorKey, int]
+_EPOLL_TICK_S = 0.001
+_EPOLL = getattr(selectors, "EpollSelector", ())
+_SELECT_MAX_FD = 1024
 """`select` supports descriptors below this number."""
 
 
-class Rest(NamedTuple):
+class PollState(NamedTuple):
     """Next wake-up condition of a socket's owner.
 
     Attributes:
@@ -66,19 +64,19 @@ class Rest(NamedTuple):
         sends: True to serve it also when its descriptor is writable. Not for ZeroMQ sockets.
     """
 
-    is_quiet: bool = False
+    pause_reading: bool = False
     due: float | None = None
     sends: bool = False
 
 
-class Served(Protocol):
+class Pollable(Protocol):
     """Owner of a socket that an `IoThread` serves."""
 
     @property
     def fd(self) -> int:
         """File descriptor of the socket."""
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         """Process input until the socket is empty. Takes the owner's lock; doesn't block."""
 
 
@@ -95,14 +93,14 @@ class IoThread:
         self._new_selector = new_selector
         self._selector = new_selector()
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
-        self._orders: deque[tuple[str, Served, threading.Event | None]] = deque()
-        self._served: set[Served] = set()
-        self._polled: dict[Served, tuple[int, int]] = {}
+        self._commands: deque[tuple[str, Pollable, threading.Event | None]] = deque()
+        self._served: set[Pollable] = set()
+        self._polled: dict[Pollable, tuple[int, int]] = {}
         """Registered descriptor and event mask of each owner."""
-        self._doubtful: set[Served] = set()
+        self._suspects: set[Pollable] = set()
         """Owners that may have broken the poller: each is polled alone before it is registered again."""
-        self._due: dict[Served, float] = {}
-        self._heap: list[tuple[float, int, Served]] = []
+        self._wake_times: dict[Pollable, float] = {}
+        self._timers: list[tuple[float, int, Pollable]] = []
         self._numbers = itertools.count()
         self._turns = 0
         self._stuck_in: int | None = None
@@ -117,25 +115,25 @@ class IoThread:
         """Start the thread."""
         self._thread.start()
 
-    def add(self, served: Served) -> None:
+    def add(self, served: Pollable) -> None:
         """Start serving `served`; its first call follows at once."""
-        self._order("add", served, None)
+        self._queue_command("add", served, None)
 
-    def serve_soon(self, served: Served) -> None:
+    def serve_soon(self, served: Pollable) -> None:
         """Serve `served` again, whether its descriptor is ready or not."""
-        self._order("soon", served, None)
+        self._queue_command("soon", served, None)
 
-    def remove(self, served: Served, timeout_s: float = 2.0) -> None:
+    def remove(self, served: Pollable, timeout_s: float = 2.0) -> None:
         """Stop serving `served`; afterwards its socket may be closed.
 
         While the thread is blocked (by a sink that doesn't return), only the first call waits for
         `timeout_s`.
         """
         if threading.current_thread() is self._thread or not self._thread.is_alive():
-            self._forget(served)
+            self._unregister(served)
             return
         done = threading.Event()
-        self._order("remove", served, done)
+        self._queue_command("remove", served, done)
         if self._stuck_in != self._turns and not done.wait(timeout_s):
             self._stuck_in = self._turns
 
@@ -154,11 +152,11 @@ class IoThread:
         self._is_closing = True
         self._pause = threading.Event()
         self._served.clear()
-        self._orders.clear()
+        self._commands.clear()
         self._selector.close()
 
-    def _order(self, what: str, served: Served, done: threading.Event | None) -> None:
-        self._orders.append((what, served, done))
+    def _queue_command(self, command: str, served: Pollable, done: threading.Event | None) -> None:
+        self._commands.append((command, served, done))
         self._waker.wake()
 
     # ---- in the I/O thread
@@ -171,9 +169,9 @@ class IoThread:
             except Exception:
                 if not self._is_closing:
                     _logger.exception("polling failed; rebuilding the poller")
-                    self._begin_anew()
+                    self._rebuild_poller()
         self._release()
-        for _what, _served, done in self._orders:
+        for _what, _served, done in self._commands:
             if done is not None:
                 done.set()
 
@@ -183,13 +181,13 @@ class IoThread:
         # Each system call releases the GIL and then waits for it, so avoid needless ones.
         if any(key.data is None for key, _events in ready):
             self._waker.clear()
-        self._obey()
+        self._run_commands()
         for key, _events in ready:
             if isinstance(key.data, tuple) and key.data[0] in self._served:
                 self._serve(key.data[0])
         self._serve_due()
 
-    def _begin_anew(self) -> None:
+    def _rebuild_poller(self) -> None:
         while not self._is_closing:
             with suppress(Exception):  # the selector itself may be broken
                 self._selector.close()
@@ -201,31 +199,31 @@ class IoThread:
                 _logger.exception("can't poll the sockets of this program; retrying")
                 self._pause.wait(_RETRY_S)
                 continue
-            self._doubtful = set(self._served)
+            self._suspects = set(self._served)
             for served in tuple(self._served):
                 self._serve(served)
             return
 
-    def _obey(self) -> None:
-        while self._orders:
-            what, served, done = self._orders.popleft()
-            if what == "remove":
-                self._forget(served)
+    def _run_commands(self) -> None:
+        while self._commands:
+            command, served, done = self._commands.popleft()
+            if command == "remove":
+                self._unregister(served)
             else:
-                if what == "add":
+                if command == "add":
                     self._served.add(served)
                 if served in self._served:
                     self._serve(served)
             if done is not None:
                 done.set()
 
-    def _serve(self, served: Served) -> None:
+    def _serve(self, served: Pollable) -> None:
         now = time.monotonic()
         try:
             rest = served.serve(now)
         except Exception:  # one broken socket must not block the others
             _logger.exception("error while serving a socket; retrying")
-            rest = Rest(is_quiet=True, due=now + _RETRY_S)
+            rest = PollState(pause_reading=True, due=now + _RETRY_S)
         if served not in self._served or self._is_closing:
             return  # removed while it was served
         try:
@@ -233,44 +231,44 @@ class IoThread:
         except (OSError, ValueError, KeyError) as error:
             _logger.error("can't poll a socket, serving it every second instead: %s", error)  # noqa: TRY400
             self._polled.pop(served, None)
-            self._doubtful.add(served)
-            rest = Rest(is_quiet=True, due=now + _RETRY_S)
+            self._suspects.add(served)
+            rest = PollState(pause_reading=True, due=now + _RETRY_S)
         if rest.due is None:
-            self._due.pop(served, None)
-        elif self._due.get(served) != rest.due:
-            self._due[served] = rest.due
-            heapq.heappush(self._heap, (rest.due, next(self._numbers), served))
+            self._wake_times.pop(served, None)
+        elif self._wake_times.get(served) != rest.due:
+            self._wake_times[served] = rest.due
+            heapq.heappush(self._timers, (rest.due, next(self._numbers), served))
 
     def _serve_due(self) -> None:
         now = time.monotonic()
-        late: list[Served] = []
-        while self._heap and self._heap[0][0] <= now:
-            due, _number, served = heapq.heappop(self._heap)
-            if self._due.get(served) == due:  # otherwise it was rescheduled
-                del self._due[served]
+        late: list[Pollable] = []
+        while self._timers and self._timers[0][0] <= now:
+            due, _number, served = heapq.heappop(self._timers)
+            if self._wake_times.get(served) == due:  # otherwise it was rescheduled
+                del self._wake_times[served]
                 late.append(served)
         for served in late:
             if served in self._served:
                 self._serve(served)
 
     def _timeout(self) -> float | None:
-        while self._heap and self._due.get(self._heap[0][2]) != self._heap[0][0]:
-            heapq.heappop(self._heap)
-        return max(0.0, self._heap[0][0] - time.monotonic()) if self._heap else None
+        while self._timers and self._wake_times.get(self._timers[0][2]) != self._timers[0][0]:
+            heapq.heappop(self._timers)
+        return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
 
-    def _try_alone(self, served: Served, wanted: int) -> None:
+    def _probe(self, served: Pollable, wanted: int) -> None:
         # Windows' select reports a broken descriptor only while polling, and then for the whole set.
         with self._new_selector() as trial:
             trial.register(served.fd, wanted)
             trial.select(0)
-        self._doubtful.discard(served)
+        self._suspects.discard(served)
 
-    def _poll(self, served: Served, wanted: int) -> None:
+    def _poll(self, served: Pollable, wanted: int) -> None:
         polled = self._polled.get(served)
         if polled is None:
             if wanted:
-                if served in self._doubtful:
-                    self._try_alone(served, wanted)
+                if served in self._suspects:
+                    self._probe(served, wanted)
                 self._selector.register(served.fd, wanted, (served,))
                 self._polled[served] = (served.fd, wanted)
         elif not wanted:
@@ -280,10 +278,10 @@ class IoThread:
             self._selector.modify(polled[0], wanted, (served,))
             self._polled[served] = (polled[0], wanted)
 
-    def _forget(self, served: Served) -> None:
+    def _unregister(self, served: Pollable) -> None:
         self._served.discard(served)
-        self._doubtful.discard(served)
-        self._due.pop(served, None)
+        self._suspects.discard(served)
+        self._wake_times.pop(served, None)
         if served in self._polled:
             with suppress(OSError, ValueError, KeyError):  # the poller is closed or was rebuilt
                 self._poll(served, 0)
@@ -293,17 +291,17 @@ class IoThread:
         self._waker.close()
 
 
-def _events(rest: Rest) -> int:
-    return (0 if rest.is_quiet else selectors.EVENT_READ) | (selectors.EVENT_WRITE if rest.sends else 0)
+def _events(rest: PollState) -> int:
+    return (0 if rest.pause_reading else selectors.EVENT_READ) | (selectors.EVENT_WRITE if rest.sends else 0)
 
 
-def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_Ready]:
+def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_ReadyKey]:
     # epoll rounds timeouts up to a whole millisecond.
     if (
         timeout_s
-        and timeout_s < _ROUNDED_S
-        and isinstance(selector, _ROUNDING)
-        and selector.fileno() < _SELECT_MOST
+        and timeout_s < _EPOLL_TICK_S
+        and isinstance(selector, _EPOLL)
+        and selector.fileno() < _SELECT_MAX_FD
     ):
         if not select.select((selector.fileno(),), (), (), timeout_s)[0]:
             return ()
@@ -323,7 +321,7 @@ class SharedContext:
         self._lock = threading.Lock()
         self._idle_wakers: list[Waker] = []
         self._pause = threading.Event()
-        self._is_over = False
+        self._is_terminated = False
         self.users = 0
         """Number of users. Guarded by the module's lock."""
         try:
@@ -336,22 +334,22 @@ class SharedContext:
         """Create a socket with a linger of 0. Raises `TooManyFilesError`, which names `what`."""
         self._wait_for_room(what)
         try:
-            made = self._context.socket(kind)
+            created = self._context.socket(kind)
         except zmq.ZMQError as error:
             if is_lack(error.errno):
                 raise TooManyFilesError(what, opened(), limit()) from error
             if self._context.closed:
                 raise ClosedError("the node") from error
             raise
-        made.setsockopt(zmq.LINGER, 0)
-        return made
+        created.setsockopt(zmq.LINGER, 0)
+        return created
 
     def _wait_for_room(self, what: str) -> None:
         # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
-        for _ in range(_LOOKS):
+        for _ in range(_ROOM_CHECKS):
             if has_room(_SOCKET_FILES + SPARE):
                 return
-            self._pause.wait(_LOOK_S)
+            self._pause.wait(_ROOM_CHECK_S)
         check_room(_SOCKET_FILES, what)
 
     def take_waker(self) -> Waker:
@@ -363,7 +361,7 @@ class SharedContext:
         """Return a waker to the pool."""
         waker.clear()
         with self._lock:
-            if not self._is_over and len(self._idle_wakers) < _IDLE_WAKERS:
+            if not self._is_terminated and len(self._idle_wakers) < _IDLE_WAKERS:
                 self._idle_wakers.append(waker)
                 return
         waker.close()
@@ -386,7 +384,7 @@ class SharedContext:
         self.io.close()
         self._context.term()
         with self._lock:
-            self._is_over = True
+            self._is_terminated = True
             for waker in self._idle_wakers:
                 waker.close()
             self._idle_wakers.clear()
@@ -414,9 +412,9 @@ def shared_context() -> SharedContext:
         return _shared
 
 
-def _forget(ended: SharedContext) -> None:
+def _forget(terminated: SharedContext) -> None:
     global _shared  # noqa: PLW0603 - one per process
-    if _shared is ended:
+    if _shared is terminated:
         _shared = None
 
 

@@ -19,53 +19,43 @@ import zmq
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
 from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, Backlog
-from nep.backends.zeromq.io_thread import Rest
+from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import (
-    Refusals,
+    RejectionLog,
     Socket,
     bind,
     connect,
-    receive_mark,
-    wait_shortly,
+    receive_high_water_mark,
+    set_receive_timeout,
     wait_until,
 )
-from nep.backends.zeromq.sub_socket import Into
-from nep.backends.zeromq.subscriber import ReadOneByOne, SocketSubscriber
+from nep.backends.zeromq.sub_socket import MessageBuffer
+from nep.backends.zeromq.subscriber import SocketSubscriber, UnbatchedReader
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
 
-__all__ = [
-    "OriginalPublisher",
-    "OriginalSubSocket",
-    "OriginalSubscriber",
-    "attach",
-    "from_frame",
-    "has_prefix",
-    "to_frame",
-]
+_PREFIXED_TYPES = frozenset({"dictionary", "image"})
+_UNPREFIXED_TYPES = frozenset({"bytes", "msgpack", "images"})
+_JSON_FIRST_BYTES = frozenset(b'{["-0123456789tfnNI')
 
-_ALWAYS = frozenset({"dictionary", "image"})
-_NEVER = frozenset({"bytes", "msgpack", "images"})
-_JSON_BEGINS = frozenset(b'{["-0123456789tfnNI')
-
-_MARKS = {"image": 64, "bytes": 1000}
-_MARK = 10_000
+_HIGH_WATER_MARKS = {"image": 64, "bytes": 1000}
+_DEFAULT_HIGH_WATER_MARK = 10_000
 """High-water mark in messages per connection.
 
 For small messages this stays below the byte limit of all connections together, so that one subscriber that
 doesn't read can't use up the others' room.
 """
 _logger = logging.getLogger("nep")
-_TOLD_MS = 100
+_CLOSE_EVENT_MS = 100
 """Time that libzmq may need after the linger period to report a socket as closed."""
 
 
 def has_prefix(generation: str, msg_type: str) -> bool:
     """Return True if programs of this generation send the topic as a prefix."""
-    return msg_type in _ALWAYS or (generation == "A" and msg_type not in _NEVER)
+    return msg_type in _PREFIXED_TYPES or (generation == "A" and msg_type not in _UNPREFIXED_TYPES)
 
 
 def to_frame(topic: str, generation: str, msg_type: str, codec: str, data: bytes | memoryview) -> bytes:
@@ -80,11 +70,11 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
     Raises `WireError` for an image that is not valid base64.
     """
     prefix = topic.encode() + b" "
-    if msg_type in _NEVER and codec != "image":
+    if msg_type in _UNPREFIXED_TYPES and codec != "image":
         return frame
     if frame.startswith(prefix):
         frame = frame[len(prefix) :]
-    elif (codec == "json" and frame[:1] and frame[0] not in _JSON_BEGINS) or (
+    elif (codec == "json" and frame[:1] and frame[0] not in _JSON_FIRST_BYTES) or (
         codec == "image" and b" " in frame[:300]
     ):
         return None
@@ -129,18 +119,18 @@ class OriginalPublisher:
         self._is_closed = False
         self._backlog = Backlog()
         self._untracked_bytes = 0
-        socket.setsockopt(zmq.SNDHWM, _MARKS.get(spec.codec.name, _MARK))
+        socket.setsockopt(zmq.SNDHWM, _HIGH_WATER_MARKS.get(spec.codec.name, _DEFAULT_HIGH_WATER_MARK))
         self._deadline = 0.0
         self._changed = threading.Condition(threading.Lock())
         # report every unsubscribe, so that filters can be counted: one per subscriber
         socket.setsockopt(zmq.XPUB_VERBOSER, 1)
         self.fd = int(socket.getsockopt(zmq.FD))
         # libzmq reports here when everything is sent and the socket is closed
-        place = f"inproc://ended-{spec.id:x}"
-        socket.monitor(place, zmq.EVENT_MONITOR_STOPPED)
-        self._end: Socket = socket.context.socket(zmq.PAIR)
-        self._end.setsockopt(zmq.LINGER, 0)
-        self._end.connect(place)
+        monitor_endpoint = f"inproc://ended-{spec.id:x}"
+        socket.monitor(monitor_endpoint, zmq.EVENT_MONITOR_STOPPED)
+        self._close_monitor: Socket = socket.context.socket(zmq.PAIR)
+        self._close_monitor.setsockopt(zmq.LINGER, 0)
+        self._close_monitor.connect(monitor_endpoint)
 
     @property
     def is_heard(self) -> bool:
@@ -192,11 +182,11 @@ class OriginalPublisher:
         self._backlog.sent(tracked.tracker, self._untracked_bytes)
         self._untracked_bytes = 0
 
-    def serve(self, now: float) -> Rest:  # noqa: ARG002 - nothing to schedule
+    def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
         """Process subscriptions."""
         with self._changed:
             self._read_filters()
-        return Rest()
+        return PollState()
 
     def close(self, timeout_s: float) -> None:
         """Unregister, flush and close the socket. Called once, by the publisher."""
@@ -222,17 +212,17 @@ class OriginalPublisher:
         with self._changed:
             self._is_closed = True
             self._deadline = deadline
-            self._socket.close(self._left_ms())
+            self._socket.close(self._remaining_ms())
 
     def release(self) -> None:
         """Close the socket and wait until libzmq has sent everything; log a warning at the deadline."""
         if not self._socket.closed:
             self.flush(self._deadline)
         with self._changed:
-            if self._end.closed:
+            if self._close_monitor.closed:
                 return
-            self._end.poll(self._left_ms() + _TOLD_MS)
-            if self.count and self._filters and not self._left_ms():
+            self._close_monitor.poll(self._remaining_ms() + _CLOSE_EVENT_MS)
+            if self.count and self._filters and not self._remaining_ms():
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
@@ -240,9 +230,9 @@ class OriginalPublisher:
                     self._filters,
                     self.count,
                 )
-            self._end.close(0)
+            self._close_monitor.close(0)
 
-    def _left_ms(self) -> int:
+    def _remaining_ms(self) -> int:
         return max(0, int((self._deadline - time.monotonic()) * 1000))
 
     def _read_filters(self) -> None:
@@ -252,20 +242,20 @@ class OriginalPublisher:
             self._changed.notify_all()
 
 
-class OriginalSubSocket(ReadOneByOne):
+class OriginalSubSocket(UnbatchedReader):
     """SUB socket for frames of both generations. They have no sequence numbers, so `lost` is unknown."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
-        self.refusals = Refusals()
+        self.refusals = RejectionLog()
         self.received = 0
         self.lost: int | None = None
         self.problem = ""
         self._socket = socket
         self._spec = spec
         self._codec = codec_for(spec.msg_type)
-        wait_shortly(socket)
-        socket.setsockopt(zmq.RCVHWM, receive_mark(self._codec.name))
+        set_receive_timeout(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(self._codec.name))
         socket.setsockopt(zmq.SUBSCRIBE, b"")
 
     @property
@@ -273,7 +263,7 @@ class OriginalSubSocket(ReadOneByOne):
         """True if a message can be read."""
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message of this topic, or None."""
         while True:
             try:

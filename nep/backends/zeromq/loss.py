@@ -14,11 +14,9 @@ from nep.protocol.requests import RemotePublisher
 from nep.system.addresses import is_loopback
 from nep.system.computer import computer_id
 
-__all__ = ["UNLISTED_MAX", "HeardPublisher", "HeardPublishers"]
-
-FAREWELL_S = 3.0
+BYE_TIMEOUT_S = 3.0
 """Time in seconds after a publisher has unregistered in which its last messages may still arrive."""
-EARLY_S = 5.0
+EARLY_MESSAGES_S = 5.0
 GAP_MAX = 2**32
 """Largest accepted gap in sequence numbers: an hour at a million messages per second."""
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
@@ -28,7 +26,7 @@ _UNKNOWN = kind_of("", "", "")
 
 
 @dataclass
-class HeardPublisher:
+class TrackedPublisher:
     """State of one publisher.
 
     `last` is the sequence number of its newest message received or counted as lost; None while unknown, 0 if
@@ -49,7 +47,7 @@ class HeardPublisher:
     """Endpoint that couldn't be connected; `problem` has the reason."""
     problem: str = ""
     early_until: float | None = None
-    """Time until which messages before the echo are skipped, see `HeardPublishers.is_early`."""
+    """Time until which messages before the echo are skipped, see `PublisherTracker.is_early`."""
     last: int | None = None
     is_heard: bool = False
     """True once a message, echo or bye was received."""
@@ -58,7 +56,7 @@ class HeardPublisher:
     reconnect_s: float = MIN_RECONNECT_S
     reconnect_at: float = math.inf
     has_echoed: bool = False
-    is_lapsed: bool = False
+    is_silent: bool = False
     ends_at: float | None = None
     promised: int = 0
     """Newest sequence number reported by the master or by the publisher's unregistration."""
@@ -67,7 +65,7 @@ class HeardPublisher:
     """First of the promised messages counted as lost that may still arrive. They can only do so while
     `late_to` equals `last`: a later message would have been sent after them.
     """
-    leapt_to: int = 0
+    jump_seq: int = 0
     """Sequence number of a message that was rejected because the gap before it is too large; otherwise 0."""
 
     def connecting(self, endpoint: str) -> None:
@@ -80,23 +78,23 @@ class HeardPublisher:
         self.endpoint = ""
 
 
-class HeardPublishers:
+class PublisherTracker:
     """Counts `received` and `lost` by gaps in the sequence numbers."""
 
     def __init__(self) -> None:
         self.received = 0
         self.lost = 0
-        self.by_id: dict[int, HeardPublisher] = {}
+        self.by_id: dict[int, TrackedPublisher] = {}
         """All publishers by id. Read-only for others."""
         self._clocks: Mapping[str, ClockDifference] = {}
         self._unlisted: dict[int, None] = {}
         """Ids of publishers that the master doesn't list, oldest first."""
 
-    def get(self, publisher: int) -> HeardPublisher:
+    def get(self, publisher: int) -> TrackedPublisher:
         """Return a publisher's state; create it if needed, which may evict the oldest unlisted one."""
         source = self.by_id.get(publisher)
         if source is None:
-            source = self.by_id[publisher] = HeardPublisher()
+            source = self.by_id[publisher] = TrackedPublisher()
             self._unlisted[publisher] = None
             if len(self._unlisted) > UNLISTED_MAX:
                 self.pop(next(iter(self._unlisted)))
@@ -108,7 +106,7 @@ class HeardPublishers:
         if source.last is None:
             source.last = 0
 
-    def listed(self, remote: RemotePublisher) -> HeardPublisher:
+    def listed(self, remote: RemotePublisher) -> TrackedPublisher:
         """Return the state of a publisher that the master lists; create it if needed."""
         source = self.get(remote.publisher.id)
         source.remote = remote
@@ -126,16 +124,16 @@ class HeardPublishers:
     def _difference(self, remote: RemotePublisher) -> ClockDifference | None:
         return SAME_CLOCK if _is_here(remote) else self._clocks.get(remote.node_id)
 
-    def find(self, publisher: int) -> HeardPublisher | None:
+    def find(self, publisher: int) -> TrackedPublisher | None:
         """Return a publisher's state, or None."""
         return self.by_id.get(publisher)
 
-    def pop(self, publisher: int) -> HeardPublisher | None:
+    def pop(self, publisher: int) -> TrackedPublisher | None:
         """Remove and return a publisher's state."""
         self._unlisted.pop(publisher, None)
         return self.by_id.pop(publisher, None)
 
-    def items(self) -> list[tuple[int, HeardPublisher]]:
+    def items(self) -> list[tuple[int, TrackedPublisher]]:
         """Return all publishers and their states."""
         return list(self.by_id.items())
 
@@ -155,10 +153,10 @@ class HeardPublishers:
         source.is_heard = source.is_connected = True
         last = source.last
         if last is not None and seq - last > GAP_MAX:
-            if not source.leapt_to or source.leapt_to != seq - 1:
-                source.leapt_to = seq
+            if not source.jump_seq or source.jump_seq != seq - 1:
+                source.jump_seq = seq
                 raise WireError(f"its sequence number jumps from {last} to {seq}", code="seq-leap")
-            source.leapt_to, source.promised, source.last = 0, 0, seq
+            source.jump_seq, source.promised, source.last = 0, 0, seq
             self.received += 1
             return True
         if last is None or seq > last:
@@ -178,7 +176,7 @@ class HeardPublishers:
 
         A publisher with a history may read this subscriber's filter before its hello. Messages sent in
         between are newer than those of the history, which follows with all of them. Publishers that send no
-        echo are accepted after `EARLY_S`.
+        echo are accepted after `EARLY_MESSAGES_S`.
         """
         source = self.by_id.get(publisher)
         if source is None or source.has_echoed or source.is_heard or source.remote is None:
@@ -187,7 +185,7 @@ class HeardPublishers:
             return False
         now = time.monotonic()
         if source.early_until is None:
-            source.early_until = now + EARLY_S
+            source.early_until = now + EARLY_MESSAGES_S
         return now < source.early_until
 
     def reached(self, publisher: int, seq: int) -> bool:
@@ -231,14 +229,14 @@ class HeardPublishers:
         """Note that a publisher unregistered or was replaced; `final` is its last message, 0 if unknown."""
         source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
-            source.ends_at = now + FAREWELL_S
+            source.ends_at = now + BYE_TIMEOUT_S
             source.promised = max(source.promised, final)
 
     def lapsed(self, publisher: int, final: int) -> None:
         """Note that a publisher is no longer listed; `final` is the newest message known to the master."""
         source = self.by_id.get(publisher)
         if source is not None:
-            source.is_lapsed = True
+            source.is_silent = True
             source.promised = max(source.promised, final)
 
     def settle(self, publisher: int) -> None:
@@ -253,7 +251,7 @@ class HeardPublishers:
         These are unregistered ones whose bye is overdue, and the oldest silent ones beyond `UNLISTED_MAX`.
         """
         all_ = self.by_id.items()
-        silent = [each for each, source in all_ if source.is_lapsed and source.ends_at is None]
+        silent = [each for each, source in all_ if source.is_silent and source.ends_at is None]
         over = [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
         return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
 
@@ -270,7 +268,7 @@ class HeardPublishers:
         return [
             each
             for each, source in self.by_id.items()
-            if source.is_lapsed
+            if source.is_silent
             and source.remote is not None
             and each != remote.publisher.id
             and source.remote.node_name == remote.node_name

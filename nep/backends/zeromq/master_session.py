@@ -1,7 +1,7 @@
 """MasterSession: a node's registrations at one master, renewed periodically.
 
-Keeps everything that is registered, so that a restarted master receives it again at once. `Pace` schedules
-renewals.
+Keeps everything that is registered, so that a restarted master receives it again at once. `RenewalTimer`
+schedules the renewals.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
-from nep.backends.zeromq.bindings import in_reach, may_stay
-from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.bindings import has_room_for_local, select_endpoint
+from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.rpc import PendingCall, RpcClient
-from nep.backends.zeromq.sockets import CONNECT_MS, LOOPBACK, Socket, host_towards
+from nep.backends.zeromq.sockets import CONNECT_MS, LOOPBACK, Socket, local_address_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
@@ -61,17 +61,15 @@ from nep.protocol.topic_pattern import matches
 from nep.system.addresses import MasterName, is_endpoint, is_loopback, look_up
 from nep.system.cpu import CpuLoad
 
-__all__ = ["MasterSession", "Pace", "SessionPublisher", "SessionSubscriber"]
-
-_RENEW_LONGEST_S = 30.0
+_MAX_RENEW_S = 30.0
 """Upper bound for the renewal interval that a master may request."""
 
 _logger = logging.getLogger("nep")
 
-_FOLLOW_S = 1.0
+_ADDRESS_CHECK_S = 1.0
 """Interval at which a node checks whether its publishers have to move to other addresses."""
-_JOIN_AGAIN_S = 0.5
-_CONNECT_AGAIN_S, _CONNECT_AGAIN_FAR_S = 2.0, 2 * CONNECT_MS / 1000
+_JOIN_RETRY_S = 0.5
+_RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_MS / 1000
 """Reconnection interval. libzmq gives up after a failed handshake, as with a PUB socket at the master's
 address.
 """
@@ -90,7 +88,7 @@ class SessionPublisher(Protocol):
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
         """Bind at these addresses of this computer; return the endpoints."""
 
-    def leave_local(self) -> None:
+    def unbind_local(self) -> None:
         """Accept TCP connections only from now on."""
 
 
@@ -112,11 +110,11 @@ class SessionSubscriber(Protocol):
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Process the newest sequence numbers known to the master."""
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to other computers, after the address of this one has changed."""
 
 
-class Pace:
+class RenewalTimer:
     """Renewal schedule: every second, unless the master requests another interval.
 
     `due_at` is a time of the node's own clock (`time.monotonic`).
@@ -126,13 +124,13 @@ class Pace:
         self.due_at = 0.0
         self._renew_s = RENEW_S
 
-    def renews(self, now: float) -> None:
+    def start(self, now: float) -> None:
         """Note a renewal at `now`; schedules the next one in case the master doesn't reply."""
         self.due_at = now + self._renew_s
 
-    def told(self, renew_s: float, now: float) -> None:
+    def set_interval(self, renew_s: float, now: float) -> None:
         """Set the interval requested by the master."""
-        self._renew_s = min(_RENEW_LONGEST_S, max(RENEW_S, renew_s))
+        self._renew_s = min(_MAX_RENEW_S, max(RENEW_S, renew_s))
         self.due_at = now + self._renew_s
 
 
@@ -159,21 +157,21 @@ class MasterSession:
         self._subscribers: dict[int, tuple[SubscriberRecord, SessionSubscriber | PatternSubscriber]] = {}
         self._confirmed: set[int] = set()
         self._epoch, self._revision = 0, 0
-        self._join_again_at = 0.0
-        self._pace = Pace()
-        self._follow_at = 0.0
+        self._join_retry_at = 0.0
+        self._renewal_timer = RenewalTimer()
+        self._address_check_at = 0.0
         self._was_connected = False
         self._is_closed = False
         self._leaving: PendingCall | None = None
         self._left_at = 0.0
         self._is_near = is_loopback(address)
-        self._connect_again_s = _CONNECT_AGAIN_S if self._is_near else _CONNECT_AGAIN_FAR_S
-        self._connect_again_at = time.monotonic() + self._connect_again_s
-        self._served: tuple[str, ...] = ()
+        self._reconnect_s = _RECONNECT_S if self._is_near else _RECONNECT_FAR_S
+        self._reconnect_at = time.monotonic() + self._reconnect_s
+        self._served_hosts: tuple[str, ...] = ()
         self._own_host = LOOPBACK
-        self._name = MasterName(address, self._found, look_up)
+        self._name = MasterName(address, self._set_address, look_up)
         if self._name.known:
-            self._found(self._name.known)
+            self._set_address(self._name.known)
         self._name.look(time.monotonic())
         self._moved_to = self.hosts
         self._connected_from = self._own_host
@@ -195,7 +193,7 @@ class MasterSession:
         On the master's computer these are the loopback address and those at which the master serves other
         computers; elsewhere it is the address of the interface towards the master.
         """
-        return (LOOPBACK, *self._served) if self._is_near else (self._own_host,)
+        return (LOOPBACK, *self._served_hosts) if self._is_near else (self._own_host,)
 
     # ---- for the transport, in any thread
 
@@ -203,17 +201,17 @@ class MasterSession:
     def is_idle(self) -> bool:
         """True if nothing is registered and no request is pending."""
         with self._lock:
-            return not self._publishers and not self._subscribers and not self._calls.is_asked
+            return not self._publishers and not self._subscribers and not self._calls.has_waiting_calls
 
     def wait_for_name(self, wait_s: float | None) -> None:
         """Wait until the master's address is resolved; None waits forever. Raises `MasterUnreachable`."""
         if not self._name.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
 
-    def _found(self, known: str) -> None:
+    def _set_address(self, known: str) -> None:
         if not self._is_near:
-            self._own_host = host_towards(known) or self._own_host
-        self._calls.lead_to(known)
+            self._own_host = local_address_towards(known) or self._own_host
+        self._calls.connect(known)
 
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
@@ -229,7 +227,9 @@ class MasterSession:
         with self._lock:
             self._confirmed.add(record.id)
         added = reply if isinstance(reply, Added) else Added(reply.epoch, reply.revision)
-        self._served = added.hosts  # the first registration returns the addresses that the master serves
+        self._served_hosts = (
+            added.hosts
+        )  # the first registration returns the addresses that the master serves
         endpoints = publisher.move(self.hosts)
         if endpoints == record.endpoints or not endpoints:
             return added
@@ -254,7 +254,7 @@ class MasterSession:
             self._confirmed.add(record.id)
         if not isinstance(reply, Found):
             return Found(reply.epoch, reply.revision)
-        return replace(reply, publishers=self._in_reach(reply.publishers))
+        return replace(reply, publishers=self._select_endpoints(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
         """Unregister a publisher; doesn't wait."""
@@ -320,53 +320,53 @@ class MasterSession:
 
     # ---- in the I/O thread
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         """Process replies; renew when due, and at once after a reconnection."""
         answers = self._calls.read()
         self._read_at = self._clock.now() if answers else self._read_at
         for answer in answers:
-            self._obey(answer.what, now)
+            self._handle_reply(answer.what, now)
             if answer.then is not None and not isinstance(answer.what, Push):
                 answer.then(answer.what)
         if self._is_closed:
-            return Rest()
+            return PollState()
         is_connected = self._calls.is_connected
         if is_connected and not self._was_connected:
-            self._pace.due_at = now
+            self._renewal_timer.due_at = now
         self._was_connected = is_connected
         if is_connected:
-            self._connect_again_at = now + self._connect_again_s
+            self._reconnect_at = now + self._reconnect_s
         else:
             self._name.look(now)
             self._connect_when_due(now)
-        is_due = now >= self._pace.due_at
-        if is_due or now >= self._follow_at:
-            self._follow_at = now + _FOLLOW_S
-            self._follow_addresses()
+        is_due = now >= self._renewal_timer.due_at
+        if is_due or now >= self._address_check_at:
+            self._address_check_at = now + _ADDRESS_CHECK_S
+            self._update_addresses()
         if is_due:
-            self._pace.renews(now)
+            self._renewal_timer.start(now)
             self._renew()
-        due = min(self._pace.due_at, self._follow_at)
-        return Rest(due=now if self._calls.has_more else due)
+        due = min(self._renewal_timer.due_at, self._address_check_at)
+        return PollState(due=now if self._calls.has_more else due)
 
     def _connect_when_due(self, now: float) -> None:
-        if now >= self._connect_again_at:
-            self._connect_again_at = now + self._connect_again_s
-            self._calls.connect_again()
+        if now >= self._reconnect_at:
+            self._reconnect_at = now + self._reconnect_s
+            self._calls.reconnect()
 
-    def _follow_addresses(self) -> None:
+    def _update_addresses(self) -> None:
         # Publishers move when an address of this computer or the master changes, or descriptors run out.
         if not self._is_near and self._name.known:
-            self._own_host = host_towards(self._name.known) or self._own_host
-            self._connect_from(self._own_host)
-        is_cramped = not may_stay()
+            self._own_host = local_address_towards(self._name.known) or self._own_host
+            self._reconnect_from(self._own_host)
+        is_cramped = not has_room_for_local()
         if self.hosts == self._moved_to and not is_cramped:
             return
         self._moved_to = self.hosts
         with self._lock:
             for id, (record, publisher) in self._publishers.items():
                 if is_cramped:
-                    publisher.leave_local()
+                    publisher.unbind_local()
                 try:
                     moved = replace(record, endpoints=publisher.move(self.hosts), local=publisher.is_local)
                 except (AddressInUseError, TooManyFilesError):
@@ -377,48 +377,48 @@ class MasterSession:
                     if id in self._confirmed:
                         self._calls.tell(AddPublisher(self._node, moved))
 
-    def _connect_from(self, host: str) -> None:
+    def _reconnect_from(self, host: str) -> None:
         # Connections from the old address would stay silent for many seconds.
         before, self._connected_from = self._connected_from, host
         if before in {host, LOOPBACK}:  # `LOOPBACK`: not known before
             return
-        self._calls.connect_again()
+        self._calls.reconnect()
         self._was_connected = False
         for _record, subscriber in self._all_subscribers():
-            subscriber.connect_again()
+            subscriber.reconnect()
 
-    def _in_reach(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
-        return tuple(in_reach(remote, self._name.known or self.address) for remote in remotes)
+    def _select_endpoints(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
+        return tuple(select_endpoint(remote, self._name.known or self.address) for remote in remotes)
 
-    def _obey(self, answer: Reply | Push, now: float) -> None:
-        if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served:
-            self._served = answer.hosts
-            self._pace.due_at = now
+    def _handle_reply(self, answer: Reply | Push, now: float) -> None:
+        if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served_hosts:
+            self._served_hosts = answer.hosts
+            self._renewal_timer.due_at = now
         if isinstance(answer, PublisherCame):
-            self._publisher_came(answer)
+            self._handle_publisher_added(answer)
         elif isinstance(answer, PublisherGone):
-            self._publisher_gone(answer)
+            self._handle_publisher_removed(answer)
         elif isinstance(answer, Renewed):
-            self._renewed(answer, now)
+            self._handle_renewed(answer, now)
         elif isinstance(answer, Added | Found) and self._epoch == 0:
             self._epoch = answer.epoch
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
 
-    def _publisher_came(self, came: PublisherCame) -> None:
-        remotes = self._in_reach((came.publisher,))
+    def _handle_publisher_added(self, came: PublisherCame) -> None:
+        remotes = self._select_endpoints((came.publisher,))
         can_be_heard = any(is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints)
         for subscriber in self._subscribers_of(came.publisher.publisher.topic):
             if came.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
                 subscriber.expect_all_of(came.publisher.publisher.id)
             subscriber.connect(remotes)
 
-    def _publisher_gone(self, gone: PublisherGone) -> None:
+    def _handle_publisher_removed(self, gone: PublisherGone) -> None:
         if gone.is_closed:
             for _record, each in self._all_subscribers():
                 if isinstance(each, PatternSubscriber):
-                    each.closed_early(gone.id)
-        for subscriber in self._subscribers_of(gone.topic, is_wanted=False):
+                    each.note_early_close(gone.id)
+        for subscriber in self._subscribers_of(gone.topic, may_create=False):
             subscriber.gone(gone.id, gone.last_seq, is_closed=gone.is_closed)
 
     def _renew(self) -> None:
@@ -426,7 +426,7 @@ class MasterSession:
             return
         offset = self._clock.offset()
         if offset is None:
-            self._correct({})  # also after this computer's clock was set
+            self._update_clocks({})  # also after this computer's clock was set
         with self._lock:
             publishers = [
                 publisher for each, (_, publisher) in self._publishers.items() if each in self._confirmed
@@ -443,9 +443,9 @@ class MasterSession:
                 self._load.ratio(),
                 offset or (),
             )
-            self._calls.tell(request, then=partial(self._timed, self._clock.now()))
+            self._calls.tell(request, then=partial(self._add_clock_sample, self._clock.now()))
 
-    def _timed(self, sent: Moment, answer: Reply) -> None:
+    def _add_clock_sample(self, sent: Moment, answer: Reply) -> None:
         # Compares this computer's clock with the master's by the times of a renewal and its reply.
         if not isinstance(answer, Renewed) or answer.epoch != self._epoch or not answer.times:
             return
@@ -453,18 +453,18 @@ class MasterSession:
         if len(answer.times) != 2:
             self._calls.refusals.add(_("the times of a renewal are two"))
         elif self._clock.add(sent, *answer.times, self._read_at) and not was_known:
-            self._pace.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
+            self._renewal_timer.due_at = self._read_at.steady_ns / 1e9  # other nodes wait for it
 
-    def _renewed(self, answer: Renewed, now: float) -> None:
+    def _handle_renewed(self, answer: Renewed, now: float) -> None:
         if answer.again:
             self._join(now)
             return
         self._revision = answer.revision
-        self._pace.told(answer.next_s, now)
+        self._renewal_timer.set_interval(answer.next_s, now)
         for topic in answer.topics:
             for subscriber in self._subscribers_of(topic.topic):
-                subscriber.reconcile(self._in_reach(topic.publishers))
-        self._correct(self._differences_in(answer))
+                subscriber.reconcile(self._select_endpoints(topic.publishers))
+        self._update_clocks(self._differences_in(answer))
         for _record, each in self._all_subscribers():
             each.tick(now, answer.last_seqs.items())
 
@@ -479,7 +479,7 @@ class MasterSession:
             self._calls.refusals.add(_("a clock differs as no clock can"))
         return found
 
-    def _correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+    def _update_clocks(self, clocks: Mapping[str, ClockDifference]) -> None:
         if clocks or self._clocks:
             self._clocks = clocks
             for _record, each in self._all_subscribers():
@@ -488,11 +488,11 @@ class MasterSession:
                     each.correct(clocks)
 
     def _join(self, now: float) -> None:
-        # Registers everything again, at most once per `_JOIN_AGAIN_S`.
-        self._pace.told(RENEW_S, now)  # the new master hasn't requested an interval yet
-        if now < self._join_again_at:
+        # Registers everything again, at most once per `_JOIN_RETRY_S`.
+        self._renewal_timer.set_interval(RENEW_S, now)  # the new master hasn't requested an interval yet
+        if now < self._join_retry_at:
             return
-        self._join_again_at = now + _JOIN_AGAIN_S
+        self._join_retry_at = now + _JOIN_RETRY_S
         with self._lock:
             if self._is_closed:  # a join after the leave would register the node again
                 return
@@ -500,34 +500,41 @@ class MasterSession:
             subscribers = tuple(record for record, _ in self._subscribers.values())
             request = Join(self._node, self._epoch, publishers, subscribers)
             items = {record.id for record in publishers} | {record.id for record in subscribers}
-            self._calls.tell(request, then=lambda reply: self._joined(reply, items))
+            self._calls.tell(request, then=lambda reply: self._handle_joined(reply, items))
 
-    def _joined(self, reply: Reply, items: set[int]) -> None:
+    def _handle_joined(self, reply: Reply, items: set[int]) -> None:
         if not isinstance(reply, Found):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
         self._clock.forget()  # the master may run on another computer now
-        self._join_again_at = 0.0
+        self._join_retry_at = 0.0
         with self._lock:
             self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())
         by_topic: dict[str, list[RemotePublisher]] = {}
-        for remote in self._in_reach(reply.publishers):
+        for remote in self._select_endpoints(reply.publishers):
             by_topic.setdefault(remote.publisher.topic, []).append(remote)
         for record, subscriber in self._all_subscribers():
             if isinstance(subscriber, PatternSubscriber):
-                for topic in {*subscriber.topics, *(each for each in by_topic if _hears(record, each))}:
-                    member = subscriber.of_topic(topic)
+                for topic in {
+                    *subscriber.topics,
+                    *(each for each in by_topic if _matches_pattern(record, each)),
+                }:
+                    member = subscriber.member(topic)
                     if member is not None:
                         member.reconcile(by_topic.get(topic, ()))
             else:
                 subscriber.reconcile(by_topic.get(record.topic, ()))
 
-    def _subscribers_of(self, topic: str, *, is_wanted: bool = True) -> list[SessionSubscriber]:
-        # Pattern subscribers create a member for a new topic only with `is_wanted`.
+    def _subscribers_of(self, topic: str, *, may_create: bool = True) -> list[SessionSubscriber]:
+        # Pattern subscribers create a member for a new topic only with `may_create`.
         found: list[SessionSubscriber] = []
         for record, subscriber in self._all_subscribers():
             if isinstance(subscriber, PatternSubscriber):
-                member = subscriber.of_topic(topic, is_wanted=is_wanted) if _hears(record, topic) else None
+                member = (
+                    subscriber.member(topic, may_create=may_create)
+                    if _matches_pattern(record, topic)
+                    else None
+                )
                 found += () if member is None else (member,)
             elif record.topic == topic:
                 found.append(subscriber)
@@ -538,5 +545,5 @@ class MasterSession:
             return list(self._subscribers.values())
 
 
-def _hears(record: SubscriberRecord, topic: str) -> bool:
+def _matches_pattern(record: SubscriberRecord, topic: str) -> bool:
     return record.pattern and matches(record.topic, topic)

@@ -26,10 +26,8 @@ from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.log_rarely import is_logged
 from nep.system.wakeup import Waker
 
-__all__ = ["PatternSubscriber"]
-
 _logger = logging.getLogger("nep")
-_MEMBERS_MAX = 2_000
+_MAX_MEMBERS = 2_000
 """Maximum number of topics per subscriber: any program at the master could publish any number."""
 
 
@@ -61,11 +59,11 @@ class PatternSubscriber(WakingSubscriber):
         self._closed_early: set[int] | None = set()
         """Ids of publishers that closed before `begin`; None afterwards."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
-        self._gone = _Totals()
+        self._removed_totals = _Totals()
         self._dropped = 0
-        self._problem = self._lack = ""
+        self._problem = self._member_error = ""
         self._failures = 0
-        self._making = threading.RLock()
+        self._members_lock = threading.RLock()
 
     # ---- reading
 
@@ -85,7 +83,7 @@ class PatternSubscriber(WakingSubscriber):
         """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self._inbox) > 0
 
-    def _came(self, messages: Sequence[Message]) -> None:
+    def _receive(self, messages: Sequence[Message]) -> None:
         # Runs in the thread that serves the members.
         if self.spec.sink is not None:
             self.spec.sink(messages)
@@ -100,20 +98,28 @@ class PatternSubscriber(WakingSubscriber):
     @property
     def received(self) -> int:
         """Number of messages received on all topics."""
-        with self._making:
-            return self._gone.received + sum(each.received for each in self._members.values()) - self._dropped
+        with self._members_lock:
+            return (
+                self._removed_totals.received
+                + sum(each.received for each in self._members.values())
+                - self._dropped
+            )
 
     @property
     def lost(self) -> int:
         """Number of messages lost or dropped here for lack of room."""
-        with self._making:
-            return self._gone.lost + sum(each.lost or 0 for each in self._members.values()) + self._dropped
+        with self._members_lock:
+            return (
+                self._removed_totals.lost
+                + sum(each.lost or 0 for each in self._members.values())
+                + self._dropped
+            )
 
     @property
     def refused(self) -> int:
         """Number of inputs rejected because they aren't valid messages."""
-        with self._making:
-            return self._gone.refused + sum(each.refused for each in self._members.values())
+        with self._members_lock:
+            return self._removed_totals.refused + sum(each.refused for each in self._members.values())
 
     @property
     def endpoints(self) -> tuple[str, ...]:
@@ -126,31 +132,31 @@ class PatternSubscriber(WakingSubscriber):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics for a renewal."""
-        with self._making:
+        with self._members_lock:
             problems = (each.counts().problem for each in self._members.values())
-            problem = self._problem or self._lack or next(filter(None, problems), "")
+            problem = self._problem or self._member_error or next(filter(None, problems), "")
             return SubscriberCount(self.spec.id, as_count(self.received), as_count(self.lost), problem)
 
     # ---- publishers
 
-    def of_topic(self, topic: str, *, is_wanted: bool = True) -> NativeSubscriber | None:
+    def member(self, topic: str, *, may_create: bool = True) -> NativeSubscriber | None:
         """Return the member for a topic, or None.
 
-        With `is_wanted` a missing member is created, unless there is no room.
+        With `may_create` a missing member is created, unless there is no room.
         """
-        with self._making:
+        with self._members_lock:
             member = self._members.get(topic)
-            if member is not None or not is_wanted or self.is_closed:
+            if member is not None or not may_create or self.is_closed:
                 return member
             try:
                 member = self._members[topic] = self._new_member(topic)
             except NepError as error:
-                self._lack = str(error)
+                self._member_error = str(error)
                 self._failures += 1
                 if is_logged(self._failures):
                     _logger.warning("'%s' can't subscribe to '%s': %s", self.spec.topic, topic, error)
                 return None
-            self._lack = ""
+            self._member_error = ""
             is_registered = self._closed_early is None
         if is_registered:
             member.begin(())
@@ -158,34 +164,34 @@ class PatternSubscriber(WakingSubscriber):
         return member
 
     def _new_member(self, topic: str) -> NativeSubscriber:
-        if len(self._members) >= _MEMBERS_MAX:
-            raise NepError(f"it is already subscribed to {_MEMBERS_MAX} topics")
+        if len(self._members) >= _MAX_MEMBERS:
+            raise NepError(f"it is already subscribed to {_MAX_MEMBERS} topics")
         spec = replace(
             self.spec,
             topic=topic,
             keep="all",
             max_messages=MAX_MESSAGES,
-            sink=self._came,
+            sink=self._receive,
             is_pattern=False,
         )
         return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
 
     def begin(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to the publishers known at registration, except those closed since."""
-        with self._making:
+        with self._members_lock:
             closed, self._closed_early = self._closed_early or set(), None
             members = list(self._members.values())
         for member in members:
             member.begin(())
         for remote in remotes:
             if remote.publisher.id not in closed:
-                found = self.of_topic(remote.publisher.topic)
+                found = self.member(remote.publisher.topic)
                 if found is not None:
                     found.connect((remote,))
 
-    def closed_early(self, publisher: int) -> None:
+    def note_early_close(self, publisher: int) -> None:
         """Note that a publisher closed, in case the reply to the registration still lists it."""
-        with self._making:
+        with self._members_lock:
             if self._closed_early is not None:
                 self._closed_early.add(publisher)
 
@@ -212,21 +218,21 @@ class PatternSubscriber(WakingSubscriber):
         for topic, member in list(self._members.items()):
             member.tick(now, seqs)
             if self.spec.sink is None and not member.has_publishers:
-                with self._making:
+                with self._members_lock:
                     del self._members[topic]
-                    self._gone.add(member)
+                    self._removed_totals.add(member)
                 member.close()
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to publishers on other computers."""
         for member in list(self._members.values()):
-            member.connect_again()
+            member.reconnect()
 
     # ---- closing
 
     def close(self) -> None:
         """Unregister and discard unread messages."""
-        with self._making, self._changed:
+        with self._members_lock, self._changed:
             if self.is_closed:
                 return
             self.is_closed = True

@@ -1,7 +1,7 @@
 """PendingBatch: messages published in quick succession, to be sent in one part. No sockets.
 
-A message is sent at once unless the previous one was published less than `SOON_NS` ago. Otherwise it waits
-for more, until there are `MOST` or `WAIT_NS` have passed. See docs/adr/0009-one-part.md.
+A message is sent at once unless the previous one was published less than `BATCH_WINDOW_NS` ago. Otherwise it
+waits for more, until there are `MAX_PENDING` or `MAX_DELAY_NS` have passed. See docs/adr/0009-one-part.md.
 """
 
 from __future__ import annotations
@@ -16,23 +16,21 @@ from nep.messages.codecs import NULL
 from nep.messages.encoded import Encoded
 from nep.protocol.batch import BATCH_MAX
 
-__all__ = ["MOST", "SMALL_BYTES", "SOON_NS", "WAIT_NS", "PendingBatch"]
-
-SOON_NS = 20_000
-WAIT_NS = 100_000
-MOST = 64
-FULL_BYTES = 65_536
+BATCH_WINDOW_NS = 20_000
+MAX_DELAY_NS = 100_000
+MAX_PENDING = 64
+FULL_BATCH_BYTES = 65_536
 """Size at which a batch is sent: copying more at once takes longer than a separate send."""
-SMALL_BYTES = 16_384
+MAX_BATCHED_BYTES = 16_384
 """Upper size limit of messages in a batch: copying larger ones costs more than it saves."""
-_GOES_ON_S = 500e-6
+_BURST_CHECK_S = 500e-6
 """Interval at which the I/O thread checks while the publisher itself sends full batches."""
 
 
 _time_ns = time.time_ns
 
 
-class Way(Protocol):
+class SendPath(Protocol):
     """Sending end of a publisher."""
 
     is_heard: bool
@@ -51,15 +49,15 @@ class Way(Protocol):
 
 
 class PendingBatch:
-    """Pending messages of one publisher; guarded by its lock, except `waiting`.
+    """Pending messages of one publisher; guarded by its lock, except `pending`.
 
     `may_wait` is False to disable batches.
     """
 
     def __init__(self, *, may_wait: bool) -> None:
-        self.waiting: list[tuple[bytes, int]] = []
+        self.pending: list[tuple[bytes, int]] = []
         """Pending payloads and their time stamps. Any thread may append without the lock, which would cost as
-        much as the rest of publishing; it then checks `is_looked_after`.
+        much as the rest of publishing; it then checks `is_flush_scheduled`.
         """
         self.until_ns = 0
         """Time before which a new message is batched."""
@@ -67,11 +65,11 @@ class PendingBatch:
         """Time by which the pending messages must be sent."""
         self.is_allowed = False
         """True if all current subscribers accept batches."""
-        self.is_looked_after = False
+        self.is_flush_scheduled = False
         """True if the I/O thread is scheduled to send the pending messages."""
-        self.is_leaving = False
+        self.is_flushing = False
         """True while pending messages are being sent."""
-        self.has_gone_full = False
+        self.has_sent_full = False
         """True if the publisher has sent a full batch since the I/O thread's last check."""
         self._may_wait = may_wait
 
@@ -81,12 +79,14 @@ class PendingBatch:
         if not self.is_allowed:
             self.until_ns = 0
 
-    def begin_after(self, stamp_ns: int) -> None:
+    def open_window(self, stamp_ns: int) -> None:
         """Open the batching window after a message with this time stamp was sent alone."""
         if self.is_allowed:
-            self.until_ns = stamp_ns + SOON_NS
+            self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
-    def publishing(self, asked: QuickPublish, way: Way, lock: threading.Lock) -> Callable[..., None]:
+    def publish_function(
+        self, asked: QuickPublish, path: SendPath, lock: threading.Lock
+    ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
         It is one closure because nearly all of the time for a small message is spent here.
@@ -94,17 +94,17 @@ class PendingBatch:
         Args:
             asked: Functions for encoding and for the slow path.
             way: Sending end.
-            lock: Lock of `way`.
+            lock: Lock of `path`.
         """
         owner, kind, ordinary, look, slowly = asked
-        batch, waiting, put, send_now = self, self.waiting, self.waiting.append, way.send_now
+        batch, pending, put, send_now = self, self.pending, self.pending.append, path.send_now
 
         def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
             if strict:
                 slowly(payload, strict=True)
                 return
             stamp_ns = _time_ns()
-            if owner.is_closed or way.problem or not way.is_heard or type(payload) is Encoded:
+            if owner.is_closed or path.problem or not path.is_heard or type(payload) is Encoded:
                 slowly(payload)
                 return
             try:
@@ -114,22 +114,22 @@ class PendingBatch:
                 return
             if look is not None and data.rfind(NULL) >= 0:
                 look(payload)
-            if stamp_ns >= batch.until_ns or len(data) >= SMALL_BYTES:
+            if stamp_ns >= batch.until_ns or len(data) >= MAX_BATCHED_BYTES:
                 send_now(data)
                 return
             put((data, stamp_ns))
-            count = len(waiting)
-            if count >= MOST or count * len(data) >= FULL_BYTES:
+            count = len(pending)
+            if count >= MAX_PENDING or count * len(data) >= FULL_BATCH_BYTES:
                 with lock:
-                    way.flush()
-                batch.has_gone_full = True
+                    path.flush()
+                batch.has_sent_full = True
                 return
             if count == 1:
-                batch.ends_ns = stamp_ns + WAIT_NS
-            if not batch.is_looked_after:
+                batch.ends_ns = stamp_ns + MAX_DELAY_NS
+            if not batch.is_flush_scheduled:
                 with lock:
-                    way.flush_soon()
-            until_ns, ends_ns = stamp_ns + SOON_NS, batch.ends_ns
+                    path.flush_soon()
+            until_ns, ends_ns = stamp_ns + BATCH_WINDOW_NS, batch.ends_ns
             batch.until_ns = until_ns if until_ns < ends_ns else ends_ns  # noqa: FURB136 - takes half the time of min
 
         return publish
@@ -139,27 +139,27 @@ class PendingBatch:
 
         Must not be called without any.
         """
-        taken = self.waiting[:BATCH_MAX]
-        del self.waiting[: len(taken)]  # more may have been appended meanwhile
-        self.until_ns = taken[-1][1] + SOON_NS if self.is_allowed else 0
+        taken = self.pending[:BATCH_MAX]
+        del self.pending[: len(taken)]  # more may have been appended meanwhile
+        self.until_ns = taken[-1][1] + BATCH_WINDOW_NS if self.is_allowed else 0
         return taken
 
-    def look_again_s(self, now_ns: int) -> float:
+    def next_check_s(self, now_ns: int) -> float:
         """Return seconds until the I/O thread must check again; 0 to send pending messages now.
 
         For the I/O thread.
         """
-        has_gone, self.has_gone_full = self.has_gone_full, False
+        had_full, self.has_sent_full = self.has_sent_full, False
         # Before reading: a thread that appends afterwards requests a check itself.
-        self.is_looked_after = has_gone
-        waiting = self.waiting[:1]
-        left_ns = waiting[0][1] + WAIT_NS - now_ns if waiting else 0
-        if 0 < left_ns <= WAIT_NS:  # larger values mean that the clock was set
-            self.is_looked_after = True
-            return _GOES_ON_S if has_gone else left_ns / 1e9
+        self.is_flush_scheduled = had_full
+        pending = self.pending[:1]
+        left_ns = pending[0][1] + MAX_DELAY_NS - now_ns if pending else 0
+        if 0 < left_ns <= MAX_DELAY_NS:  # larger values mean that the clock was set
+            self.is_flush_scheduled = True
+            return _BURST_CHECK_S if had_full else left_ns / 1e9
         return 0.0
 
     @property
-    def goes_on_s(self) -> float:
+    def burst_check_s(self) -> float:
         """Seconds until the next check with no pending messages; 0 after the end of a burst."""
-        return _GOES_ON_S if self.is_looked_after else 0.0
+        return _BURST_CHECK_S if self.is_flush_scheduled else 0.0

@@ -17,13 +17,21 @@ from typing import NoReturn, cast
 import zmq
 
 from nep.backends.base import PublisherSpec, QuickPublish
-from nep.backends.zeromq.bindings import SMALL, Bindings
-from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, STEP_BYTES, Backlog
-from nep.backends.zeromq.io_thread import Rest, Served
-from nep.backends.zeromq.pending_batch import SMALL_BYTES, PendingBatch
+from nep.backends.zeromq.bindings import SMALL_CODECS, Bindings
+from nep.backends.zeromq.byte_window import ACK_STEP_BYTES, BACKLOG_STEP_BYTES, Backlog
+from nep.backends.zeromq.io_thread import Pollable, PollState
+from nep.backends.zeromq.pending_batch import MAX_BATCHED_BYTES, PendingBatch
 from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import FarConnection, Part, Refusals, Socket, send_mark, sendable, wait_until
+from nep.backends.zeromq.sockets import (
+    FarConnection,
+    Part,
+    RejectionLog,
+    Socket,
+    sendable,
+    set_send_high_water_mark,
+    wait_until,
+)
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
@@ -44,22 +52,20 @@ from nep.protocol.wire import (
 )
 from nep.protocol.wire import EXTENSION as EXTENSION_FLAG
 
-__all__ = ["NativePublisher"]
-
 _logger = logging.getLogger("nep")
 _SNDMORE = int(zmq.SNDMORE)  # plain ints: looking up pyzmq's enum members costs as much as the call
 _EVENTS = int(zmq.EVENTS)
 _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 _NO_COPY_BYTES = 65_536
-_ONE_PART_BYTES = SMALL_BYTES
+_MAX_ONE_PART_BYTES = MAX_BATCHED_BYTES
 """Size limit for messages sent in one part, if all subscribers accept it: see docs/adr/0009-one-part.md."""
-_LOOK_NS = 500_000
+_READ_INTERVAL_NS = 500_000
 """Interval at which a busy publishing thread reads subscriptions. The I/O thread checks afterwards, because
 sending may have consumed the edge of ZMQ_FD.
 """
-_SERVE_S = 0.02
-_BYE_AGAIN_S = 0.05
+_IO_CHECK_S = 0.02
+_BYE_RETRY_S = 0.05
 
 
 def _only_bytes(payload: object) -> NoReturn:
@@ -73,7 +79,7 @@ class GreetedPublisher:
         """Initialize; `seen` has the message count at the hello of each connected subscriber."""
         self._changed, self._seen = changed, seen
         self._names: dict[int, str] = {}
-        self._waited: set[int] = set()
+        self._expected: set[int] = set()
 
     @property
     def subscriber_ids(self) -> frozenset[int]:
@@ -85,13 +91,13 @@ class GreetedPublisher:
     def missing(self) -> tuple[str, ...]:
         """Names of nodes whose subscribers are registered but not connected."""
         with self._changed:
-            return tuple(sorted({self._names[each] for each in self._waited - set(self._seen)}))
+            return tuple(sorted({self._names[each] for each in self._expected - set(self._seen)}))
 
     def expect(self, expected: Iterable[Expected]) -> None:
         """Note registered subscribers that will connect."""
         with self._changed:
             for each in expected:
-                self._waited.add(each.id)
+                self._expected.add(each.id)
                 self._names[each.id] = each.node_name
 
     def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
@@ -114,7 +120,7 @@ class NativePublisher(GreetedPublisher):
         socket: Socket,
         spec: PublisherSpec,
         on_close: Callable[[NativePublisher, float], None],
-        serve_soon: Callable[[Served], None],
+        serve_soon: Callable[[Pollable], None],
     ) -> None:
         self.spec = spec
         self._count = 0
@@ -124,15 +130,15 @@ class NativePublisher(GreetedPublisher):
         self._on_close = on_close
         self._serve_soon = serve_soon
         self._socket = socket
-        send_mark(socket)
+        set_send_high_water_mark(socket)
         self._bindings = Bindings(
-            socket, may_be_local=spec.codec.name in SMALL, is_watched=FarConnection.can_tell
+            socket, may_be_local=spec.codec.name in SMALL_CODECS, is_watched=FarConnection.can_tell
         )
         # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
-        self._bytes = self._settled_bytes = 0
+        self._bytes = self._windowed_bytes = 0
         """Value of `_bytes` up to which the send windows are accounted."""
-        self._settle_at = 0
+        self._full_path_at = 0
         """Value of `_bytes` from which a message needs the full path with flow control."""
         self._backlog = Backlog()
         self._last_stamp_ns: int | None = None
@@ -141,10 +147,10 @@ class NativePublisher(GreetedPublisher):
         self._subscriptions = Subscriptions(spec.topic, spec.id)
         if can_share() and not spec.history:
             self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
-        self._apart = self._subscriptions.apart
+        self._legacy_filters = self._subscriptions.legacy_filters
         self._history: History[tuple[Part, ...]] = History(spec.history)
-        self._looked_ns = self._served = 0
-        self._io_comes = False
+        self._polled_ns = self._count_at_check = 0
+        self._is_io_scheduled = False
         self._batch = PendingBatch(may_wait=spec.may_batch and not spec.is_latched)
         self._id = spec.id
         self._topic = topic_part(spec.topic)
@@ -156,12 +162,12 @@ class NativePublisher(GreetedPublisher):
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
         self.fd = int(socket.getsockopt(zmq.FD))
         bytes_only = QuickPublish(self, bytes, _only_bytes, None, self.send_now)
-        self._send_bytes = self._batch.publishing(bytes_only, self, self._lock)
+        self._send_bytes = self._batch.publish_function(bytes_only, self, self._lock)
 
     @property
     def count(self) -> int:
         """Number of messages published."""
-        return self._count + len(self._batch.waiting)
+        return self._count + len(self._batch.pending)
 
     # ---- subscribers
 
@@ -188,15 +194,15 @@ class NativePublisher(GreetedPublisher):
             self._read_subscriptions()  # binding may have consumed the edge of ZMQ_FD
             return endpoints
 
-    def leave_local(self) -> None:
+    def unbind_local(self) -> None:
         """Accept TCP connections only from now on."""
         with self._lock:
             if not self._socket.closed and self._bindings.is_local:
-                self._bindings.leave_local()
+                self._bindings.unbind_local()
                 self._read_subscriptions()
 
     @property
-    def refusals(self) -> Refusals:
+    def refusals(self) -> RejectionLog:
         """Rejected subscriptions."""
         return self._subscriptions.refusals
 
@@ -228,29 +234,29 @@ class NativePublisher(GreetedPublisher):
 
         Raises `WireError` for an extension that can't be encoded.
         """
-        data, beside = encoded
-        if beside is None and type(data) is bytes:
+        data, extension_fields = encoded
+        if extension_fields is None and type(data) is bytes:
             self._send_bytes(data)
         else:
-            self._send_now(data, beside)
+            self._send_now(data, extension_fields)
 
     def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
         """Return the fast publish function, see `nep.backends.base.PublishesQuickly`."""
-        return self._batch.publishing(asked, self, self._lock)
+        return self._batch.publish_function(asked, self, self._lock)
 
     def send_now(self, data: bytes) -> None:
         """Send pending messages, then `data`."""
         self._send_now(data, None)
 
-    def _send_now(self, given: bytes | memoryview, beside: Mapping[str, object] | None) -> None:
-        data: Part = given
+    def _send_now(self, payload: bytes | memoryview, extension_fields: Mapping[str, object] | None) -> None:
+        data: Part = payload
         extension = None
-        if (given.nbytes if type(given) is memoryview else len(given)) >= SHARED_BYTES:
-            self._send_large(given, extension_part(beside) if beside else None)
+        if (payload.nbytes if type(payload) is memoryview else len(payload)) >= SHARED_BYTES:
+            self._send_large(payload, extension_part(extension_fields) if extension_fields else None)
             return
-        if beside or type(given) is not bytes:
-            data = sendable(given) if len(given) >= _ONE_PART_BYTES else bytes(given)
-            extension = extension_part(beside) if beside else None
+        if extension_fields or type(payload) is not bytes:
+            data = sendable(payload) if len(payload) >= _MAX_ONE_PART_BYTES else bytes(payload)
+            extension = extension_part(extension_fields) if extension_fields else None
         size = len(data)
         with self._lock:
             if self.is_closed:
@@ -261,48 +267,52 @@ class NativePublisher(GreetedPublisher):
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
-            if total >= self._settle_at or extension or self._flags:
+            if total >= self._full_path_at or extension or self._flags:
                 self._send_all(data, extension, size)
-            elif size < _ONE_PART_BYTES and not self._apart and type(data) is bytes:
+            elif size < _MAX_ONE_PART_BYTES and not self._legacy_filters and type(data) is bytes:
                 head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
                 self._send(b"".join((self._topic, head, data)))
-                self._batch.begin_after(stamp_ns)
+                self._batch.open_window(stamp_ns)
             else:
-                self._send_apart(data, size, seq, stamp_ns)
-            self._look(stamp_ns)
+                self._send_in_parts(data, size, seq, stamp_ns)
+            self._poll_subscriptions(stamp_ns)
 
     def _greet_before(self, size: int) -> None:
         # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
         # order. Without a history only if `_send_all` would read them.
-        if self.spec.history > 1 or self._bytes + size >= self._settle_at:
+        if self.spec.history > 1 or self._bytes + size >= self._full_path_at:
             self._read_subscriptions()
 
-    def _send_large(self, given: bytes | memoryview, extension: bytes | None) -> None:
+    def _send_large(self, payload: bytes | memoryview, extension: bytes | None) -> None:
         # The payload is copied at most once.
         shared = self._subscriptions.shared
         # before taking the lock: loading the library is slow
         opened = begin_sharing() if shared is not None and self._seen and not shared.readers else None
         if shared is not None and opened is None and not shared.readers:
             shared = None
-        data = sendable(given) if shared is None or not shared.readers else None
-        size = given.nbytes if isinstance(given, memoryview) else len(given)
+        data = sendable(payload) if shared is None or not shared.readers else None
+        size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
         with self._lock:
             if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.flush()
             if self._flags:
                 self._greet_before(size)
-            number = shared.place(given, self._seen, time.monotonic()) if shared and not self._apart else None
+            number = (
+                shared.place(payload, self._seen, time.monotonic())
+                if shared and not self._legacy_filters
+                else None
+            )
             is_for_all = number is not None and shared is not None and shared.readers >= self._seen.keys()
             if data is None and not is_for_all:
-                data = sendable(given)
+                data = sendable(payload)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if (
                 number is not None
                 and is_for_all
-                and total < self._settle_at
+                and total < self._full_path_at
                 and not (extension or self._flags)
             ):
                 head = pack_quickly(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
@@ -310,7 +320,7 @@ class NativePublisher(GreetedPublisher):
                 self._send(b"".join((self._topic, head, number)))
             else:
                 self._send_all(b"" if data is None else data, extension, size, number)
-            self._look(stamp_ns)
+            self._poll_subscriptions(stamp_ns)
 
     def lend(self, size_bytes: int) -> memoryview | None:
         """Return writable shared memory for a payload, or None."""
@@ -323,16 +333,16 @@ class NativePublisher(GreetedPublisher):
         notice = pack_quickly(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
         self._send_parts(self._subscriptions.hellos[subscriber], (notice,))
 
-    def _look(self, stamp_ns: int) -> None:
-        # Reads subscriptions at most every `_LOOK_NS`; the I/O thread checks afterwards.
-        if not 0 <= stamp_ns - self._looked_ns < _LOOK_NS:
-            self._looked_ns = stamp_ns
+    def _poll_subscriptions(self, stamp_ns: int) -> None:
+        # Reads subscriptions at most every `_READ_INTERVAL_NS`; the I/O thread checks afterwards.
+        if not 0 <= stamp_ns - self._polled_ns < _READ_INTERVAL_NS:
+            self._polled_ns = stamp_ns
             self._read_subscriptions()
-        elif not self._io_comes:
-            self._io_comes = True
+        elif not self._is_io_scheduled:
+            self._is_io_scheduled = True
             self._serve_soon(self)
 
-    def _send_apart(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
+    def _send_in_parts(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
         # Sends three parts. Call with the lock held.
         send = self._send
         send(self._topic, _SNDMORE)
@@ -341,35 +351,35 @@ class NativePublisher(GreetedPublisher):
 
     def flush_soon(self) -> None:
         """Have the I/O thread send pending messages soon. Call with the lock held."""
-        if not self._batch.is_looked_after:
-            self._batch.is_looked_after = self._io_comes = True
+        if not self._batch.is_flush_scheduled:
+            self._batch.is_flush_scheduled = self._is_io_scheduled = True
             self._serve_soon(self)
 
     def flush(self) -> None:
         """Send pending messages and count them. Call with the lock held."""
         batch = self._batch
-        if batch.is_leaving or not batch.waiting:
+        if batch.is_flushing or not batch.pending:
             return
-        batch.is_leaving = True  # a nested flush must not overtake the messages being sent
+        batch.is_flushing = True  # a nested flush must not overtake the messages being sent
         try:
             self._send_batches(batch)
         finally:
-            batch.is_leaving = False
+            batch.is_flushing = False
 
     def _send_batches(self, batch: PendingBatch) -> None:
-        while batch.waiting:
+        while batch.pending:
             taken = batch.take()
             self._last_stamp_ns = stamp_ns = taken[-1][1]
             count, payloads, stamps_ns = len(taken), *zip(*taken, strict=True)
             size = sum(map(len, payloads))
-            if count > 1 and batch.is_allowed and self._bytes + size < self._settle_at:
+            if count > 1 and batch.is_allowed and self._bytes + size < self._full_path_at:
                 part = batch_part(self._topic, self._form, self._count + 1, self._id, stamps_ns, payloads)
                 self._count += count
                 self._bytes += size
                 self._send(part)
             else:
                 self._send_each(taken)
-            self._look(stamp_ns)
+            self._poll_subscriptions(stamp_ns)
 
     def _send_each(self, taken: Iterable[tuple[bytes, int]]) -> None:
         # Call with the lock held.
@@ -386,17 +396,17 @@ class NativePublisher(GreetedPublisher):
         tail = self._tail(data, extension, size, 0)
         shared = None if number is None else self._tail(number, extension, len(number), SHARED)
         self._history.add(tail, size)
-        if self._bytes < self._settle_at:
+        if self._bytes < self._full_path_at:
             self._send_to_all(tail, shared)
         else:
             if not self._flags:
                 self._read_subscriptions()
-            self._send_to_those_with_room(tail, shared, size)
+            self._send_with_flow_control(tail, shared, size)
 
     def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
-        told = size if size <= SIZE_MAX else 0
-        header = pack_quickly(form, told, self._count, self._last_stamp_ns or 0, self._id)
+        size_field = size if size <= SIZE_MAX else 0
+        header = pack_quickly(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
     def _send_to_all(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
@@ -418,41 +428,41 @@ class NativePublisher(GreetedPublisher):
         shared = self._subscriptions.shared
         return set() if shared is None else shared.readers
 
-    def _send_to_those_with_room(
+    def _send_with_flow_control(
         self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None, size: int
     ) -> None:
         # Call with the lock held. While a subscriber has no room, the message is sent to each of the others
         # alone.
         windows = self._subscriptions.windows
-        since = self._bytes - size - self._settled_bytes  # sent to all
+        since = self._bytes - size - self._windowed_bytes  # sent to all
         if since:
             for window in windows.values():
                 window.sent(self._count - 1, since)
-        self._settled_bytes = self._bytes
-        is_told = self._subscriptions.tells_all
+        self._windowed_bytes = self._bytes
+        has_acks = self._subscriptions.all_acknowledge
         has_room = {each: window.has_room(size) for each, window in windows.items()}
-        if all(has_room.values()) and (is_told or self._backlog.has_room(size)):
-            if is_told:
+        if all(has_room.values()) and (has_acks or self._backlog.has_room(size)):
+            if has_acks:
                 self._send_to_all(tail, shared)
             else:
                 self._send_tracked(tail, size + since)
-            self._settle_at = self._bytes + (STEP_BYTES if is_told else BACKLOG_STEP_BYTES)
-            taking = windows
+            self._full_path_at = self._bytes + (ACK_STEP_BYTES if has_acks else BACKLOG_STEP_BYTES)
+            receivers = windows
         else:
-            self._settle_at = 0  # check each message until all have room again
-            taking = {each: window for each, window in windows.items() if has_room[each]}
+            self._full_path_at = 0  # check each message until all have room again
+            receivers = {each: window for each, window in windows.items() if has_room[each]}
             for each, window in windows.items():
-                if each in taking:
+                if each in receivers:
                     is_shared = shared is not None and each in self._shared_readers()
                     chosen = shared if is_shared and shared is not None else tail
                     self._send_parts(self._subscriptions.hellos[each], chosen)
                 else:
-                    window.missed()
-        for window in taking.values():
+                    window.note_drop()
+        for window in receivers.values():
             window.sent(self._count, size)
         now = time.monotonic()
         for each, window in windows.items():
-            if window.is_to_ask(now, has_room=has_room[each]):
+            if window.should_request_ack(now, has_room=has_room[each]):
                 self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
@@ -473,21 +483,21 @@ class NativePublisher(GreetedPublisher):
 
     # ---- subscriptions
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         """Send pending messages when due, and read subscriptions."""
         with self._lock:
             if not self.is_closed or self._seen:
                 self._read_subscriptions()
-            again_s = self._batch.look_again_s(_time_ns())
-            if not again_s:
+            wait_s = self._batch.next_check_s(_time_ns())
+            if not wait_s:
                 self.flush()
-                again_s = self._batch.goes_on_s
-            if again_s:
-                return Rest(due=now + again_s)
-            count, self._served = self._served, self._count
+                wait_s = self._batch.burst_check_s
+            if wait_s:
+                return PollState(due=now + wait_s)
+            count, self._count_at_check = self._count_at_check, self._count
             # While another thread publishes without reading subscriptions, this thread keeps checking.
-            self._io_comes = self._io_comes and count != self._count and not self.is_closed
-            return Rest(due=now + _SERVE_S) if self._io_comes else Rest()
+            self._is_io_scheduled = self._is_io_scheduled and count != self._count and not self.is_closed
+            return PollState(due=now + _IO_CHECK_S) if self._is_io_scheduled else PollState()
 
     def _read_subscriptions(self) -> None:
         # Call with the lock held. Reads until the socket is empty.
@@ -497,18 +507,18 @@ class NativePublisher(GreetedPublisher):
             # Before the echo: a subscriber that received it must already be counted.
             self.subscribers = len(self._seen)
             # a connected subscriber may leave without being reported as missing
-            self._waited.difference_update(self._seen)
+            self._expected.difference_update(self._seen)
             self.is_heard = self._subscriptions.is_there
             self._batch.allow(reads_batches=self._subscriptions.reads_batches)
             if own is not None:
                 self._greet(own)
             self._changed.notify_all()
-            if self._settle_at == 0:
-                self._tell_what_was_missed()
+            if self._full_path_at == 0:
+                self._notify_drops()
 
-    def _tell_what_was_missed(self) -> None:
+    def _notify_drops(self) -> None:
         for each, window in self._subscriptions.windows.items():
-            if window.is_to_tell():
+            if window.should_notify():
                 self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
 
     def _greet(self, own: bytes) -> None:
@@ -542,17 +552,17 @@ class NativePublisher(GreetedPublisher):
         """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
+                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
                     self._bye()  # a full queue drops the bye like any message
             if self._seen:
-                owed = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
-                if any(owed):  # otherwise only the bye is missing
+                undelivered = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
+                if any(undelivered):  # otherwise only the bye is missing
                     _logger.warning(
                         "'%s' was closed before %d subscriber(s) received everything: "
                         "up to %d messages not delivered",
                         self.spec.topic,
-                        sum(map(bool, owed)),
-                        max(owed),
+                        sum(map(bool, undelivered)),
+                        max(undelivered),
                     )
                 self._subscriptions.forget()
                 self.subscribers = 0

@@ -12,22 +12,20 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.sockets import CONNECT_MS, Refusals, Socket, wait_until
+from nep.backends.zeromq.sockets import CONNECT_MS, RejectionLog, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
 from nep.protocol.encoding import call_of_view, decode_answer, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 
-__all__ = ["PendingCall", "ReceivedAnswer", "RpcClient", "Then"]
-
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 50
 """Maximum number of replies read at once, before other sockets are served."""
-_AGAIN_S = 0.5
+_RESEND_S = 0.5
 """Interval to resend a request without a reply: it may have gone to a master that was just ending."""
-_MOST_CALLS = 256
+_MAX_CALLS = 256
 
 Then = Callable[[Reply], None]
 
@@ -65,7 +63,7 @@ class RpcClient:
         self._calls: dict[int, PendingCall] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
-        self.refusals = Refusals()
+        self.refusals = RejectionLog()
         self.has_more = False
         """True if `read` left messages unread."""
         self.is_connected = False
@@ -80,16 +78,16 @@ class RpcClient:
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
             socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS)
         self.endpoint = ""
-        """Endpoint of the connection; "" before `lead_to`."""
+        """Endpoint of the connection; "" before `connect`."""
         self.fd = int(socket.getsockopt(zmq.FD))
 
     @property
-    def is_asked(self) -> bool:
+    def has_waiting_calls(self) -> bool:
         """True if a thread waits for a reply."""
         with self._changed:
             return any(call.is_waited for call in self._calls.values())
 
-    def lead_to(self, address: str) -> None:
+    def connect(self, address: str) -> None:
         """Connect to `address` instead of the previous one. Callable from any thread."""
         with self._changed:
             if self._is_closed or self.endpoint == endpoint_of(address):
@@ -100,7 +98,7 @@ class RpcClient:
             self._socket.connect(self.endpoint)
         self._after_use()
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect, because the local address has changed or the handshake failed."""
         with self._changed:
             if self._is_closed or not self.endpoint:
@@ -155,7 +153,7 @@ class RpcClient:
         try:
             reply = decode_answer(view)[1]
         except WireError as error:
-            self._refuse(error)
+            self._reject(error)
             raise RequestRefusedError(
                 _("the master's answer cannot be read: {reason}").format(reason=error.reason)
             ) from error
@@ -175,7 +173,7 @@ class RpcClient:
         answers: list[ReceivedAnswer] = []
         events = 0
         with self._changed:
-            while not (many := len(answers) >= _READ_MAX):
+            while not (has_more := len(answers) >= _READ_MAX):
                 events = self._events()
                 if events & zmq.POLLIN:
                     answer = self._read_one()
@@ -183,7 +181,7 @@ class RpcClient:
                         answers.append(answer)
                 elif not self._flush():  # zmq_send may consume input
                     break
-            self.has_more = many
+            self.has_more = has_more
             self.is_connected = bool(events & zmq.POLLOUT)
         return answers
 
@@ -206,7 +204,7 @@ class RpcClient:
             if self._is_closed:
                 return call
             self._calls[number] = call
-            if len(self._calls) > _MOST_CALLS:
+            if len(self._calls) > _MAX_CALLS:
                 self._drop_oldest()
             self._flush()
             events = self._events()
@@ -240,17 +238,17 @@ class RpcClient:
 
     def _read_one(self) -> ReceivedAnswer | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
-        asked = call_of_view(body)
-        if asked is not None:
-            looking = self._calls.pop(asked, None)
-            if looking is not None:  # otherwise its request has timed out
-                looking.view = body
+        view_number = call_of_view(body)
+        if view_number is not None:
+            graph_call = self._calls.pop(view_number, None)
+            if graph_call is not None:  # otherwise its request has timed out
+                graph_call.view = body
                 self._changed.notify_all()
             return None
         try:
             number, answer = decode_answer(body)
         except WireError as error:
-            self._refuse(error)
+            self._reject(error)
             return None
         call = self._calls.pop(number, None)
         if call is None or isinstance(answer, Push):
@@ -259,7 +257,7 @@ class RpcClient:
         self._changed.notify_all()
         return ReceivedAnswer(answer, call.then)
 
-    def _refuse(self, error: WireError) -> None:
+    def _reject(self, error: WireError) -> None:
         if self.refusals.add(error.reason):
             _logger.warning(
                 "malformed message from the master at '%s' (%d so far): %s",
@@ -274,5 +272,5 @@ class RpcClient:
 
 def _left(started: float, timeout_s: float | None) -> float:
     if timeout_s is None:
-        return _AGAIN_S
-    return max(0.0, min(_AGAIN_S, started + timeout_s - time.monotonic()))
+        return _RESEND_S
+    return max(0.0, min(_RESEND_S, started + timeout_s - time.monotonic()))

@@ -22,30 +22,8 @@ from nep.system.addresses import endpoint_of, host_of, in_numbers, is_endpoint, 
 from nep.system.descriptors import check_room
 from nep.system.log_rarely import is_logged
 
-__all__ = [
-    "CONNECT_MS",
-    "LOOPBACK",
-    "ORIGINAL_PORTS",
-    "SHORT_WAIT_S",
-    "SILENT_MS",
-    "FarConnection",
-    "Part",
-    "Refusals",
-    "bind",
-    "bind_free_port",
-    "connect",
-    "host_towards",
-    "is_far",
-    "keep_alive",
-    "receive_mark",
-    "send_mark",
-    "sendable",
-    "wait_shortly",
-    "wait_until",
-]
-
 _logger = logging.getLogger("nep")
-_TOLD_S = 5.0
+_REPORT_S = 5.0
 
 Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
@@ -55,10 +33,10 @@ SHORT_WAIT_S = 0.005
 faster: a timer that ends before the kernel's next tick costs more than the wait.
 """
 _SLICE_S = 0.1
-_HELD = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
+_IN_USE_ERRORS = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
 """Errors of bind that mean that the address exists but is in use."""
-_MOST = 50_000
-_LEAST = 32
+_SEND_HIGH_WATER_MARK = 50_000
+_IMAGE_HIGH_WATER_MARK = 32
 _PORT_FILES = 2
 SILENT_MS = 15_000
 """Milliseconds without an acknowledgement of sent data after which a connection to another computer is
@@ -73,11 +51,11 @@ _TcpInfo = struct.Struct("=2xBB52xI")
 """Fields of Linux's `tcp_info`: retransmissions, window probes, and milliseconds since the last
 acknowledgement.
 """
-_TRIES = 3
+_MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
-class Refusals:
+class RejectionLog:
     """Count of rejected inputs, with the newest reason. Not thread-safe: guarded by the owner."""
 
     def __init__(self) -> None:
@@ -92,27 +70,27 @@ class Refusals:
         self._last_at = time.monotonic()
         return is_logged(self.count)
 
-    def told(self) -> str:
+    def recent_message(self) -> str:
         """Return the newest reason and the count, or "" if nothing was rejected in the last seconds."""
-        if not self.count or time.monotonic() - self._last_at > _TOLD_S:
+        if not self.count or time.monotonic() - self._last_at > _REPORT_S:
             return ""
         return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
 
-def send_mark(owner: Socket) -> None:
+def set_send_high_water_mark(owner: Socket) -> None:
     """Set the high-water mark for sending. Call before bind: libzmq ignores changes for open connections.
 
     The bytes are bounded by `byte_window`.
     """
-    owner.setsockopt(zmq.SNDHWM, _MOST)
+    owner.setsockopt(zmq.SNDHWM, _SEND_HIGH_WATER_MARK)
 
 
-def receive_mark(codec: str) -> int:
+def receive_high_water_mark(codec: str) -> int:
     """Return the high-water mark for receiving. A small one suffices: the I/O thread empties the socket."""
-    return _LEAST if codec == "image" else 1000
+    return _IMAGE_HIGH_WATER_MARK if codec == "image" else 1000
 
 
-def wait_shortly(owner: Socket) -> None:
+def set_receive_timeout(owner: Socket) -> None:
     """Let a blocking receive time out after `SHORT_WAIT_S` seconds."""
     owner.setsockopt(zmq.RCVTIMEO, round(SHORT_WAIT_S * 1000))
 
@@ -136,7 +114,7 @@ def bind(owner: Socket, address: str) -> str:
     try:
         owner.bind(endpoint_of(address))
     except zmq.ZMQError as error:
-        raise AddressInUseError(address, is_own=error.errno in _HELD) from error
+        raise AddressInUseError(address, is_own=error.errno in _IN_USE_ERRORS) from error
     return owner.getsockopt_string(zmq.LAST_ENDPOINT)
 
 
@@ -154,7 +132,7 @@ def connect(owner: Socket, address: str) -> str:
     return endpoint
 
 
-def host_towards(address: str) -> str | None:
+def local_address_towards(address: str) -> str | None:
     """Return the local address used to reach a master at `address`, or None without a route."""
     if is_loopback(address):
         return LOOPBACK
@@ -250,19 +228,19 @@ class FarConnection:
         if not self.can_tell:
             return False
         try:
-            with _same(self.fd) as connection:
+            with _duplicated(self.fd) as connection:
                 if connection.getpeername() != self.peer:
                     return False
-                told = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TcpInfo.size)
-            resent, asked, last_answer_ms = _TcpInfo.unpack(told)
+                tcp_info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TcpInfo.size)
+            resent, asked, last_answer_ms = _TcpInfo.unpack(tcp_info)
         except (OSError, struct.error):
             return False
-        return bool(max(resent, asked) >= _TRIES and last_answer_ms >= SILENT_MS)
+        return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENT_MS)
 
     def end(self) -> None:
         """Close the connection, if it still exists; libzmq then releases its queue."""
         try:
-            with _same(self.fd) as connection:
+            with _duplicated(self.fd) as connection:
                 if connection.getpeername() == self.peer:
                     connection.shutdown(socket.SHUT_RDWR)
         except OSError as error:
@@ -270,12 +248,12 @@ class FarConnection:
 
 
 def _peer_of(fd: int) -> tuple[str, int] | None:
-    with _same(fd) as connection:
+    with _duplicated(fd) as connection:
         peer = connection.getpeername()
     return (str(peer[0]), int(peer[1])) if connection.family == socket.AF_INET else None
 
 
-def _same(fd: int) -> socket.socket:
+def _duplicated(fd: int) -> socket.socket:
     # Duplicates the descriptor, because libzmq may close the original at any moment.
     own = os.dup(fd)
     try:

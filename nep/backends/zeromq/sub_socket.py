@@ -17,9 +17,16 @@ import zmq
 
 from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.byte_window import WINDOW_BYTES
-from nep.backends.zeromq.loss import HeardPublisher, HeardPublishers
+from nep.backends.zeromq.loss import PublisherTracker, TrackedPublisher
 from nep.backends.zeromq.shared.payloads import SharedSources
-from nep.backends.zeromq.sockets import Refusals, Socket, is_far, keep_alive, receive_mark, wait_shortly
+from nep.backends.zeromq.sockets import (
+    RejectionLog,
+    Socket,
+    is_far,
+    keep_alive,
+    receive_high_water_mark,
+    set_receive_timeout,
+)
 from nep.errors import DecodeError, WireError
 from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for, codec_numbered
@@ -49,9 +56,7 @@ from nep.protocol.wire import (
 )
 from nep.system.addresses import is_endpoint
 
-__all__ = ["CarefulParser", "Into", "SubSocket"]
-
-Into = list[Message] | deque[Message]
+MessageBuffer = list[Message] | deque[Message]
 """Containers to which messages are appended."""
 
 _NO_COPY_BYTES = 8_192
@@ -87,7 +92,7 @@ class CarefulParser:
         self,
         spec: SubscriberSpec,
         hello: bytes,
-        sources: HeardPublishers,
+        sources: PublisherTracker,
         leave: Callable[[int], None],
         tell: Callable[[int, int], None],
         shared: SharedSources | None = None,
@@ -98,7 +103,7 @@ class CarefulParser:
         self._hello = hello
         self._sources = sources
         self._leave = leave
-        self._tell = tell
+        self._acknowledge = tell
         self._shared = shared
 
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
@@ -143,7 +148,7 @@ class CarefulParser:
             if self._shared is not None:
                 self._shared.open(header.publisher, header.size)
         elif source.has_echoed:
-            self._tell(header.publisher, header.seq)
+            self._acknowledge(header.publisher, header.seq)
         else:
             source.has_echoed = True
         if not is_possible:
@@ -208,8 +213,8 @@ class SubSocket:
     """
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
-        self.sources = HeardPublishers()
-        self.refusals = Refusals()
+        self.sources = PublisherTracker()
+        self.refusals = RejectionLog()
         self.fd = int(socket.getsockopt(zmq.FD))
         self._socket = socket
         self._recv: Callable[..., Any] = socket.recv
@@ -218,18 +223,20 @@ class SubSocket:
         self._hello = hello_part(spec.id, spec.topic, batches=True)
         self._id = spec.id
         self._shared = SharedSources(spec.id, self._answer)
-        self._parser = CarefulParser(spec, self._hello, self.sources, self.leave, self._tell, self._shared)
-        self._cut = len(self._topic)
+        self._parser = CarefulParser(
+            spec, self._hello, self.sources, self.leave, self._acknowledge, self._shared
+        )
+        self._topic_length = len(self._topic)
         self.payloads: deque[Any] = deque()
         """See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._run: _Run | None = None
-        self._body = self._cut + HEADER_BYTES
+        self._body = self._topic_length + HEADER_BYTES
         """Offset of the payload in a message of one part."""
         # sizes at which a payload can't be told apart from the first part of the next message
-        self._doubtful = frozenset({0, len(self._topic), len(self._hello)})
-        wait_shortly(socket)
-        socket.setsockopt(zmq.RCVHWM, receive_mark(codec_for(spec.msg_type).name))
+        self._ambiguous_sizes = frozenset({0, len(self._topic), len(self._hello)})
+        set_receive_timeout(socket)
+        socket.setsockopt(zmq.RCVHWM, receive_high_water_mark(codec_for(spec.msg_type).name))
         socket.setsockopt(zmq.SNDHWM, 0)  # libzmq otherwise drops filters beyond 1000 silently
         socket.setsockopt(zmq.SUBSCRIBE, self._topic)
         socket.setsockopt(zmq.SUBSCRIBE, self._hello)
@@ -252,10 +259,10 @@ class SubSocket:
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher (idempotent). Silent publishers that it replaces are removed later."""
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
-        self._replace(remote, endpoint)
+        self._disconnect_replaced(remote, endpoint)
         source = self.sources.listed(remote)
         source.form = 0  # its message type may have changed
-        source.is_lapsed = False
+        source.is_silent = False
         source.ends_at = None
         if endpoint and endpoint not in (source.endpoint, source.refused):
             source.refused = source.problem = ""
@@ -263,9 +270,11 @@ class SubSocket:
                 self._connect(source, endpoint)
             else:
                 other = endpoint.startswith("nanomsg://")
-                self._refuse(source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none"))
+                self._report_problem(
+                    source, endpoint, _("it is one of 'nanomsg'") if other else _("it is none")
+                )
 
-    def _replace(self, remote: RemotePublisher, endpoint: str) -> None:
+    def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
         # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
         for old in self.sources.replaced_by(remote):
             self.sources.closing(old, 0, time.monotonic())
@@ -277,7 +286,7 @@ class SubSocket:
                 self.sources.settle(old)
                 self.leave(old)
 
-    def _connect(self, source: HeardPublisher, endpoint: str) -> None:
+    def _connect(self, source: TrackedPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has a new address, or its master has restarted
             self._disconnect(source.endpoint)
         source.connecting(endpoint)
@@ -285,22 +294,22 @@ class SubSocket:
             keep_alive(self._socket, endpoint)
             self._socket.connect(endpoint)
         except zmq.ZMQError as error:
-            self._refuse(source, endpoint, str(error))
+            self._report_problem(source, endpoint, str(error))
         else:
             source.endpoint = endpoint
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
         for source in self.sources.by_id.values():
             if is_far(source.endpoint):
                 self._connect(source, source.endpoint)
 
     def reconnect(self, publisher: int) -> None:
-        """Connect anew to a publisher that was connected to."""
+        """Disconnect from a connected publisher and connect again."""
         source = self.sources.get(publisher)
         self._connect(source, source.endpoint)
 
-    def _refuse(self, source: HeardPublisher, endpoint: str, why: str) -> None:
+    def _report_problem(self, source: TrackedPublisher, endpoint: str, why: str) -> None:
         # An invalid endpoint is reported, not raised: it must not affect other publishers.
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
@@ -314,7 +323,7 @@ class SubSocket:
     @property
     def problem(self) -> str:
         """Problem of a listed publisher; empty if none."""
-        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_lapsed)
+        listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
     def leave(self, publisher: int) -> None:
@@ -324,18 +333,18 @@ class SubSocket:
         if source is not None and source.endpoint:
             self._disconnect(source.endpoint)
 
-    def _tell(self, publisher: int, seq: int) -> None:
+    def _acknowledge(self, publisher: int, seq: int) -> None:
         # Acknowledges `seq` to a publisher, and assigns it a share of the receive window.
         bound = WINDOW_BYTES // max(1, self.sources.echoing)
-        self._say(read_part(Read(self._id, publisher, seq, bound)))
+        self._send_filter(read_part(Read(self._id, publisher, seq, bound)))
 
     def _answer(self, shares: Shares) -> None:
-        self._say(shares_part(shares))
+        self._send_filter(shares_part(shares))
 
-    def _say(self, said: bytes) -> None:
+    def _send_filter(self, filter_part: bytes) -> None:
         # Reaches all publishers, as a filter that is set and removed at once.
-        self._socket.setsockopt(zmq.SUBSCRIBE, said)
-        self._socket.setsockopt(zmq.UNSUBSCRIBE, said)
+        self._socket.setsockopt(zmq.SUBSCRIBE, filter_part)
+        self._socket.setsockopt(zmq.UNSUBSCRIBE, filter_part)
 
     def _has_more(self) -> bool:
         return bool(self._socket.getsockopt(_RCVMORE))
@@ -348,7 +357,7 @@ class SubSocket:
                 raise
 
     def read_into(
-        self, into: Into, most: int, room: int, *, may_wait: bool = False, first: bytes | None = None
+        self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False, first: bytes | None = None
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
@@ -363,7 +372,7 @@ class SubSocket:
             first: First part, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
-        cut, body = self._cut, self._body
+        cut, body = self._topic_length, self._body
         count, others, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
             while count < most and room > 0:
@@ -414,23 +423,23 @@ class SubSocket:
         self.sources.received += count - others
         return count
 
-    def _read_batch(self, first: bytes, into: Into) -> tuple[int, int]:
+    def _read_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
         # Returns the number of messages, and how many of them aren't counted yet.
         body = self._body
-        form, size, seq, _stamp_ns, publisher = unpack_at(first, self._cut)
+        form, size, seq, _stamp_ns, publisher = unpack_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
         count = int.from_bytes(first[body : body + 4], "little")
         is_next = source and source.last == seq - 1 and source.form | BATCH_FORM == form
         if not (source and is_next and 0 < count <= BATCH_MAX and len(first) == body + size):
-            return self._read_batch_carefully(first, into)
+            return self._read_any_batch(first, into)
         table = table_of(count)
         at = body + table.size
         if at > len(first):
-            return self._read_batch_carefully(first, into)
+            return self._read_any_batch(first, into)
         numbers = table.unpack_from(first, body)
         sizes = numbers[1 : count + 1]
         if at + sum(sizes) != len(first):
-            return self._read_batch_carefully(first, into)
+            return self._read_any_batch(first, into)
         if self.wants_payloads and not self.payloads and not into:
             raws = [first[at : (at := at + size)] for size in sizes]
             if self._read_payloads(source, seq, publisher, numbers[count + 1 :], raws, into):
@@ -451,12 +460,12 @@ class SubSocket:
 
     def _read_payloads(
         self,
-        source: HeardPublisher,
+        source: TrackedPublisher,
         seq: int,
         publisher: int,
         stamps_ns: tuple[int, ...],
         raws: Sequence[bytes],
-        into: Into,
+        into: MessageBuffer,
     ) -> bool:
         # Decodes all but the first message of a batch. Returns False if one can't be decoded.
         kind = source.kind
@@ -488,7 +497,7 @@ class SubSocket:
 
     def _read_shared(self, first: bytes) -> Message | None:
         # Fast path for shared memory. Returns None to continue on the careful path.
-        form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+        form, size, seq, stamp_ns, publisher = unpack_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
         if (
             not source
@@ -504,9 +513,9 @@ class SubSocket:
         source.last = seq
         return arrived(source.kind, data, stamp_ns, seq, publisher)
 
-    def _read_batch_carefully(self, first: bytes, into: Into) -> tuple[int, int]:
+    def _read_any_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
         if self._has_more():
-            self._carefully(first)
+            self._parse_parts(first)
             return 0, 0
         try:
             messages = self._parser.parse_batch(first)
@@ -516,7 +525,7 @@ class SubSocket:
         into.extend(messages)
         return len(messages), 0
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message, or None if the socket is empty; wait with `may_wait`.
 
         Other messages of its batch are appended to `rest`. Repeats the fast path of `read_into`, because the
@@ -529,7 +538,7 @@ class SubSocket:
         except zmq.Again:
             return None
         if len(first) >= self._body and first.startswith(self._topic):
-            form, size, seq, stamp_ns, publisher = unpack_at(first, self._cut)
+            form, size, seq, stamp_ns, publisher = unpack_at(first, self._topic_length)
             source = self.sources.by_id.get(publisher)
             raw = first[self._body :]
             if source and source.form == form and source.last == seq - 1 and len(raw) == size:
@@ -550,16 +559,21 @@ class SubSocket:
 
     def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         # Asking pyzmq whether a part is the last takes longer than receiving it, so this assumes three parts,
-        # see `_carefully`.
+        # see `_parse_parts`.
         if first != self._topic:
-            return self._carefully(first)
+            return self._parse_parts(first)
         recv, data = self._recv, None
         try:
             head = recv(_DONTWAIT)
             if len(head) == HEADER_BYTES:
                 form, size, seq, stamp_ns, publisher = unpack_quickly(head)
                 source = self.sources.by_id.get(publisher)
-                if source and source.form == form and source.last == seq - 1 and size not in self._doubtful:
+                if (
+                    source
+                    and source.form == form
+                    and source.last == seq - 1
+                    and size not in self._ambiguous_sizes
+                ):
                     data = recv(_DONTWAIT, size < _NO_COPY_BYTES)
                     if len(data) == size:
                         self.sources.received += 1
@@ -569,9 +583,11 @@ class SubSocket:
         except zmq.Again:
             self.refusals.add(_(_TOO_SHORT))
             return None, None
-        return self._carefully(first, head, data)
+        return self._parse_parts(first, head, data)
 
-    def _carefully(self, first: bytes, *got: bytes | zmq.Frame | None) -> tuple[bytes | None, Message | None]:
+    def _parse_parts(
+        self, first: bytes, *got: bytes | zmq.Frame | None
+    ) -> tuple[bytes | None, Message | None]:
         # If a message has fewer than three parts, the last part in `got` is already the first of the next
         # message. It then begins with the topic or the hello, unlike a header, and is returned.
         read = [each for each in got if each is not None]

@@ -26,40 +26,38 @@ from typing import Any, Generic, Protocol, TypeVar
 import zmq
 
 from nep.backends.base import SubscriberSpec, Wakes
-from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.loss import HeardPublishers
-from nep.backends.zeromq.sockets import SHORT_WAIT_S, Refusals, wait_until
-from nep.backends.zeromq.sub_socket import Into, SubSocket
+from nep.backends.zeromq.io_thread import IoThread, PollState
+from nep.backends.zeromq.loss import PublisherTracker
+from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog, wait_until
+from nep.backends.zeromq.sub_socket import MessageBuffer, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
 from nep.messages.queue import AHEAD_MOST, Inbox, ReadAhead
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-__all__ = ["NativeReadable", "NativeSubscriber", "ReadOneByOne", "Readable", "SocketSubscriber"]
-
 _AHEAD_BYTES = 2**18
 
 _logger = logging.getLogger("nep")
 _POLLIN = int(zmq.POLLIN)
-_NEVER = math.inf
+_INFINITE = math.inf
 LEASE_S = 0.02
-_WAITING_S = 0.1
+_WAITER_CHECK_S = 0.1
 """Interval at which the I/O thread checks whether a reader still waits."""
-_LATE_S = _WAITING_S + LEASE_S
+_MAX_IO_DELAY_S = _WAITER_CHECK_S + LEASE_S
 """A read wakes the I/O thread only if that would come later than this: not for every message."""
 _BATCH_S = 0.005
 """Sinks and inboxes are filled at most 200 times a second."""
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
-_FEW = 50
+_HANDSHAKE_BATCH = 50
 
 
 class Readable(Protocol):
     """Socket that returns messages. Guarded by the subscriber's lock."""
 
     fd: int
-    refusals: Refusals
+    refusals: RejectionLog
     """Rejected messages."""
 
     @property
@@ -78,7 +76,7 @@ class Readable(Protocol):
     def has_input(self) -> bool:
         """True if a message can be read. Also processes connects and disconnects."""
 
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+    def read_into(self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
         Args:
@@ -88,7 +86,7 @@ class Readable(Protocol):
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`.
 
         Other messages of its batch are appended to `rest`.
@@ -101,14 +99,14 @@ class Readable(Protocol):
         """Close the socket."""
 
 
-class ReadOneByOne:
+class UnbatchedReader:
     """Implements `Readable.read_into` for libraries without batches."""
 
-    def read(self, rest: Into, *, may_wait: bool = False) -> Message | None:
+    def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message, see `Readable.read`."""
         raise NotImplementedError
 
-    def read_into(self, into: Into, most: int, room: int, *, may_wait: bool = False) -> int:
+    def read_into(self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False) -> int:
         """Read messages one by one, see `Readable.read_into`."""
         count = 0
         while count < most and room > 0:
@@ -124,7 +122,7 @@ class ReadOneByOne:
 class NativeReadable(Readable, Protocol):
     """Socket connected to the publishers that the master lists."""
 
-    sources: HeardPublishers
+    sources: PublisherTracker
     """Publishers of the topic."""
 
     def connect(self, remote: RemotePublisher) -> None:
@@ -133,7 +131,7 @@ class NativeReadable(Readable, Protocol):
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
 
     def reconnect(self, publisher: int) -> None:
@@ -157,7 +155,7 @@ class SocketSubscriber(Generic[R]):
         self._readable = readable
         self._read = readable.read
         self._read_into = readable.read_into
-        self._keeps_all = spec.keep == "all"
+        self._queues_all = spec.keep == "all"
         self.ready: deque[Message] = deque()
         """Messages read ahead, before those of the inbox. Pop from the left, without the lock."""
         self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
@@ -165,14 +163,14 @@ class SocketSubscriber(Generic[R]):
         """See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._ahead = ReadAhead(spec.max_messages)
-        self._moves = spec.max_messages >= 10 * AHEAD_MOST
+        self._may_exceed_bound = spec.max_messages >= 10 * AHEAD_MOST
         """True if the queue is large enough to exceed its bound by a few messages."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._leased_until = 0.0
-        self._io_comes_at = _NEVER
-        self._is_brisk = False
-        self._wanted: deque[None] = deque()
+        self._io_check_at = _INFINITE
+        self._is_hot = False
+        self._lock_requests: deque[None] = deque()
         self._waiters: list[Wakes] = []
         self._waker: Waker | None = None
         self._woken: set[Wakes] = set()
@@ -185,9 +183,9 @@ class SocketSubscriber(Generic[R]):
 
     def poll(self) -> Message | None:
         """Return the next message, or None. Reads in the calling thread."""
-        self._wanted.append(None)
+        self._lock_requests.append(None)
         with self._lock:
-            self._wanted.pop()
+            self._lock_requests.pop()
             return None if self.is_closed else self._next()
 
     def receive(self, timeout_s: float) -> Message | None:
@@ -195,12 +193,12 @@ class SocketSubscriber(Generic[R]):
         with self._lock:
             if self.is_closed:
                 return None
-            may_wait = self._is_brisk and not self._wanted and timeout_s >= SHORT_WAIT_S
+            may_wait = self._is_hot and not self._lock_requests and timeout_s >= SHORT_WAIT_S
             message = self._next(may_wait=may_wait)
             if message is not None:
-                self._is_brisk = True
+                self._is_hot = True
                 return message
-            self._is_brisk = False
+            self._is_hot = False
             # Under the same lock: the socket is empty, so its descriptor signals the next message.
             waker, self._waker = self._waker or Waker(), None
             self._waiters.append(waker)
@@ -226,7 +224,7 @@ class SocketSubscriber(Generic[R]):
                 return None
             message = self._next()
             # after a longer wait the short one would only delay each message
-            self._is_brisk = message is not None and time.monotonic() - began < SHORT_WAIT_S
+            self._is_hot = message is not None and time.monotonic() - began < SHORT_WAIT_S
             return message
 
     # ---- statistics
@@ -252,7 +250,7 @@ class SocketSubscriber(Generic[R]):
 
     def counts(self) -> SubscriberCount:
         """Return the statistics for a renewal."""
-        problem = self._problem or self._readable.refusals.told() or self._readable.problem
+        problem = self._problem or self._readable.refusals.recent_message() or self._readable.problem
         lost = None if self.lost is None else as_count(self.lost)
         return SubscriberCount(self.spec.id, as_count(self.received), lost, problem)
 
@@ -260,7 +258,7 @@ class SocketSubscriber(Generic[R]):
 
     def enter_wait(self, waker: Wakes) -> bool:
         """Prepare to poll the descriptor; return False if a message is available."""
-        self._wanted.append(None)  # as `_turn` does, but faster
+        self._lock_requests.append(None)  # as `_requested_lock` does, but faster
         try:
             with self._lock:
                 if (
@@ -274,7 +272,7 @@ class SocketSubscriber(Generic[R]):
                 self._waiters.append(waker)
                 return True
         finally:
-            self._wanted.pop()
+            self._lock_requests.pop()
 
     def leave_wait(self, waker: Wakes) -> None:
         """End a wait that `enter_wait` began."""
@@ -293,11 +291,11 @@ class SocketSubscriber(Generic[R]):
         try:
             while True:
                 with self._lock:
-                    count = 0 if self.is_closed else self._fill(_FEW)
+                    count = 0 if self.is_closed else self._fill(_HANDSHAKE_BATCH)
                     left = deadline - time.monotonic()
                     if is_met() or left <= 0.0 or self.is_closed:
                         return is_met()
-                if count == _FEW:
+                if count == _HANDSHAKE_BATCH:
                     continue  # the awaited notice is behind the messages of a busy publisher
                 polled = [(self.fd, _POLLIN), (waker.fd, _POLLIN)]
                 zmq.zmq_poll(polled, int(min(left, 0.1) * 1000) + 1)
@@ -308,23 +306,23 @@ class SocketSubscriber(Generic[R]):
 
     # ---- in the I/O thread
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         """Move available messages into the inbox or the sink, unless a reader holds the lease."""
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
             # without the lock, which a waiting reader holds; a stale value is harmless
-            self._io_comes_at = due = now + _WAITING_S if self._waiters else self._leased_until
-            return Rest(is_quiet=True, due=due)
-        with self._turn():
+            self._io_check_at = due = now + _WAITER_CHECK_S if self._waiters else self._leased_until
+            return PollState(pause_reading=True, due=due)
+        with self._requested_lock():
             if self.is_closed:
-                return Rest(is_quiet=True)
+                return PollState(pause_reading=True)
             if self._waiters or now < self._leased_until:
                 # a reader in a long wait needs fewer checks than one that may stop at any moment
-                self._io_comes_at = max(self._leased_until, now + LEASE_S)
+                self._io_check_at = max(self._leased_until, now + LEASE_S)
                 if self._waiters and now >= self._leased_until:
-                    self._io_comes_at = now + _WAITING_S
-                return Rest(is_quiet=True, due=self._io_comes_at)
-            self._io_comes_at = _NEVER
+                    self._io_check_at = now + _WAITER_CHECK_S
+                return PollState(pause_reading=True, due=self._io_check_at)
+            self._io_check_at = _INFINITE
             batch: list[Message] = []
             if sink is None:
                 count = self._fill()
@@ -337,13 +335,13 @@ class SocketSubscriber(Generic[R]):
                 sink(batch)
             except BaseException:  # also SystemExit: the sinks' thread continues with the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
-        return Rest(is_quiet=True, due=now + _BATCH_S) if count or batch else Rest()
+        return PollState(pause_reading=True, due=now + _BATCH_S) if count or batch else PollState()
 
     # ---- closing
 
     def close(self) -> None:
         """Unregister and discard unread messages."""
-        with self._turn():
+        with self._requested_lock():
             if self.is_closed:
                 return
             self.is_closed = True
@@ -367,19 +365,19 @@ class SocketSubscriber(Generic[R]):
         self.ready.clear()
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
+    def _requested_lock(self) -> Iterator[None]:
         # Takes the lock for all but readers; no reader waits in the socket while the lock is wanted.
-        self._wanted.append(None)
+        self._lock_requests.append(None)
         try:
             with self._lock:
                 yield
         finally:
-            self._wanted.pop()
+            self._lock_requests.pop()
 
     def restore(self) -> None:
         """Convert the remaining payloads back to messages, see `GivesPayloads`."""
         if self._source is not None:
-            with self._turn():
+            with self._requested_lock():
                 self._source.restore(self.ready)
 
     # ---- with the lock held
@@ -388,7 +386,7 @@ class SocketSubscriber(Generic[R]):
         if self._source is not None:
             if self.payloads:
                 self._source.restore(self.ready)
-            self._source.wants_payloads = self.wants_payloads and self._moves
+            self._source.wants_payloads = self.wants_payloads and self._may_exceed_bound
         try:
             return self._next_message(may_wait=may_wait)
         finally:
@@ -398,12 +396,12 @@ class SocketSubscriber(Generic[R]):
     def _next_message(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
-        if self._io_comes_at > now + _LATE_S:
+        if self._io_check_at > now + _MAX_IO_DELAY_S:
             # After reading one message of several the descriptor may not signal the others, so the I/O thread
             # must check when the lease ends. It is asked once for many reads.
-            self._io_comes_at = self._leased_until
+            self._io_check_at = self._leased_until
             self._io.serve_soon(self)
-        if self._keeps_all and not self.ready and not self._inbox.messages:
+        if self._queues_all and not self.ready and not self._inbox.messages:
             span, self._read_at = now - self._read_at, now
             if span > self._ahead.span_s:
                 if self._ahead.now > 1:
@@ -415,9 +413,9 @@ class SocketSubscriber(Generic[R]):
                 self._ahead.begin()
         if self.ready:
             return self._bounded(self.ready.popleft())
-        if not self._keeps_all:
+        if not self._queues_all:
             self._fill()
-        elif self._moves and self._inbox.messages:
+        elif self._may_exceed_bound and self._inbox.messages:
             self._inbox.move(self.ready, AHEAD_MOST, _AHEAD_BYTES)
             return self.ready.popleft()
         return self._inbox.take()
@@ -443,7 +441,7 @@ class SocketSubscriber(Generic[R]):
         return count
 
     def _fill_batch(self, batch: list[Message]) -> int:
-        if self._keeps_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
+        if self._queues_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
             return self._read_into(batch, _BATCH_MESSAGES, _BATCH_BYTES)
         count = self._fill()
         batch += self._inbox.take_all()
@@ -474,7 +472,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
     @property
     def has_publishers(self) -> bool:
         """True if it has any publishers, including silent ones."""
-        with self._turn():
+        with self._requested_lock():
             return bool(self._readable.sources.by_id)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
@@ -509,20 +507,20 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
 
         The notification of a close is read in another thread than the reply and may be processed first.
         """
-        with self._turn():
+        with self._requested_lock():
             closed, self._closed_early = self._closed_early or set(), None
             self._connect(each for each in remotes if each.publisher.id not in closed)
 
     def expect_all_of(self, publisher: int) -> None:
         """Count losses from the first message of a publisher that was created after this subscriber."""
-        with self._turn():
+        with self._requested_lock():
             is_registered = self._closed_early is None
             if is_registered and not self.is_closed:
                 self._readable.sources.expect_all_of(publisher)
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to publishers (idempotent)."""
-        with self._turn():
+        with self._requested_lock():
             self._connect(remotes)
 
     def _connect(self, remotes: Iterable[RemotePublisher]) -> None:
@@ -532,13 +530,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.connect(remote)
             self._after_use()
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to publishers on other computers, after the address of this one has changed."""
-        with self._turn():
+        with self._requested_lock():
             if not self.is_closed:
                 self._fill()
                 self._wake_waiters()
-                self._readable.connect_again()
+                self._readable.reconnect()
                 self._after_use()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
@@ -546,14 +544,14 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         known = tuple(remotes)
         self.connect(known)
         listed = {remote.publisher.id for remote in known}
-        with self._turn():
+        with self._requested_lock():
             for each, source in self._readable.sources.items():
                 if each not in listed and source.remote is not None:
-                    source.is_lapsed = True
+                    source.is_silent = True
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """Process the removal of a publisher. Its connection stays until the bye, or until it is replaced."""
-        with self._turn():
+        with self._requested_lock():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
             if is_closed:
@@ -563,7 +561,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, by node id."""
-        with self._turn():
+        with self._requested_lock():
             self._readable.sources.correct(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
@@ -571,7 +569,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
 
         `last_seqs` has the newest sequence numbers known to the master.
         """
-        with self._turn():
+        with self._requested_lock():
             if self.is_closed:
                 return
             sources = self._readable.sources

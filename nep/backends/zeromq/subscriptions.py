@@ -7,10 +7,8 @@ from collections.abc import Callable
 
 from nep.backends.zeromq.byte_window import SendWindow
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import FarConnection, Refusals
+from nep.backends.zeromq.sockets import FarConnection, RejectionLog
 from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topic_part
-
-__all__ = ["MAX_SUBSCRIBERS", "Subscriptions"]
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
@@ -29,7 +27,7 @@ class Subscriptions:
         """Message counts at the hello, by the id of connected subscribers."""
         self.hellos: dict[int, bytes] = {}
         """First part that addresses one subscriber alone, by its id."""
-        self.apart: dict[bytes, int] = {}
+        self.legacy_filters: dict[bytes, int] = {}
         """Number of subscribers by plain filter, for those that don't accept messages of one part."""
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
@@ -37,7 +35,7 @@ class Subscriptions:
         self._far: dict[int, FarConnection] = {}
         """Connections of subscribers on other computers."""
         self.shared: SharedPayloads | None = None
-        self.refusals = Refusals()
+        self.refusals = RejectionLog()
         self._id = publisher
         self._name = topic
         self._topic = topic_part(topic)
@@ -45,17 +43,17 @@ class Subscriptions:
     @property
     def is_there(self) -> bool:
         """True if any subscriber is connected."""
-        return bool(self.seen or self.apart)
+        return bool(self.seen or self.legacy_filters)
 
     @property
     def reads_batches(self) -> bool:
         """True if all current subscribers accept batches."""
-        return not self.apart and not self._without_batches
+        return not self.legacy_filters and not self._without_batches
 
     @property
-    def tells_all(self) -> bool:
+    def all_acknowledge(self) -> bool:
         """True if all current subscribers acknowledge messages."""
-        return not self.apart and len(self.windows) == len(self.seen)
+        return not self.legacy_filters and len(self.windows) == len(self.seen)
 
     def forget(self) -> None:
         """Remove all subscribers that said hello."""
@@ -66,7 +64,7 @@ class Subscriptions:
         self._without_batches.clear()
 
     def note(
-        self, event: bytes, count: int, came_by: Callable[[], FarConnection | None] = lambda: None
+        self, event: bytes, count: int, connection_of: Callable[[], FarConnection | None] = lambda: None
     ) -> bytes | None:
         """Process a subscription event after `count` messages.
 
@@ -78,44 +76,44 @@ class Subscriptions:
         Returns:
             First part that addresses a subscriber to greet, or None.
         """
-        is_wanted, what = event[:1] == b"\1", event[1:]
-        hello = parse_hello(what)
+        is_wanted, subscription = event[:1] == b"\1", event[1:]
+        hello = parse_hello(subscription)
         if hello is None:
-            if not self._is_answer(what, is_wanted=is_wanted):
-                self._note_filter(what, is_wanted=is_wanted)
+            if not self._handle_answer(subscription, is_wanted=is_wanted):
+                self._update_filters(subscription, is_wanted=is_wanted)
             return None
         if hello.topic != self._name:
             return None  # a subscriber of this port's previous owner
         if is_wanted:
-            own = self._note_hello(hello, what, count)
+            own = self._add_subscriber(hello, subscription, count)
             if own is not None:
-                self._note_connection(hello.subscriber, came_by())
+                self._update_connection(hello.subscriber, connection_of())
             return own
-        self._leave(hello.subscriber)
+        self._remove_subscriber(hello.subscriber)
         return None
 
-    def _is_answer(self, what: bytes, *, is_wanted: bool) -> bool:
+    def _handle_answer(self, subscription: bytes, *, is_wanted: bool) -> bool:
         # Returns True for acknowledgements and replies to offers, which it processes.
-        read, shares = parse_read(what), parse_shares(what)
+        read, shares = parse_read(subscription), parse_shares(subscription)
         if read is not None:
             if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
-                self.windows[read.subscriber].read(read.seq, read.bound_bytes)
+                self.windows[read.subscriber].acknowledge(read.seq, read.bound_bytes)
         elif shares is not None:
             own = is_wanted and shares.publisher == self._id and shares.subscriber in self.windows
             if own and self.shared is not None:
                 self.shared.note(shares)
         return read is not None or shares is not None
 
-    def _note_hello(self, hello: Hello, what: bytes, count: int) -> bytes | None:
+    def _add_subscriber(self, hello: Hello, subscription: bytes, count: int) -> bytes | None:
         if len(self.seen) >= MAX_SUBSCRIBERS and hello.subscriber not in self.seen:
-            self._refuse(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
+            self._reject(f"a hello beyond the limit of {MAX_SUBSCRIBERS} subscribers")
             return None
         if hello.one_part:  # its plain filter was counted before
-            left = self.apart.pop(self._topic, 0) - 1
+            left = self.legacy_filters.pop(self._topic, 0) - 1
             if left > 0:
-                self.apart[self._topic] = left
+                self.legacy_filters[self._topic] = left
         self.seen[hello.subscriber] = count
-        self.hellos[hello.subscriber] = what
+        self.hellos[hello.subscriber] = subscription
         self.windows.pop(hello.subscriber, None)
         if self.shared is not None:
             self.shared.forget(hello.subscriber)
@@ -124,9 +122,9 @@ class Subscriptions:
             self._without_batches.add(hello.subscriber)
         if hello.tells:
             self.windows[hello.subscriber] = SendWindow()  # a new connection: nothing is in flight
-        return what
+        return subscription
 
-    def _note_connection(self, subscriber: int, connection: FarConnection | None) -> None:
+    def _update_connection(self, subscriber: int, connection: FarConnection | None) -> None:
         # After a hello over a new connection the previous one is abandoned.
         before = self._far.pop(subscriber, None)
         if connection is not None:
@@ -140,7 +138,7 @@ class Subscriptions:
             if connection.is_silent():
                 connection.end()
 
-    def _leave(self, subscriber: int) -> None:
+    def _remove_subscriber(self, subscriber: int) -> None:
         self.seen.pop(subscriber, None)
         self.hellos.pop(subscriber, None)
         self.windows.pop(subscriber, None)
@@ -149,16 +147,16 @@ class Subscriptions:
         if self.shared is not None:
             self.shared.forget(subscriber)
 
-    def _note_filter(self, what: bytes, *, is_wanted: bool) -> None:
+    def _update_filters(self, subscription: bytes, *, is_wanted: bool) -> None:
         # XPUB_VERBOSE reports every subscribe, but only the last unsubscribe.
-        if not self._topic.startswith(what):
-            self._refuse(f"an invalid subscription of {len(what)} bytes")
+        if not self._topic.startswith(subscription):
+            self._reject(f"an invalid subscription of {len(subscription)} bytes")
             return
         if is_wanted:
-            self.apart[what] = self.apart.get(what, 0) + 1
+            self.legacy_filters[subscription] = self.legacy_filters.get(subscription, 0) + 1
         else:
-            self.apart.pop(what, None)
+            self.legacy_filters.pop(subscription, None)
 
-    def _refuse(self, reason: str) -> None:
+    def _reject(self, reason: str) -> None:
         if self.refusals.add(reason):
-            _logger.info("'%s' received %s", self._name, self.refusals.told())
+            _logger.info("'%s' received %s", self._name, self.refusals.recent_message())

@@ -29,7 +29,7 @@ from nep.backends.services import (
     SurveyTransport,
 )
 from nep.backends.zeromq.checked_sub_socket import CHECKED_TYPES, CheckedSubSocket
-from nep.backends.zeromq.io_thread import IoThread, Served, SharedContext, shared_context
+from nep.backends.zeromq.io_thread import IoThread, Pollable, SharedContext, shared_context
 from nep.backends.zeromq.legacy import OriginalPublisher, OriginalSubscriber, OriginalSubSocket, attach
 from nep.backends.zeromq.master_session import MasterSession, SessionPublisher
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
@@ -47,18 +47,16 @@ from nep.system.descriptors import check_room
 from nep.system.forks import give_up, watch
 from nep.system.wakeup import Waker
 
-__all__ = ["DIRECT_WAIT_S", "MasteredPublisher", "OwnedPublisher", "ZeromqTransport", "closed_on_error"]
-
 DIRECT_WAIT_S = 0.3
 """Seconds to wait for a peer of a direct connection; without a master it is unknown whether there is one."""
 _LEAVE_S = 0.3
 _THREAD_FILES = 4
-_MOST_SESSIONS = 8
+_MAX_IDLE_SESSIONS = 8
 """Maximum number of sessions kept without registrations."""
 _Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
 
 
-class OwnedPublisher(PublisherTransport, Served, Protocol):
+class OwnedPublisher(PublisherTransport, Pollable, Protocol):
     """Publisher as its transport uses it."""
 
     spec: PublisherSpec
@@ -134,7 +132,7 @@ class ZeromqTransport:
         self._threads = threading.local()
         self._waiting: WeakSet[ThreadWait] = WeakSet()
         self._is_closed = False
-        self._is_over = False
+        self._is_terminated = False
         self._services = ZeromqServices(self._shared, self._session, node.name)
         self._attached: dict[int, str] = {}
         """Endpoints of direct connections, by the id of their publisher or subscriber."""
@@ -157,7 +155,7 @@ class ZeromqTransport:
         publisher = self._mastered_publisher(spec, closer)
         with closed_on_error(publisher.release):
             endpoints = publisher.move(session.hosts)
-            self._hold(publisher)
+            self._add_publisher(publisher)
         record = PublisherRecord(
             spec.id,
             spec.topic,
@@ -196,7 +194,7 @@ class ZeromqTransport:
             publisher = OriginalPublisher(socket, spec, direct, closer)
         with closed_on_error(publisher.release):
             self._attached[spec.id] = attach(socket, direct, is_publisher=True)
-            self._hold(publisher)
+            self._add_publisher(publisher)
         try:
             publisher.wait_for_any(DIRECT_WAIT_S)
         except BaseException:
@@ -210,9 +208,9 @@ class ZeromqTransport:
         socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # applies to received messages
         return socket
 
-    def _hold(self, publisher: OwnedPublisher) -> None:
+    def _add_publisher(self, publisher: OwnedPublisher) -> None:
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             self._publishers[publisher.spec.id] = publisher
             self._io.add(publisher)  # before `close` can remove it, which takes this lock first
 
@@ -252,12 +250,12 @@ class ZeromqTransport:
         subscriber: NativeSubscriber | PatternSubscriber
         if spec.is_pattern:
             subscriber = PatternSubscriber(self._mastered_readable, io, spec, forget)
-            self._keep(subscriber)
+            self._add_subscriber(subscriber)
         else:
             readable = self._mastered_readable(spec)
             subscriber = NativeSubscriber(readable, io, spec, forget)
             with closed_on_error(readable.close):
-                self._keep(subscriber)
+                self._add_subscriber(subscriber)
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number, spec.is_pattern)
         try:
             reply = session.add_subscriber(record, subscriber, spec.wait_s)
@@ -291,7 +289,7 @@ class ZeromqTransport:
             subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._forget_subscriber)
         with closed_on_error(socket.close):
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
-            self._keep(subscriber)
+            self._add_subscriber(subscriber)
         try:
             self._serve(io, subscriber)
             if isinstance(subscriber, NativeSubscriber):
@@ -306,16 +304,16 @@ class ZeromqTransport:
         if spec.sink is None:
             return self._io
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             if self._sinks is None:
                 check_room(_THREAD_FILES, f"a subscriber of '{spec.topic}'")
                 self._sinks = IoThread(f"nep-sinks-{self._node.name}")
                 self._sinks.start()
             return self._sinks
 
-    def _keep(self, subscriber: _Subscriber) -> None:
+    def _add_subscriber(self, subscriber: _Subscriber) -> None:
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             self._subscribers[subscriber.spec.id] = subscriber
 
     def _serve(self, io: IoThread, subscriber: SocketSubscriber[Any]) -> None:
@@ -330,14 +328,14 @@ class ZeromqTransport:
         # Keeps the context while sockets are opened, also if `close` ends the last node meanwhile. Raises
         # `ClosedError`.
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             self._shared.join()
         try:
             yield
         finally:
             self._shared.leave()
 
-    def _check_open(self) -> None:
+    def _check_open_locked(self) -> None:
         # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
@@ -379,13 +377,13 @@ class ZeromqTransport:
         calls: Sequence[CallQueue] = (),
     ) -> None:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
-        waits = self._of_thread()
+        waits = self._thread_wait()
         entered: list[_Subscriber] = []
         entered_calls: list[CallQueue] = []
         fds: list[int] = []
         waits.is_busy = True
         try:
-            if self._is_over:
+            if self._is_terminated:
                 return
             for queue in calls:
                 if not queue.enter_wait(waits.waker.wake):
@@ -404,17 +402,17 @@ class ZeromqTransport:
             for queue in entered_calls:
                 queue.leave_wait(waits.waker.wake)
             waits.is_busy = False
-            if self._is_over:  # `close` left a busy waker open
+            if self._is_terminated:  # `close` left a busy waker open
                 waits.waker.close()
 
-    def _end_waits(self) -> None:
-        # Call with the lock held, after setting `_is_over`.
+    def _wake_waits_locked(self) -> None:
+        # Call with the lock held, after setting `_is_terminated`.
         for waits in self._waiting:
             waits.waker.wake()
             if not waits.is_busy:
                 waits.waker.close()
 
-    def _of_thread(self) -> ThreadWait:
+    def _thread_wait(self) -> ThreadWait:
         waits: ThreadWait | None = getattr(self._threads, "waits", None)
         if waits is None:
             waits = self._threads.waits = ThreadWait()
@@ -470,10 +468,10 @@ class ZeromqTransport:
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         with self._lock:
-            if self._is_over:
+            if self._is_terminated:
                 return
-            self._is_over = True
-            self._end_waits()
+            self._is_terminated = True
+            self._wake_waits_locked()
             sessions = list(self._sessions.values())
             publishers = list(self._publishers.values())
             subscribers = list(self._subscribers.values())
@@ -498,10 +496,10 @@ class ZeromqTransport:
             sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
         self._shared.leave()
 
-    def _forget_sessions(self) -> None:
+    def _close_idle_sessions_locked(self) -> None:
         # Call with the lock held. Closes idle sessions when there are many.
         for address, session in list(self._sessions.items()):
-            if len(self._sessions) < _MOST_SESSIONS:
+            if len(self._sessions) < _MAX_IDLE_SESSIONS:
                 return
             if session.is_idle:
                 del self._sessions[address]
@@ -520,10 +518,10 @@ class ZeromqTransport:
 
     def _session(self, address: str) -> MasterSession:
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             session = self._sessions.get(address)
             if session is None:
-                self._forget_sessions()
+                self._close_idle_sessions_locked()
                 socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
                 with closed_on_error(socket.close):
                     session = MasterSession(socket, self._io, self._node, address)

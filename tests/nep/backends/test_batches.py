@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import nep
 from nep.backends.base import QuickPublish
-from nep.backends.zeromq.pending_batch import MOST, SOON_NS, WAIT_NS, PendingBatch
+from nep.backends.zeromq.pending_batch import BATCH_WINDOW_NS, MAX_DELAY_NS, MAX_PENDING, PendingBatch
 from nep.errors import ClosedError, WireError
 from nep.masters.master import Master
 from nep.messages.encoded import Encoded
@@ -124,7 +124,7 @@ def test_those_that_read_batches_get_them(node: nep.Node, stranger: Callable[...
         assert [seq for _many, seq in said] == [
             before + 1 + sum(each for each, _seq in said[:place]) for place in range(len(said))
         ]
-        assert max(many for many, _seq in said) <= MOST
+        assert max(many for many, _seq in said) <= MAX_PENDING
         return len(said) < 250
 
     eventually(comes_together)  # a computer with much else to do may let 20 microseconds pass each time
@@ -242,42 +242,42 @@ def test_no_reader_keeps_more_of_a_batch_than_it_wants(node: nep.Node) -> None:
 
 def waiting(batch: PendingBatch, *stamps_ns: int) -> None:
     for stamp_ns in stamps_ns:
-        batch.waiting.append((b"x", stamp_ns))
+        batch.pending.append((b"x", stamp_ns))
 
 
 def test_who_may_wait() -> None:
     batch = PendingBatch(may_wait=True)
-    batch.begin_after(1000)
+    batch.open_window(1000)
     assert batch.until_ns == 0  # nobody has said that he reads batches
     batch.allow(reads_batches=True)
-    batch.begin_after(1000)
-    assert batch.until_ns == 1000 + SOON_NS
+    batch.open_window(1000)
+    assert batch.until_ns == 1000 + BATCH_WINDOW_NS
     never = PendingBatch(may_wait=False)
     never.allow(reads_batches=True)
-    never.begin_after(1000)
+    never.open_window(1000)
     assert (never.is_allowed, never.until_ns) == (False, 0)
 
 
 def test_when_the_node_s_thread_comes_again() -> None:
     batch = PendingBatch(may_wait=True)
-    batch.is_looked_after = True
+    batch.is_flush_scheduled = True
     waiting(batch, 10_000, 12_000)
-    assert batch.look_again_s(20_000) == pytest.approx((WAIT_NS - 10_000) / 1e9)
-    assert batch.look_again_s(10_000 + WAIT_NS) == 0.0
+    assert batch.next_check_s(20_000) == pytest.approx((MAX_DELAY_NS - 10_000) / 1e9)
+    assert batch.next_check_s(10_000 + MAX_DELAY_NS) == 0.0
     assert batch.take() == [(b"x", 10_000), (b"x", 12_000)]
-    assert (batch.goes_on_s, batch.is_looked_after) == (0.0, False)
-    batch.is_looked_after = batch.has_gone_full = True  # it sends batch after batch itself
+    assert (batch.burst_check_s, batch.is_flush_scheduled) == (0.0, False)
+    batch.is_flush_scheduled = batch.has_sent_full = True  # it sends batch after batch itself
     waiting(batch, 200_000)
-    assert batch.look_again_s(200_001) > WAIT_NS / 1e9
-    assert batch.look_again_s(10**9) == 0.0
+    assert batch.next_check_s(200_001) > MAX_DELAY_NS / 1e9
+    assert batch.next_check_s(10**9) == 0.0
     batch.take()
-    assert batch.goes_on_s == 0.0  # nothing went since
+    assert batch.burst_check_s == 0.0  # nothing went since
 
 
 def test_a_clock_that_is_set_back_holds_nothing_up() -> None:
     batch = PendingBatch(may_wait=True)
     waiting(batch, 10**18)
-    assert batch.look_again_s(5 * 10**17) == 0.0
+    assert batch.next_check_s(5 * 10**17) == 0.0
 
 
 # ---- the form
@@ -325,6 +325,6 @@ def test_an_encoded_payload_is_not_encoded_again() -> None:
     asked = QuickPublish(
         _HeardWay(), None, lambda payload: encoded.append(payload) or b"", None, passed.append
     )
-    publish = PendingBatch(may_wait=False).publishing(asked, _HeardWay(), threading.Lock())
+    publish = PendingBatch(may_wait=False).publish_function(asked, _HeardWay(), threading.Lock())
     publish(Encoded(b"1"))
     assert (encoded, passed) == ([], [Encoded(b"1")])

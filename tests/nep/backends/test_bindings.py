@@ -49,7 +49,7 @@ def test_it_is_used_whoever_comes_first(node: nep.Node, first: str) -> None:
     else:
         sub = node.new_sub("t", "string")
         pub = node.new_pub("t", "string")
-    name = bindings.local_of(endpoint(node, "t"))
+    name = bindings.local_name(endpoint(node, "t"))
     assert ends(sub) == [name]
     pub.publish("first")
     message = sub.receive(30.0)
@@ -71,7 +71,7 @@ def test_a_publisher_may_leave_it_out(node: nep.Node, monkeypatch: pytest.Monkey
     pub = node.new_pub("t", "string")
     sub = node.new_sub("t", "string")
     assert ends(sub) == [endpoint(node, "t")]
-    assert not is_bound(bindings.local_of(endpoint(node, "t")))
+    assert not is_bound(bindings.local_name(endpoint(node, "t")))
     pub.publish("first")
     assert sub.receive(30.0) is not None
 
@@ -80,7 +80,7 @@ def test_where_a_sandbox_forbids_it_there_is_tcp(node: nep.Node, monkeypatch: py
     def forbidden(_self: socket.socket, _address: object) -> None:
         raise PermissionError
 
-    monkeypatch.setattr(bindings, "_reached", set())
+    monkeypatch.setattr(bindings, "_probed", set())
     pub = node.new_pub("t", "string")
     with monkeypatch.context() as sandbox:
         sandbox.setattr(socket.socket, "connect", forbidden)
@@ -101,7 +101,7 @@ def test_a_name_that_is_taken_is_left_alone(node: nep.Node, monkeypatch: pytest.
                 holder.listen()
             return f"ipc://@{name}"
 
-        monkeypatch.setattr(bindings, "local_of", take)
+        monkeypatch.setattr(bindings, "local_name", take)
         pub = node.new_pub("t", "string")
         monkeypatch.undo()
         sub = node.new_sub("t", "string")
@@ -111,6 +111,6 @@ def test_a_name_that_is_taken_is_left_alone(node: nep.Node, monkeypatch: pytest.
 
 
 def test_a_loopback_endpoint_is_the_only_one_with_a_name() -> None:
-    assert bindings.local_of("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
-    assert bindings.local_of("tcp://192.168.1.20:4711") == ""
-    assert bindings.local_of("") == ""
+    assert bindings.local_name("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
+    assert bindings.local_name("tcp://192.168.1.20:4711") == ""
+    assert bindings.local_name("") == ""

@@ -6,7 +6,13 @@ import random
 
 import pytest
 
-from nep.backends.zeromq.byte_window import STEP_BYTES, WINDOW_BYTES, WINDOW_LEAST_BYTES, Backlog, SendWindow
+from nep.backends.zeromq.byte_window import (
+    ACK_STEP_BYTES,
+    MIN_WINDOW_BYTES,
+    WINDOW_BYTES,
+    Backlog,
+    SendWindow,
+)
 
 
 class Held:
@@ -22,35 +28,35 @@ def test_what_is_under_way_is_bounded_for_any_sizes() -> None:
             size = chance.choice([0, 1, 2**10, 2**20, 6 * 2**20, 64 * 2**20])
             if window.has_room(size):
                 window.sent(seq, size)
-            most = max(most, window.under_way)
+            most = max(most, window.unacked_bytes)
             if chance.random() < 0.01:
-                window.read(chance.randrange(seq + 1), WINDOW_BYTES)
+                window.acknowledge(chance.randrange(seq + 1), WINDOW_BYTES)
         assert most <= WINDOW_BYTES
-        window.read(3000, WINDOW_BYTES)
-        assert window.under_way == 0
+        window.acknowledge(3000, WINDOW_BYTES)
+        assert window.unacked_bytes == 0
 
 
 def test_a_message_larger_than_the_window_goes_when_nearly_nothing_is_under_way() -> None:
     window = SendWindow()
-    window.sent(1, STEP_BYTES)
+    window.sent(1, ACK_STEP_BYTES)
     assert window.has_room(WINDOW_BYTES * 2)
     window.sent(2, WINDOW_BYTES * 2)
     assert not window.has_room(1)
-    window.read(1, WINDOW_BYTES)
+    window.acknowledge(1, WINDOW_BYTES)
     assert not window.has_room(1)
-    window.read(2, WINDOW_BYTES)
+    window.acknowledge(2, WINDOW_BYTES)
     assert window.has_room(1)
 
 
-@pytest.mark.parametrize("bound", [0, 1, WINDOW_LEAST_BYTES, 2**64 - 1])
+@pytest.mark.parametrize("bound", [0, 1, MIN_WINDOW_BYTES, 2**64 - 1])
 def test_a_subscriber_chooses_its_bound_within_limits(bound: int) -> None:
     window = SendWindow()
-    window.read(0, bound)
+    window.acknowledge(0, bound)
     size, count = 2**20, 0
     while window.has_room(size):
         count += 1
         window.sent(count, size)
-    assert count * size == max(WINDOW_LEAST_BYTES, min(bound, WINDOW_BYTES))
+    assert count * size == max(MIN_WINDOW_BYTES, min(bound, WINDOW_BYTES))
 
 
 def test_many_small_messages_need_few_entries() -> None:
@@ -58,31 +64,31 @@ def test_many_small_messages_need_few_entries() -> None:
     for seq in range(1, 200_000):
         window.sent(seq, 1000)
     assert len(window._sent) < 250
-    window.read(2**64 - 1, WINDOW_BYTES)
-    assert window.under_way == 0
+    window.acknowledge(2**64 - 1, WINDOW_BYTES)
+    assert window.unacked_bytes == 0
 
 
 def test_it_is_asked_for_each_step_and_again_while_it_has_no_room() -> None:
     window = SendWindow()
-    window.sent(1, STEP_BYTES - 1)
-    assert not window.is_to_ask(0.0, has_room=True)
+    window.sent(1, ACK_STEP_BYTES - 1)
+    assert not window.should_request_ack(0.0, has_room=True)
     window.sent(2, 1)
-    assert window.is_to_ask(0.0, has_room=True)
-    assert not window.is_to_ask(0.1, has_room=True)
-    assert not window.is_to_ask(0.1, has_room=False)
-    assert window.is_to_ask(0.6, has_room=False)
-    assert not window.is_to_ask(0.7, has_room=False)
+    assert window.should_request_ack(0.0, has_room=True)
+    assert not window.should_request_ack(0.1, has_room=True)
+    assert not window.should_request_ack(0.1, has_room=False)
+    assert window.should_request_ack(0.6, has_room=False)
+    assert not window.should_request_ack(0.7, has_room=False)
 
 
 def test_who_missed_something_is_told_once_when_there_is_room_again() -> None:
     window = SendWindow()
     window.sent(1, WINDOW_BYTES)
-    assert not window.is_to_tell()
-    window.missed()
-    assert not window.is_to_tell()
-    window.read(1, WINDOW_BYTES)
-    assert window.is_to_tell()
-    assert not window.is_to_tell()
+    assert not window.should_notify()
+    window.note_drop()
+    assert not window.should_notify()
+    window.acknowledge(1, WINDOW_BYTES)
+    assert window.should_notify()
+    assert not window.should_notify()
 
 
 def test_what_cannot_be_asked_is_counted_until_it_is_let_go_of_in_order() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import nep
 from nep.backends.zenoh.early import EarlyMessages
-from nep.backends.zeromq.loss import EARLY_S, HeardPublishers
+from nep.backends.zeromq.loss import EARLY_MESSAGES_S, PublisherTracker
 from nep.masters.master import Master
 from nep.messages.history import HISTORY_BYTES, History
 from nep.protocol.requests import PublisherRecord, RemotePublisher
@@ -235,13 +235,13 @@ def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
 ) -> None:
     now = [100.0]
     monkeypatch.setattr("nep.backends.zeromq.loss.time.monotonic", lambda: now[0])
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     assert not sources.is_early(5)
     sources.listed(_remote(1))
     assert not sources.is_early(5)
     sources.listed(_remote(2))
     assert sources.is_early(5)
-    now[0] += EARLY_S
+    now[0] += EARLY_MESSAGES_S
     assert not sources.is_early(5), "it greets nobody"
     now[0] -= 1.0
     assert sources.is_early(5)
@@ -251,7 +251,7 @@ def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
 
 def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
     now = [0.0]
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     early: EarlyMessages[bytes] = EarlyMessages(sources, 3, lambda: now[0])
     assert not early.keep(Header(1, 1, 7, 0, 5), b"7", 2), "nobody has met it"
     sources.listed(_remote(2))

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.backends.zeromq import master_session
-from nep.backends.zeromq.loss import HeardPublishers
+from nep.backends.zeromq.loss import PublisherTracker
 from nep.masters.clocks import Clocks
 from nep.masters.master import Master
 from nep.messages.clocks import SAME_CLOCK, ClockDifference
@@ -191,7 +191,7 @@ def test_a_master_that_talks_nonsense_of_clocks_is_counted_and_heard_on(
 
 def test_differences_are_those_that_were_told_last() -> None:
     far = RemotePublisher(PublisherRecord(7, "t", "json", "json", ("tcp://10.0.0.9:1",)), "n", "far", "far")
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     source = sources.listed(far)
     assert source.clock.difference is None
     known = ClockDifference(5, 6, 7)
@@ -220,7 +220,7 @@ def test_who_does_not_say_where_it_is_is_judged_by_its_address(
     endpoints = (endpoint,) if endpoint else ()
     where = computer_id() if told is None else told
     far = RemotePublisher(PublisherRecord(7, "t", "json", "json", endpoints), "n", "far", where)
-    assert (HeardPublishers().listed(far).clock.difference is SAME_CLOCK) is is_here
+    assert (PublisherTracker().listed(far).clock.difference is SAME_CLOCK) is is_here
 
 
 def test_a_computer_is_known_by_what_it_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:

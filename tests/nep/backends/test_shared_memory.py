@@ -162,7 +162,7 @@ def test_a_debugger_that_says_no_hello_gets_payloads_and_everybody_with_it(
         stranger.connect(node.graph().topics["t"].publishers[0].endpoints[0])
         transport = pub._transport
         assert isinstance(transport, NativePublisher)
-        eventually(lambda: bool(transport._subscriptions.apart))
+        eventually(lambda: bool(transport._subscriptions.legacy_filters))
         data = os.urandom(LARGE)
         pub.publish(data)
         assert stranger.recv_multipart()[2] == data

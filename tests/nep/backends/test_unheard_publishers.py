@@ -12,7 +12,7 @@ import nep
 from nep.backends.base import SubscriberSpec
 from nep.backends.connection import Hybrid
 from nep.backends.zeromq.io_thread import IoThread
-from nep.backends.zeromq.loss import GAP_MAX, HeardPublishers
+from nep.backends.zeromq.loss import GAP_MAX, PublisherTracker
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.masters.master import Master
@@ -34,9 +34,9 @@ from tests.nep.programs import eventually
 KEY = "a publisher behind a closed port"
 
 
-def new_publisher(history: int = 0) -> HeardPublishers:
+def new_publisher(history: int = 0) -> PublisherTracker:
     """Losses of a subscriber that was registered when publisher 5 was created."""
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.expect_all_of(5)
     sources.listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
     return sources
@@ -112,7 +112,7 @@ def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher
     io.start()
     with zmq.Context() as context:
         pattern = PatternSubscriber(new_readable, io, spec, lambda _id: None)
-        member = pattern.of_topic("t")
+        member = pattern.member("t")
         assert member is not None
         member.expect_all_of(5)
         pattern.begin(())
@@ -123,7 +123,7 @@ def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher
 
 
 def test_a_publisher_that_was_there_before_counts_from_its_first_received_message() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.promised(5, 100)
     sources.promised(5, 100)
     assert sources.arrived(5, 101, is_alone=False)

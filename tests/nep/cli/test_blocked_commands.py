@@ -62,11 +62,11 @@ class Shown:
         self.press(STOP)
         lengths: list[int] = []
 
-        def is_quiet() -> bool:
+        def pause_reading() -> bool:
             lengths.append(len(self.look()))
             return len(set(lengths[-QUIET:])) == 1 and len(lengths) > QUIET
 
-        eventually(is_quiet, LONG_S)
+        eventually(pause_reading, LONG_S)
 
 
 @contextmanager

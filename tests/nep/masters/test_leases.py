@@ -11,7 +11,7 @@ import pytest
 import zmq
 
 import nep
-from nep.backends.zeromq.master_session import Pace
+from nep.backends.zeromq.master_session import RenewalTimer
 from nep.masters import leases
 from nep.masters.graph import Graph
 from nep.masters.leases import LEASE_S, Leases
@@ -104,21 +104,21 @@ def test_a_master_tells_how_long_to_wait() -> None:
 
 
 def test_a_node_obeys_and_goes_on_without_answers() -> None:
-    pace = Pace()
-    pace.renews(10.0)
+    pace = RenewalTimer()
+    pace.start(10.0)
     assert pace.due_at == 11.0
-    pace.told(4.0, 10.1)
+    pace.set_interval(4.0, 10.1)
     assert pace.due_at == pytest.approx(14.1)
-    pace.renews(14.1)
+    pace.start(14.1)
     assert pace.due_at == pytest.approx(18.1)
-    pace.told(1.0, 14.2)
+    pace.set_interval(1.0, 14.2)
     assert pace.due_at == pytest.approx(15.2)
 
 
 @pytest.mark.parametrize(("told_s", "waits_s"), [(0.0, 1.0), (-5.0, 1.0), (1e9, 30.0), (float("nan"), 1.0)])
 def test_nothing_that_a_master_says_makes_a_node_race_or_sleep(told_s: float, waits_s: float) -> None:
-    pace = Pace()
-    pace.told(told_s, 10.0)
+    pace = RenewalTimer()
+    pace.set_interval(told_s, 10.0)
     assert pace.due_at == 10.0 + waits_s
 
 

@@ -148,7 +148,7 @@ def test_publishers_that_were_there_before_are_reached_when_the_master_begins_to
 
 def test_a_node_whose_computer_gets_another_address_is_reached_there(far, master, monkeypatch):
     address = ["127.0.0.3"]
-    monkeypatch.setattr(master_session, "host_towards", lambda _master: address[0])
+    monkeypatch.setattr(master_session, "local_address_towards", lambda _master: address[0])
     with nep.node("near") as near, nep.node("far", master=far) as away:
         sub = near.new_sub("t")
         pub = away.new_pub("t")

@@ -103,7 +103,7 @@ def pair() -> Iterator[SimpleNamespace]:
     router = context.socket(zmq.ROUTER)
     port = router.bind_to_random_port("tcp://127.0.0.1")
     calls = RpcClient(context.socket(zmq.DEALER), f"127.0.0.1:{port}", lambda: None)
-    calls.lead_to(f"127.0.0.1:{port}")
+    calls.connect(f"127.0.0.1:{port}")
     yield SimpleNamespace(router=router, calls=calls)
     calls.release()
     router.close(0)

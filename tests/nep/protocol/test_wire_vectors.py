@@ -94,7 +94,7 @@ def test_a_publisher_sends_what_the_vector_says(
     monkeypatch.setattr(sends, "_id", said["publisher"])
     monkeypatch.setattr(sends, "_count", said["seq"] - 1)
     if len(parts) == 1:  # as when it has just been seen that all is read
-        monkeypatch.setattr(sends, "_settle_at", 2**20)
+        monkeypatch.setattr(sends, "_full_path_at", 2**20)
     monkeypatch.setattr("nep.backends.zeromq.publisher._time_ns", lambda: said["stamp_ns"])
     theirs.subscribe(wire.topic_part(said["topic"]))
     if len(parts) == 1:  # only to those who say that they read it

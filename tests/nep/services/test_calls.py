@@ -340,17 +340,17 @@ def test_a_server_that_closes_refuses_each_call_that_waits(make: Make) -> None:
 
 
 def test_a_server_that_closes_answers_what_it_carries_out(registered: Make) -> None:
-    is_asked, go_on = threading.Event(), threading.Event()
+    has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(request):
-        is_asked.set()
+        has_waiting_calls.set()
         assert go_on.wait(LONG_S)
         return request
 
     first = registered("first").new_server("/x", answer, threads=1)
     client = registered("client").new_client("/x", timeout_s=LONG_S)
     future = client.call_async("first")
-    assert is_asked.wait(LONG_S)
+    assert has_waiting_calls.wait(LONG_S)
     registered("second").new_server("/x", lambda _request: "second", threads=1)
     closer = threading.Thread(target=lambda: first.close(LONG_S), name="closer")
     closer.start()
@@ -364,17 +364,17 @@ def test_a_server_that_closes_answers_what_it_carries_out(registered: Make) -> N
 
 
 def test_a_node_that_closes_answers_what_its_servers_carry_out(make: Make) -> None:
-    is_asked = threading.Event()
+    has_waiting_calls = threading.Event()
     node = make("server")
 
     def answer(_request):
-        is_asked.set()
+        has_waiting_calls.set()
         eventually(lambda: node._services._servers[0]._transport.calls.is_closed)
         return "answered"
 
     node.new_server("/x", answer, threads=1)
     future = make("client").new_client("/x", timeout_s=LONG_S).call_async({})
-    assert is_asked.wait(LONG_S)
+    assert has_waiting_calls.wait(LONG_S)
     node.close()
     assert future.result(LONG_S) == "answered"
 

@@ -134,10 +134,10 @@ def test_nanocat_is_asked_and_answers(node: nep.Node, port: int) -> None:
 
 
 def test_closing_ends_a_question(node: nep.Node, port: int) -> None:
-    is_asked, go_on = threading.Event(), threading.Event()
+    has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(_question):
-        is_asked.set()
+        has_waiting_calls.set()
         return go_on.wait(LONG_S)
 
     at = node.direct("127.0.0.1", port)
@@ -154,7 +154,7 @@ def test_closing_ends_a_question(node: nep.Node, port: int) -> None:
 
     asker = threading.Thread(target=ask, name="asker")
     asker.start()
-    assert is_asked.wait(LONG_S)
+    assert has_waiting_calls.wait(LONG_S)
     surveyor.close()
     surveyor.close()
     asker.join(LONG_S)

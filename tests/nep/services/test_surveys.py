@@ -160,10 +160,10 @@ def test_sending_and_listening_as_the_original_has_it(make: Make) -> None:
 
 
 def test_a_surveyor_that_closes_ends_its_question(make: Make) -> None:
-    is_asked, go_on = threading.Event(), threading.Event()
+    has_waiting_calls, go_on = threading.Event(), threading.Event()
 
     def answer(_question):
-        is_asked.set()
+        has_waiting_calls.set()
         return go_on.wait(LONG_S)
 
     make("slow").new_respondent("/who", answer, threads=1)
@@ -178,7 +178,7 @@ def test_a_surveyor_that_closes_ends_its_question(make: Make) -> None:
 
     asker = threading.Thread(target=ask, name="asker")
     asker.start()
-    assert is_asked.wait(LONG_S)
+    assert has_waiting_calls.wait(LONG_S)
     surveyor.close()
     surveyor.close()
     asker.join(LONG_S)

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 import nep
 from nep.backends.base import Backend
-from nep.backends.zeromq.io_thread import IoThread, Rest
-from nep.backends.zeromq.loss import UNLISTED_MAX, HeardPublishers
+from nep.backends.zeromq.io_thread import IoThread, PollState
+from nep.backends.zeromq.loss import UNLISTED_MAX, PublisherTracker
 from nep.backends.zeromq.subscriptions import MAX_SUBSCRIBERS, Subscriptions
 from nep.errors import PluginsMissingError, did_you_mean
 from nep.messages.message import Message
@@ -58,7 +58,7 @@ def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
 
 
 def test_gaps_are_losses_counted_from_the_echo() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.reached(1, 10)
     for seq in (11, 12, 15):
         assert sources.arrived(1, seq, is_alone=False)
@@ -68,21 +68,21 @@ def test_gaps_are_losses_counted_from_the_echo() -> None:
 
 
 def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     assert sources.arrived(1, 100, is_alone=False)
     sources.reached(1, 100)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     assert sources.arrived(1, 5, is_alone=True)
     assert not sources.arrived(1, 5, is_alone=True)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.reached(1, 0)
     sources.get(1).has_echoed = True
     sources.arrived(1, 1, is_alone=False)
@@ -96,10 +96,10 @@ def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late()
 
 
 def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.get(1).remote = remote(1)
     assert sources.replaced_by(remote(2)) == []
-    sources.get(1).is_lapsed = True
+    sources.get(1).is_silent = True
     assert sources.replaced_by(remote(2)) == [1]
     assert sources.replaced_by(remote(2, name="other")) == []
     sources.closing(1, 7, now=10.0)
@@ -157,27 +157,27 @@ def test_a_waker_wakes_and_is_cleared() -> None:
 class Bell:
     """Something served that counts its servings."""
 
-    def __init__(self, rests: list[Rest]) -> None:
+    def __init__(self, rests: list[PollState]) -> None:
         self.waker = Waker()
         self.fd = self.waker.fd
         self.rests = rests
         self.served = threading.Semaphore(0)
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         self.waker.clear()
         self.served.release()
         if not self.rests:
-            return Rest()
+            return PollState()
         rest = self.rests.pop(0)
         if rest.due == -1.0:
             raise ZeroDivisionError
-        return Rest(rest.is_quiet, None if rest.due is None else now + rest.due)
+        return PollState(rest.pause_reading, None if rest.due is None else now + rest.due)
 
 
 def test_the_io_thread_serves_on_descriptors_orders_and_times() -> None:
     io = IoThread("nep-io-test")
     io.start()
-    bell = Bell([Rest(), Rest(is_quiet=True, due=0.05), Rest(), Rest()])
+    bell = Bell([PollState(), PollState(pause_reading=True, due=0.05), PollState(), PollState()])
     io.add(bell)
     assert bell.served.acquire(timeout=30.0)
     bell.waker.wake()
@@ -206,13 +206,13 @@ def test_the_io_thread_serves_who_sends_as_soon_as_it_can_be_written() -> None:
         left = 4_000_000
         sent = threading.Event()
 
-        def serve(self, now: float) -> Rest:
+        def serve(self, now: float) -> PollState:
             with contextlib.suppress(BlockingIOError):
                 while self.left:
                     self.left -= ours.send(bytes(min(self.left, 65_536)))
             if not self.left:
                 self.sent.set()
-            return Rest(is_quiet=True, sends=self.left > 0)
+            return PollState(pause_reading=True, sends=self.left > 0)
 
     with ours, theirs:
         ours.setblocking(False)
@@ -230,7 +230,7 @@ def test_the_io_thread_serves_who_sends_as_soon_as_it_can_be_written() -> None:
 def test_one_broken_socket_does_not_silence_the_others(caplog: pytest.LogCaptureFixture) -> None:
     io = IoThread("nep-io-test")
     io.start()
-    broken, fine = Bell([Rest(due=-1.0)]), Bell([])
+    broken, fine = Bell([PollState(due=-1.0)]), Bell([])
     io.add(broken)
     io.add(fine)
     assert broken.served.acquire(timeout=30.0)
@@ -292,7 +292,7 @@ def test_the_public_names_are_there() -> None:
 
 
 def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.reached(1, 0)
     assert sources.arrived(1, 1, is_alone=False)
     with pytest.raises(nep.errors.WireError, match="its sequence number jumps from 1 to 184467440737095516"):
@@ -306,7 +306,7 @@ def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
 
 
 def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     assert sources.arrived(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
     with pytest.raises(nep.errors.WireError):
@@ -317,7 +317,7 @@ def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
 
 
 def test_the_largest_gap_that_can_be_is_counted() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     assert sources.arrived(1, 1, is_alone=False)
     assert sources.arrived(1, 1 + 2**32, is_alone=False)
     assert sources.lost == 2**32 - 1
@@ -392,7 +392,7 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
     held, let_go = threading.Event(), threading.Event()
 
     class Slow(Bell):
-        def serve(self, now: float) -> Rest:
+        def serve(self, now: float) -> PollState:
             held.set()
             let_go.wait(20.0)
             return super().serve(now)
@@ -412,7 +412,7 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
 
 
 def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     for number in range(1, 11):
         sources.listed(remote(number))
     for number in range(100, 5000):
@@ -439,11 +439,11 @@ def test_a_flood_of_hellos_is_greeted_up_to_a_bound() -> None:
     assert subscriptions.note(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
     assert subscriptions.note(b"\0" + hello_part(5, "t", tells=True), 0) is None
     assert subscriptions.note(b"\1" + hello_part(77_777, "t"), 0) is not None
-    assert not subscriptions.tells_all
+    assert not subscriptions.all_acknowledge
     for number in range(50_000):  # nor do other filters pile up
         subscriptions.note(b"\1t\0" + b"%d" % number, 0)
         subscriptions.note(b"\1t", 0)
-    assert len(subscriptions.apart) == 1
+    assert len(subscriptions.legacy_filters) == 1
 
 
 def test_a_batch_of_a_sink_has_a_bound() -> None:
@@ -457,14 +457,14 @@ def test_a_batch_of_a_sink_has_a_bound() -> None:
 
 
 def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     for number in range(1, UNLISTED_MAX + 11):
-        sources.listed(remote(number, name=f"N{number}")).is_lapsed = number != 5
+        sources.listed(remote(number, name=f"N{number}")).is_silent = number != 5
     assert sources.ended(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
 
 
 def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     for seq in (1, 2, 3):
         assert sources.arrived(1, seq, is_alone=False)
     for _ in range(2):
@@ -478,7 +478,7 @@ def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> 
 
 
 def test_what_comes_behind_what_was_written_off_settles_it() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.arrived(1, 1, is_alone=False)
     for _ in range(2):
         sources.promised(1, 4)
@@ -491,7 +491,7 @@ def test_what_comes_behind_what_was_written_off_settles_it() -> None:
 
 
 def test_a_publisher_that_is_left_settles_what_was_promised() -> None:
-    sources = HeardPublishers()
+    sources = PublisherTracker()
     sources.arrived(1, 1, is_alone=False)
     sources.lapsed(1, 3)
     assert sources.lost == 0, "it may only be out of reach"

@@ -25,8 +25,6 @@ from nep.errors import DecodeError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import CallKind, Reply
 
-__all__ = ["CallId", "HeardPart", "ServiceChannel"]
-
 _HEAD_BYTES, _CDR_BYTES = 20, 4
 _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILED = struct.Struct("<QqB")

@@ -25,8 +25,6 @@ from nep.i18n import _
 from nep.protocol.requests import SubscriberCount, SubscriberRecord, as_count
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
-__all__ = ["Ros2Client"]
-
 _logger = logging.getLogger("nep")
 _SEEK_S, _WATCH_S = 0.02, 0.1
 """Intervals for discovering a server, and for checking that it still exists."""

@@ -18,8 +18,6 @@ from nep.i18n import _
 from nep.messages import codecs
 from nep.messages.codecs import CODECS, Codec
 
-__all__ = ["NEP_CALL", "answer_of", "codec_of_calls", "known_service", "request_of", "served_type"]
-
 NEP_CALL = "nep_msgs/srv/Call"
 _SUCCESS = "bool success\nstring message"
 _COMMON = {

@@ -11,12 +11,10 @@ from nep.backends.ros2.publisher import wait_for_others
 from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
 from nep.backends.ros2.services.definitions import served_type
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
-from nep.backends.zeromq.sockets import Refusals
+from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import NepError
 from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, failure, topic_of
-
-__all__ = ["Ros2Server"]
 
 _logger = logging.getLogger("nep")
 _MEET_S = 1.0
@@ -41,7 +39,7 @@ class Ros2Server:
         self.endpoints = ("ros2",)
         self._on_close = on_close
         self._participant = participant
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         self._type = served_type(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
             participant, node_id, spec.service, self._type, spec.id, hear=self._asked

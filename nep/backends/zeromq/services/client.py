@@ -18,8 +18,8 @@ from typing import Protocol
 import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
-from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.sockets import Refusals, is_far
+from nep.backends.zeromq.io_thread import PollState
+from nep.backends.zeromq.sockets import RejectionLog, is_far
 from nep.errors import (
     ClosedError,
     NepError,
@@ -31,8 +31,6 @@ from nep.errors import (
 from nep.i18n import _
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.protocol.service_wire import ORIGINAL, ORIGINAL_CODEC, Framing
-
-__all__ = ["SocketClient"]
 
 _logger = logging.getLogger("nep")
 
@@ -109,7 +107,7 @@ class SocketClient:
 
     def __init__(
         self,
-        connect_to: Callable[[str, Callable[[float], Rest]], Connection],
+        connect_to: Callable[[str, Callable[[float], PollState]], Connection],
         spec: ClientSpec,
         framing: Framing,
         soon: Callable[[SocketClient], None],
@@ -149,7 +147,7 @@ class SocketClient:
         """Time at which the connection to an unlisted server is closed if new calls wait."""
         self._tries = 0
         self._try_at = 0.0
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
         self._is_closed = False
         self._answered = self._failed = self._late = 0
 
@@ -270,7 +268,7 @@ class SocketClient:
                 self._unlisted = server
         self._soon(self)
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to a server on another computer, after the address of this one has changed."""
         with self._lock:
             if is_far(self._place):
@@ -296,17 +294,17 @@ class SocketClient:
 
     def counts(self) -> SubscriberCount:
         """Return the statistics for a renewal."""
-        problem = self._refusals.told()
+        problem = self._refusals.recent_message()
         return SubscriberCount(self.spec.id, as_count(self._answered), as_count(self._failed), problem)
 
     # ---- in the I/O thread: the socket
 
-    def serve(self, now: float) -> Rest:
-        """Process the connection and expired calls, see `Served.serve`."""
-        return Rest(is_quiet=True, due=self._serve(now))
+    def serve(self, now: float) -> PollState:
+        """Process the connection and expired calls, see `Pollable.serve`."""
+        return PollState(pause_reading=True, due=self._serve(now))
 
-    def _serve_connection(self, now: float) -> Rest:
-        return Rest(due=self._serve(now))
+    def _serve_connection(self, now: float) -> PollState:
+        return PollState(due=self._serve(now))
 
     def _serve(self, now: float) -> float | None:
         # Returns the time of the next call.

@@ -13,11 +13,9 @@ from collections.abc import Callable, Sequence
 
 import zmq
 
-from nep.backends.zeromq.io_thread import IoThread, Rest, SharedContext
+from nep.backends.zeromq.io_thread import IoThread, PollState, SharedContext
 from nep.backends.zeromq.sockets import Part, Socket, keep_alive
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
-
-__all__ = ["CONNECTION_FILES", "ServerConnection"]
 
 CONNECTION_FILES = 4
 """File descriptors per connection, including those of libzmq."""
@@ -36,7 +34,7 @@ class ServerConnection:
     """
 
     def __init__(
-        self, shared: SharedContext, service: str, endpoint: str, serve: Callable[[float], Rest]
+        self, shared: SharedContext, service: str, endpoint: str, serve: Callable[[float], PollState]
     ) -> None:
         self.endpoint = endpoint
         self.is_open = self.is_over = False
@@ -110,11 +108,11 @@ class ServerConnection:
 
 
 class _Side:
-    def __init__(self, socket: Socket, serve: Callable[[float], Rest]) -> None:
+    def __init__(self, socket: Socket, serve: Callable[[float], PollState]) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
         self._serve = serve
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         return self._serve(now)
 
 

@@ -12,7 +12,7 @@ import zmq
 
 from nep.backends.connection import Direct
 from nep.backends.services import ClientSpec, ServerSpec
-from nep.backends.zeromq.io_thread import Rest, SharedContext
+from nep.backends.zeromq.io_thread import PollState, SharedContext
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.services.client import Connection, SocketClient
 from nep.backends.zeromq.services.connection import CONNECTION_FILES, ServerConnection
@@ -31,8 +31,6 @@ from nep.system.forks import give_up
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-__all__ = ["ZeromqServices"]
 
 
 class ZeromqServices:
@@ -205,7 +203,7 @@ class ZeromqServices:
             self._shared.io.remove(client)
             client.release()
 
-        def connect_to(endpoint: str, serve: Callable[[float], Rest]) -> Connection:
+        def connect_to(endpoint: str, serve: Callable[[float], PollState]) -> Connection:
             if is_tcp:
                 return TcpConnection(self._shared.io, endpoint.removeprefix("tcp://"), serve)
             return ServerConnection(self._shared, spec.service, endpoint, serve)

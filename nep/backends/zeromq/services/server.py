@@ -17,13 +17,11 @@ import zmq
 
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
 from nep.backends.zeromq.bindings import Bindings
-from nep.backends.zeromq.io_thread import Rest
-from nep.backends.zeromq.sockets import Refusals, Socket
+from nep.backends.zeromq.io_thread import PollState
+from nep.backends.zeromq.sockets import RejectionLog, Socket
 from nep.errors import WireError
 from nep.protocol.requests import PublisherCount, as_count
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing, Reply
-
-__all__ = ["CallReader", "RouterServer"]
 
 _logger = logging.getLogger("nep")
 
@@ -46,7 +44,7 @@ class CallReader:
         self._service = service
         self._framing = framing
         self._tally = tally
-        self._refusals = Refusals()
+        self._refusals = RejectionLog()
 
     def read(
         self,
@@ -77,9 +75,9 @@ class CallReader:
                 error,
             )
 
-    def told(self) -> str:
-        """Return the newest problem, see `Refusals.told`."""
-        return self._refusals.told()
+    def recent_message(self) -> str:
+        """Return the newest problem, see `RejectionLog.recent_message`."""
+        return self._refusals.recent_message()
 
 
 class RouterServer:
@@ -138,28 +136,28 @@ class RouterServer:
         with self._lock:
             return () if self._is_closed else self._bindings.move(hosts)
 
-    def leave_local(self) -> None:
+    def unbind_local(self) -> None:
         """Do nothing: servers have no Unix socket names."""
 
     def counts(self) -> PublisherCount:
         """Return the statistics for a renewal."""
         tally = self.tally
-        calls, problem = as_count(tally.calls), self._reader.told()
+        calls, problem = as_count(tally.calls), self._reader.recent_message()
         return PublisherCount(self.spec.id, calls, as_count(tally.bytes), calls, None, problem, tally.errors)
 
     # ---- in the I/O thread
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         """Queue calls; reject those for which there is no room."""
         came: list[IncomingCall] = []
         with self._lock:
             if self._is_closed:
-                return Rest()
+                return PollState()
             has_more = self._read(came, now)
         for call in came:
             if not self.calls.put(call):
                 self._refuse(call)
-        return Rest(due=now if has_more else None)
+        return PollState(due=now if has_more else None)
 
     def _read(self, came: list[IncomingCall], now: float) -> bool:
         # Call with the lock held. Returns True if there may be more: ZMQ_FD is edge-triggered.

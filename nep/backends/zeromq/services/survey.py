@@ -13,8 +13,6 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 
-__all__ = ["SurveyClient"]
-
 _logger = logging.getLogger("nep")
 
 Then = Callable[[Outcome], None]
@@ -131,11 +129,11 @@ class SurveyClient:
             client.gone(0, 0, is_closed=True)
             self._leaving.append(client)
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Reconnect to respondents on other computers, after the address of this one has changed."""
         with self._lock:
             for client in self._clients.values():
-                client.connect_again()
+                client.reconnect()
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
         """Process the removal of a respondent."""

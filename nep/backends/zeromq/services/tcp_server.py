@@ -13,7 +13,7 @@ from contextlib import suppress
 from functools import partial
 
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
-from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.services.server import CallReader
 from nep.backends.zeromq.services.tcp_stream import TcpStream, keep_alive
 from nep.backends.zeromq.sockets import wait_until
@@ -22,8 +22,6 @@ from nep.protocol.service_wire import NATIVE, Reply
 from nep.system.addresses import host_of
 from nep.system.descriptors import check_room, has_room
 from nep.system.log_rarely import is_logged
-
-__all__ = ["TcpServer"]
 
 _logger = logging.getLogger("nep")
 
@@ -64,24 +62,24 @@ class TcpServer:
 
     # ---- in the I/O thread
 
-    def serve(self, now: float) -> Rest:
-        """Accept connections, see `Served.serve`."""
+    def serve(self, now: float) -> PollState:
+        """Accept connections, see `Pollable.serve`."""
         for _turn in range(_READ_MAX):
             if self.is_closed:
-                return Rest()
+                return PollState()
             try:
                 connected, (host, port) = self._listener.accept()
             except (BlockingIOError, InterruptedError):
-                return Rest()
+                return PollState()
             except OSError as error:  # the client has disconnected, or descriptors have run out
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
-                    return Rest(is_quiet=True, due=now + _FULL_S)
+                    return PollState(pause_reading=True, due=now + _FULL_S)
                 continue
             if len(self._peers) >= _PEERS_MAX or not has_room(_LISTENER_FILES):
                 self._turn_away(connected)
                 continue
             self._accept(connected, f"{host}:{port}")
-        return Rest(due=now)
+        return PollState(due=now)
 
     def _turn_away(self, connected: socket.socket) -> None:
         connected.close()
@@ -102,12 +100,12 @@ class TcpServer:
             self._peers.add(peer)
         self._io.add(peer)
 
-    def serve_peer(self, peer: _Peer, now: float) -> Rest:
+    def serve_peer(self, peer: _Peer, now: float) -> PollState:
         """Queue calls of a client, and send its pending replies."""
         came: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
-                return Rest(is_quiet=True)
+                return PollState(pause_reading=True)
             peer.stream.flush()
             has_more = self._read(peer, came, now)
             is_over = peer.stream.is_over and not has_more
@@ -121,7 +119,7 @@ class TcpServer:
         for call in came:
             if not self.calls.put(call):
                 self._refuse(call)
-        return Rest(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
+        return PollState(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
 
     def _read(self, peer: _Peer, came: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
@@ -227,7 +225,7 @@ class _Peer:
         self.is_last = False
         self._server = server
 
-    def serve(self, now: float) -> Rest:
+    def serve(self, now: float) -> PollState:
         return self._server.serve_peer(self, now)
 
 

@@ -11,13 +11,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from nep.backends.zeromq.io_thread import IoThread, Rest
+from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.service_wire import HEADER_BYTES, PAYLOAD_MAX_BYTES
 from nep.system.addresses import host_of, is_loopback
-
-__all__ = ["TcpConnection", "TcpStream"]
 
 _SIZE = struct.Struct("<I")
 _CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
@@ -169,7 +167,7 @@ class TcpConnection:
     Not thread-safe: guarded by the client's lock.
     """
 
-    def __init__(self, io: IoThread, address: str, serve: Callable[[float], Rest]) -> None:
+    def __init__(self, io: IoThread, address: str, serve: Callable[[float], PollState]) -> None:
         self.endpoint = f"tcp://{address}"
         self._io = io
         self._serve = serve
@@ -213,11 +211,11 @@ class TcpConnection:
             self._is_dead = other == self._socket.getsockname()
             self.is_open = not self._is_dead
 
-    def serve(self, now: float) -> Rest:
-        """Process the connection, see `Served.serve`."""
+    def serve(self, now: float) -> PollState:
+        """Process the connection, see `Pollable.serve`."""
         rest = self._serve(now)
-        is_quiet = self._is_dead or self._stream.is_over
-        return Rest(is_quiet, rest.due, sends=not self.is_open or self._stream.backlog > 0)
+        pause_reading = self._is_dead or self._stream.is_over
+        return PollState(pause_reading, rest.due, sends=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
         """Send a call; the I/O thread sends what the socket doesn't accept now."""

@@ -29,8 +29,6 @@ from weakref import WeakValueDictionary
 
 from nep.system.forks import in_child
 
-__all__ = ["SHARED_BYTES", "Loan", "SharedReader", "SharedWriter", "begin_sharing", "can_share", "room_bytes"]
-
 SHARED_BYTES = 32 * 2**10
 """Size from which shared memory is faster than the socket."""
 _LARGEST_BYTES = 64 * 2**20

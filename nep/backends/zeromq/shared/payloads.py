@@ -13,8 +13,6 @@ from nep.errors import WireError
 from nep.i18n import _
 from nep.protocol.wire import Shares
 
-__all__ = ["SharedPayloads", "SharedSources"]
-
 _NUMBER = struct.Struct("<Q")
 _OFFERS = 4
 """Maximum number of offers to a subscriber; without a reply it can't share memory."""
