@@ -230,14 +230,14 @@ class ClientCalls(Generic[C]):
         self._numbers = itertools.count(1)
         self._answered = self._failed = 0
 
-    def _tell(self, call: C, outcome: Outcome) -> None:
+    def _run_callback(self, call: C, outcome: Outcome) -> None:
         # Call without the lock: the callback may use the client.
         try:
             call.then(outcome)
         except Exception:  # a failing callback must not affect other calls
             _logger.exception("result callback for '%s' raised", self.spec.service)
 
-    def _take(self, call: C) -> bool:
+    def _remove_locked(self, call: C) -> bool:
         if self._calls.pop(call.number, None) is None:
             return False
         self._bytes -= call.size
@@ -248,7 +248,7 @@ class ClientCalls(Generic[C]):
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
-                self._take(known)
+                self._remove_locked(known)
 
     def forked(self) -> None:
         """Become closed in a forked child, without taking the lock."""

@@ -35,7 +35,7 @@ class WakingSubscriber(ABC):
         with self._changed:
             self._waiting = tuple(each for each in self._waiting if each is not waker)
 
-    def tell_waiting(self) -> None:
+    def notify_waiting(self) -> None:
         """Wake all waiting threads. Call with `changed` held."""
         self._changed.notify_all()
         for each in self._waiting:

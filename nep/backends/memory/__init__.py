@@ -199,7 +199,7 @@ class MemorySubscriber(WakingSubscriber):
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
             self.lost += dropped
-            self.tell_waiting()
+            self.notify_waiting()
 
     @property
     def has_input(self) -> bool:
@@ -245,7 +245,7 @@ class MemorySubscriber(WakingSubscriber):
         self._transport.wake()
         with self._changed:
             self.inbox.take_all()
-            self.tell_waiting()
+            self.notify_waiting()
 
 
 class MemoryTransport:
@@ -297,7 +297,7 @@ class MemoryTransport:
                 hub.subscribers[spec.topic] = (*hub.subscribers.get(spec.topic, ()), subscriber)
             self._subscribers = (*self._subscribers, subscriber)
         if spec.sink is not None:
-            self._pour(subscriber)
+            self._add_sink(subscriber)
         return subscriber
 
     def forget(self, closed: MemoryPublisher | MemorySubscriber) -> None:
@@ -390,7 +390,7 @@ class MemoryTransport:
             hub.transports[self.node.id] = self
             yield hub
 
-    def _pour(self, subscriber: MemorySubscriber) -> None:
+    def _add_sink(self, subscriber: MemorySubscriber) -> None:
         with self.changed:  # closing the node meanwhile finds either no thread or a started one
             self._sinks = [*self._sinks, subscriber]
             if self._thread is None and not self._closing.is_set():

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.nanomsg.library import keep_for_ever, library
+from nep.backends.nanomsg.library import keep_forever, library
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import WireError
@@ -168,4 +168,4 @@ class NanomsgServer:
         self._lock = threading.Lock()
         self.calls.forked()
         for context in self._contexts:
-            keep_for_ever(context)
+            keep_forever(context)

@@ -17,7 +17,7 @@ from typing import Any
 
 from nep.backends.deadlines import Deadlines
 from nep.backends.nanomsg.answering import close_context, in_one, in_parts
-from nep.backends.nanomsg.library import keep_for_ever, library
+from nep.backends.nanomsg.library import keep_forever, library
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
@@ -137,18 +137,18 @@ class NanomsgClient(ClientCalls[_Call]):
 
     def _end(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
-            is_waited_for = self._take(call)
+            is_waited_for = self._remove_locked(call)
             is_late = self._left.pop(call.number, None) is not None and not isinstance(outcome, NepError)
             self.late += is_late
         if is_waited_for:
-            self._tell(call, outcome)
+            self._run_callback(call, outcome)
 
     def forget(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
-                self._take(known)
+                self._remove_locked(known)
         if known is not None:
             self._leave(known)
 
@@ -165,12 +165,16 @@ class NanomsgClient(ClientCalls[_Call]):
     def expire(self, now: float) -> float:
         """Fail expired calls; return the next deadline."""
         with self._lock:
-            late = [each for each in tuple(self._calls.values()) if each.deadline <= now and self._take(each)]
+            late = [
+                each
+                for each in tuple(self._calls.values())
+                if each.deadline <= now and self._remove_locked(each)
+            ]
             due = min((each.deadline for each in self._calls.values()), default=math.inf)
         for call in late:
             self._leave(call)
             kind = ServiceTimeoutError if call.is_sent else NoServerError
-            self._tell(call, kind(self.spec.service, call.timeout_s or 0.0))
+            self._run_callback(call, kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
     def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
@@ -194,7 +198,7 @@ class NanomsgClient(ClientCalls[_Call]):
             close_context(call.context)
         for call in left:
             close_context(call.context)
-            self._tell(call, self._closed_error())
+            self._run_callback(call, self._closed_error())
         deadline = time.monotonic() + _JOIN_S
         for thread in threads:
             if thread is not threading.current_thread():
@@ -206,5 +210,5 @@ class NanomsgClient(ClientCalls[_Call]):
         self.is_closed = True
         self._lock = threading.Lock()
         for call in (*self._calls.values(), *self._left.values()):
-            keep_for_ever(call.context)
+            keep_forever(call.context)
         self._calls = {}

@@ -72,7 +72,7 @@ def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
     return made
 
 
-def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
+def keep_forever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
     """Prevent the finalizer of an object, also at exit."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
@@ -83,7 +83,7 @@ def _forked() -> None:
         return
     _inherited.add("pynng")
     for socket in _sockets:
-        keep_for_ever(socket)  # the finalizer would close it
+        keep_forever(socket)  # the finalizer would close it
     at_exit = getattr(sys.modules[_MODULE], "_pynng_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)

@@ -15,7 +15,7 @@ from typing import Any
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.answering import close_context, heard
 from nep.backends.nanomsg.direct import attach
-from nep.backends.nanomsg.library import keep_for_ever, library, new_socket
+from nep.backends.nanomsg.library import keep_forever, library, new_socket
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.sockets import wait_until
 from nep.errors import ClosedError, NepError
@@ -148,7 +148,7 @@ class NanomsgSurveyor:
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         for question in self._questions.values():
-            keep_for_ever(question.context)
+            keep_forever(question.context)
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

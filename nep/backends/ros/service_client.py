@@ -147,11 +147,11 @@ class RosClient(ClientCalls[_Call]):
     def _end_with(self, call: _Call, outcome: Outcome) -> None:
         is_answered = not isinstance(outcome, NepError)
         with self._lock:
-            is_waited_for = self._take(call)
+            is_waited_for = self._remove_locked(call)
             self._answered += is_waited_for and is_answered
             self._failed += is_waited_for and not is_answered
         if is_waited_for:
-            self._tell(call, outcome)
+            self._run_callback(call, outcome)
 
     def _outcome(self, call: _Call, connection: ServiceConnection) -> Outcome:
         kind = self._type_of(connection)
@@ -184,7 +184,7 @@ class RosClient(ClientCalls[_Call]):
         with self._lock:
             known = self._calls.get(call.number)
             if known is not None:
-                self._take(known)
+                self._remove_locked(known)
                 self._end(known)
 
     def _end(self, call: _Call) -> None:
@@ -216,7 +216,7 @@ class RosClient(ClientCalls[_Call]):
         self._is_over.set()
         self._forget_me(self)
         for call in left:
-            self._tell(call, self._closed_error())
+            self._run_callback(call, self._closed_error())
         deadline = time.monotonic() + timeout_s
         for thread in threads:
             if thread is not threading.current_thread():

@@ -129,12 +129,12 @@ class RospySubscriber(WakingSubscriber):
             self.received += 1 - dropped
             if dropped:
                 self.lost = (self.lost or 0) + dropped
-            self.tell_waiting()
+            self.notify_waiting()
 
     def _rospy_ends(self) -> None:
         # `poll` raises from now on.
         with self._owner.changed:
-            self.tell_waiting()
+            self.notify_waiting()
         self._owner.wake()
 
     def _source_of(self, header: Mapping[str, str]) -> _Source:
@@ -235,7 +235,7 @@ class RospySubscriber(WakingSubscriber):
                 return
             self.is_closed = True
             self.inbox.take_all()
-            self.tell_waiting()
+            self.notify_waiting()
             self.process.subscribed[self.topic] -= 1
         self.process.at_shutdown.discard(self._rospy_ends)
         self._owner.forget(self)

@@ -234,7 +234,7 @@ class Ros2Subscriber(WakingSubscriber):
                 dropped = self.inbox.put(message)
                 self.received += 1 - dropped
                 self._dropped += dropped
-            self.tell_waiting()
+            self.notify_waiting()
 
     # ---- reading
 
@@ -310,6 +310,6 @@ class Ros2Subscriber(WakingSubscriber):
             self._readers.clear()
         with self._transport.changed:
             self.inbox.take_all()
-            self.tell_waiting()
+            self.notify_waiting()
         self._transport.forget(self)
         self._transport.wake()

@@ -12,10 +12,10 @@ from nep.messages.message import Message
 
 _logger = logging.getLogger("nep")
 _BATCH_S = 0.005  # at most 200 calls of a sink per second
-_LOOK_S = 0.1
+_WAIT_S = 0.1
 
 
-class Poured(Protocol):
+class SinkSubscriber(Protocol):
     """Subscriber as the sink thread uses it."""
 
     is_closed: bool
@@ -39,7 +39,7 @@ class Inboxes:
         self.changed = threading.Condition()
         self._name = name
         self._wakes = 0
-        self._sinks: tuple[Poured, ...] = ()
+        self._sinks: tuple[SinkSubscriber, ...] = ()
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
@@ -48,7 +48,7 @@ class Inboxes:
         """Number of `wake` calls."""
         return self._wakes
 
-    def wait(self, subscribers: Sequence[Poured], timeout_s: float, wakes: int | None = None) -> None:
+    def wait(self, subscribers: Sequence[SinkSubscriber], timeout_s: float, wakes: int | None = None) -> None:
         """Wait for a message in `subscribers`, for one of them to close, or for `wake`.
 
         `wakes` is the number of `wake` calls known to the caller; if there were more since, the call returns
@@ -67,8 +67,8 @@ class Inboxes:
             self._wakes += 1
             self.changed.notify_all()
 
-    def pour(self, subscriber: Poured) -> None:
-        """Deliver the subscriber's messages to its sink until `stop_pouring`."""
+    def add_sink(self, subscriber: SinkSubscriber) -> None:
+        """Deliver the subscriber's messages to its sink until `remove_sink`."""
         with self.changed:
             self._sinks = (*self._sinks, subscriber)
             if self._thread is None and not self._closing.is_set():
@@ -76,7 +76,7 @@ class Inboxes:
                 self._thread.start()
             self.changed.notify_all()
 
-    def stop_pouring(self, subscriber: Poured) -> None:
+    def remove_sink(self, subscriber: SinkSubscriber) -> None:
         """Stop delivering to the subscriber's sink."""
         with self.changed:
             self._sinks = tuple(each for each in self._sinks if each is not subscriber)
@@ -91,7 +91,7 @@ class Inboxes:
 
     def _run(self) -> None:
         while not self._closing.is_set():
-            self.wait(self._sinks, _LOOK_S)
+            self.wait(self._sinks, _WAIT_S)
             for subscriber in self._sinks:
                 messages = subscriber.take_batch()
                 if messages and subscriber.sink is not None:

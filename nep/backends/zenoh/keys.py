@@ -28,51 +28,51 @@ ALL_CALLS = f"{_ROOT}/call/*"
 ALL_LIVE = f"{_LIVE}**"
 _WILD = frozenset({"*", "**"})
 _TOPIC_AT, _SINCE_AT = 3, 4
-_ID_MOST = 2**64 - 1
-_NODE_WORDS, _PUBLISHER_WORDS, _SUBSCRIBER_WORDS = 7, 6, 4
+_MAX_ID = 2**64 - 1
+_NODE_CHUNKS, _PUBLISHER_CHUNKS, _SUBSCRIBER_CHUNKS = 7, 6, 4
 
 
-class Alive(NamedTuple):
+class LiveToken(NamedTuple):
     """Content of a liveliness token: `record` belongs to the node `node_id`."""
 
     node_id: str
     record: NodeRecord | PublisherRecord | SubscriberRecord
 
 
-def _word(text: str) -> str:
+def _encode_chunk(text: str) -> str:
     return quote(text, safe="", errors="replace") or "%"
 
 
-def _text(word: str) -> str:
+def _decode_chunk(word: str) -> str:
     return "" if word == "%" else unquote(word)
 
 
 def data_key(topic: str) -> str:
     """Return the key for messages of a topic."""
-    return f"{_ROOT}/data/{_word(topic)}"
+    return f"{_ROOT}/data/{_encode_chunk(topic)}"
 
 
 def data_keys(pattern: str) -> str:
     """Return the key expression for messages of topics that match a pattern; it may match others, too."""
-    return f"{_ROOT}/data/{_words(pattern)}"
+    return f"{_ROOT}/data/{_pattern_chunk(pattern)}"
 
 
 def hello_key(topic: str, publisher: int) -> str:
     """Return the key at which a publisher replies to new subscribers."""
-    return f"{_ROOT}/hello/{_word(topic)}/{publisher:016x}"
+    return f"{_ROOT}/hello/{_encode_chunk(topic)}/{publisher:016x}"
 
 
 def hellos_key(topic: str) -> str:
     """Return the key expression for hellos to all publishers of a topic."""
-    return f"{_ROOT}/hello/{_word(topic)}/*"
+    return f"{_ROOT}/hello/{_encode_chunk(topic)}/*"
 
 
 def hellos_keys(pattern: str) -> str:
     """Return the key expression for hellos to all publishers of the topics of `data_keys`."""
-    return f"{_ROOT}/hello/{_words(pattern)}/*"
+    return f"{_ROOT}/hello/{_pattern_chunk(pattern)}/*"
 
 
-def _words(pattern: str) -> str:
+def _pattern_chunk(pattern: str) -> str:
     # A topic is one chunk and zenoh's wildcards match whole chunks, so only the fixed begin and end are used.
     levels = pattern.split("/")
     wild = [each for each, level in enumerate(levels) if level in _WILD]
@@ -84,31 +84,31 @@ def _words(pattern: str) -> str:
 
 def topic_of(key: str) -> str:
     """Return the topic in the key of a message or of a reply to a hello."""
-    return _text(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
+    return _decode_chunk(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 
 def call_key(node_id: str) -> str:
     """Return the key at which a node replies to requests."""
-    return f"{_ROOT}/call/{_word(node_id)}"
+    return f"{_ROOT}/call/{_encode_chunk(node_id)}"
 
 
 def node_key(node: NodeRecord) -> str:
     """Return the token of a node."""
     words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
-    return "/".join((f"{_LIVE}{_word(node.id)}/node", *map(_word, words)))
+    return "/".join((f"{_LIVE}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
     """Return the token of a publisher."""
     latched = "latched" if record.latched else "plain"
     words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
-    return "/".join((f"{_LIVE}{_word(node_id)}/pub", *map(_word, words)))
+    return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
     """Return the token of a subscriber."""
     words = (f"{record.id:016x}", record.topic, record.msg_type)
-    return "/".join((f"{_LIVE}{_word(node_id)}/sub", *map(_word, words)))
+    return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
 
 
 def serve_key(service: str, since_ns: int, server: int) -> str:
@@ -116,73 +116,82 @@ def serve_key(service: str, since_ns: int, server: int) -> str:
 
     All clients call the first server in the order of these keys, the oldest.
     """
-    return f"{_ROOT}/serve/{_word(service)}/{since_ns:016x}/{server:016x}"
+    return f"{_ROOT}/serve/{_encode_chunk(service)}/{since_ns:016x}/{server:016x}"
 
 
 def server_key(node_id: str, record: PublisherRecord) -> str:
     """Return the token of a server."""
     since = record.endpoints[0].split("/")[_SINCE_AT]
     return "/".join(
-        (f"{_LIVE}{_word(node_id)}/srv", f"{record.id:016x}", _word(service_of(record.topic) or ""), since)
+        (
+            f"{_LIVE}{_encode_chunk(node_id)}/srv",
+            f"{record.id:016x}",
+            _encode_chunk(service_of(record.topic) or ""),
+            since,
+        )
     )
 
 
 def client_key(node_id: str, record: SubscriberRecord) -> str:
     """Return the token of a client."""
     return "/".join(
-        (f"{_LIVE}{_word(node_id)}/cli", f"{record.id:016x}", _word(service_of(record.topic) or ""))
+        (
+            f"{_LIVE}{_encode_chunk(node_id)}/cli",
+            f"{record.id:016x}",
+            _encode_chunk(service_of(record.topic) or ""),
+        )
     )
 
 
-def parse_live(key: str) -> Alive | None:
+def parse_live(key: str) -> LiveToken | None:
     """Parse a liveliness token; return None for other keys."""
     if not key.startswith(_LIVE):
         return None
-    node_id, *words = map(_text, key[len(_LIVE) :].split("/"))
+    node_id, *words = map(_decode_chunk, key[len(_LIVE) :].split("/"))
     try:
-        if words[:1] == ["node"] and len(words) == _NODE_WORDS:
+        if words[:1] == ["node"] and len(words) == _NODE_CHUNKS:
             _kind, name, host, pid, language, generation, since = words
             number, since_ns = int(pid), int(since)
             if not (0 <= number < 2**63 and 0 <= since_ns < 2**63):
                 return None
-            return Alive(
+            return LiveToken(
                 node_id, NodeRecord(node_id, name, host, number or None, language, generation, since_ns)
             )
-        if words[:1] == ["pub"] and len(words) == _PUBLISHER_WORDS:
+        if words[:1] == ["pub"] and len(words) == _PUBLISHER_CHUNKS:
             _kind, id_, topic, msg_type, codec, latched = words
             if topic.startswith(PREFIX):  # a forged token could otherwise register a server
                 return None
             record = PublisherRecord(
-                _number(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
+                _parse_id(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
             )
-            return Alive(node_id, record)
-        if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_WORDS:
+            return LiveToken(node_id, record)
+        if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_CHUNKS:
             _kind, id_, topic, msg_type = words
             if topic.startswith(PREFIX):
                 return None
-            return Alive(node_id, SubscriberRecord(_number(id_), topic, msg_type))
+            return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic, msg_type))
         return _parse_service(node_id, *words)
     except ValueError:
         return None
 
 
-def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> Alive | None:
+def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> LiveToken | None:
     # Raises `ValueError`.
     if kind == "srv" and len(rest) == 2 and rest[0]:
         service, since = rest
-        endpoint = serve_key(service, _number(since), _number(id_))
+        endpoint = serve_key(service, _parse_id(since), _parse_id(id_))
         record = PublisherRecord(
-            _number(id_), topic_of_service(service), SERVICE_TYPE, SERVICE_TYPE, (endpoint,)
+            _parse_id(id_), topic_of_service(service), SERVICE_TYPE, SERVICE_TYPE, (endpoint,)
         )
-        return Alive(node_id, record)
+        return LiveToken(node_id, record)
     if kind == "cli" and len(rest) == 1 and rest[0]:
-        return Alive(node_id, SubscriberRecord(_number(id_), topic_of_service(rest[0]), SERVICE_TYPE))
+        return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic_of_service(rest[0]), SERVICE_TYPE))
     return None
 
 
-def _number(word: str) -> int:
+def _parse_id(word: str) -> int:
     # Raises `ValueError`.
     number = int(word, 16)
-    if not 0 < number <= _ID_MOST:
+    if not 0 < number <= _MAX_ID:
         raise ValueError(word)
     return number

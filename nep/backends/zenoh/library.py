@@ -70,7 +70,7 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             _sessions.remove(session)
 
 
-def keep_for_ever(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+def keep_forever(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
     """Prevent the finalizer of an object in a forked child, which would notify the network."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
@@ -81,7 +81,7 @@ def _forked() -> None:
         return
     _inherited.add("zenoh")
     for session in _sessions:
-        keep_for_ever(session)
+        keep_forever(session)
 
 
 in_child(_forked)

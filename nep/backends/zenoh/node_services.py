@@ -39,10 +39,10 @@ class ZenohServices:
         server = ZenohServer(session, spec, self._forget)
         try:
             with self._lock:
-                self._check_open()
+                self._check_open_locked()
                 self._servers = (*self._servers, server)
             session.add_server(server)
-            session.meet_all(HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_S)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             server.close(0.0)
             raise
@@ -55,18 +55,17 @@ class ZenohServices:
         client = ZenohClient(session, spec, self._deadlines, self._forget)
         try:
             with self._lock:
-                self._check_open()
+                self._check_open_locked()
                 self._clients = (*self._clients, client)
                 self._deadlines.watch(client)
             session.add_client(client)
-            session.meet_all(HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_S)
         except BaseException:
             client.close()
             raise
         return client
 
-    def _check_open(self) -> None:
-        # Call with the lock held.
+    def _check_open_locked(self) -> None:
         if self._is_closed:
             raise ClosedError(f"node '{self._node_name}'")
 

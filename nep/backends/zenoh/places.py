@@ -30,27 +30,27 @@ _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^
 _SECURED = re.compile(r"\b(?:tls|quic)/")
 _FILES = (".json5", ".json", ".yaml", ".yml")
 _DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
-_WAITS_S = 0.05
+_MESSAGE_WAIT_S = 0.05
 """Time in seconds that a message, or the first fragment of a large one, waits for room in a connection.
 
 Zenoh's default of one millisecond passes before its thread has run once on a busy computer. A suspended
 subscriber costs the publisher this time once: zenoh then drops at once until there is room again.
 """
-_LARGE_WAITS_S = 1.0
+_FRAGMENTS_WAIT_S = 1.0
 """Total time in seconds that all fragments of a large message wait for room before the message is dropped.
 
 Zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
 """
-_LONGEST_S = 10**6
+_MAX_TIMEOUT_S = 10**6
 _SESSION_FILES = 16
 _PEER_FILES = 2
-_TRIES = 5
-_CONNECTED_S, _LOOK_S = 1.0, 0.005
+_PORT_ATTEMPTS = 5
+_CONNECTED_S, _CONNECT_POLL_S = 1.0, 0.005
 _TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
 
 
 @dataclass(frozen=True)
-class Opened:
+class OpenedSession:
     """Open session with its rendezvous entry.
 
     `endpoints` must be closed in a forked child (`forks.give_up`). Without a connection to one of `routers`
@@ -64,7 +64,7 @@ class Opened:
     routers: tuple[str, ...] = ()
 
     @property
-    def is_cut_off(self) -> bool:
+    def is_router_lost(self) -> bool:
         """True if the connection to the router is lost. Zenoh reconnects by itself."""
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
@@ -98,7 +98,7 @@ def _endpoints_in(place: str) -> tuple[str, ...]:
     return words if all(map(_ENDPOINT.fullmatch, words)) else ()
 
 
-def open_place(place: str, wait_s: float | None) -> Opened:
+def open_place(place: str, wait_s: float | None) -> OpenedSession:
     """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError`."""
     local = _LOCAL.fullmatch(place)
     if local is not None:
@@ -106,35 +106,37 @@ def open_place(place: str, wait_s: float | None) -> Opened:
     check_room(_SESSION_FILES, "a session of zenoh")
     endpoints = _endpoints_in(place)
     if not endpoints:
-        return Opened(_open_as_told(Path(place)))
-    told: dict[str, object] = {
+        return OpenedSession(_open_file(Path(place)))
+    settings: dict[str, object] = {
         "mode": "client",
         "connect": {
             "endpoints": list(endpoints),
-            "timeout_ms": round(1000 * min(_LONGEST_S, _LONGEST_S if wait_s is None else wait_s)),
+            "timeout_ms": round(1000 * min(_MAX_TIMEOUT_S, _MAX_TIMEOUT_S if wait_s is None else wait_s)),
         },
         "scouting": {"multicast": {"enabled": False}},
     }
-    given = tuple(f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/"))
-    return Opened(_open(_config(told), place), endpoints=given, routers=endpoints)
+    tcp_endpoints = tuple(
+        f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/")
+    )
+    return OpenedSession(_open(_config(settings), place), endpoints=tcp_endpoints, routers=endpoints)
 
 
-def _open_local(name: str) -> Opened:
+def _open_local(name: str) -> OpenedSession:
     meeting = Rendezvous(name)
-    with meeting.alone():
+    with meeting.exclusive():
         others = [entry.port for entry in meeting.entries()]
         check_room(_SESSION_FILES + _PEER_FILES * len(others), "a session of zenoh")
         port, session = _open_at_free_port(others)
         entry = meeting.add(port)
     endpoints = tuple(f"tcp://{LOOPBACK}:{each}" for each in (port, *others))
-    return Opened(session, meeting, entry, endpoints)
+    return OpenedSession(session, meeting, entry, endpoints)
 
 
 def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
     # Another program may bind the port before zenoh does; then try another port.
-    for left in reversed(range(_TRIES)):
+    for left in reversed(range(_PORT_ATTEMPTS)):
         port = free_port()
-        told: dict[str, object] = {
+        settings: dict[str, object] = {
             "mode": "peer",
             "listen": {"endpoints": [f"tcp/{LOOPBACK}:{port}"], "timeout_ms": 0, "exit_on_failure": True},
             "connect": {
@@ -146,43 +148,45 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
             "open": {"return_conditions": {"connect_scouted": False, "declares": True}},
         }
         try:
-            return port, open_session(_config(told))
+            return port, open_session(_config(settings))
         except library().ZError as error:
             if not left:
                 raise NepError(
-                    _("zenoh cannot listen at '{host}': {error}").format(host=LOOPBACK, error=_short(error))
+                    _("zenoh cannot listen at '{host}': {error}").format(
+                        host=LOOPBACK, error=_without_location(error)
+                    )
                 ) from error
     raise AssertionError
 
 
-def _open_as_told(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _open_file(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     # Peers connect in the background, so wait a moment for them.
-    config = _config_of(path)
+    config = _load_config(path)
     session = _open(config, str(path))
     if json.loads(config.get_json("connect/endpoints")):
         pause, deadline = threading.Event(), time.monotonic() + _CONNECTED_S
         while time.monotonic() < deadline and not (session.info.routers_zid() or session.info.peers_zid()):
-            pause.wait(_LOOK_S)
+            pause.wait(_CONNECT_POLL_S)
     return session
 
 
-def _config(told: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _config(settings: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh is not typed
     drop = {
-        "wait_before_drop": round(1e6 * _WAITS_S),
-        "max_wait_before_drop_fragments": round(1e6 * _LARGE_WAITS_S),
+        "wait_before_drop": round(1e6 * _MESSAGE_WAIT_S),
+        "max_wait_before_drop_fragments": round(1e6 * _FRAGMENTS_WAIT_S),
     }
     queue = {"queue": {"congestion_control": {"drop": drop}}}
-    return library().Config.from_json5(json.dumps({**told, "transport": {"link": {"tx": queue}}}))
+    return library().Config.from_json5(json.dumps({**settings, "transport": {"link": {"tx": queue}}}))
 
 
-def _config_of(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     # Defaults for options that the file leaves out: loopback, no multicast. Raises `NepError`.
     try:
         config = library().Config.from_file(str(path.expanduser()))
     except library().ZError as error:
         raise NepError(
             _("'{path}' is no configuration of zenoh: {error}; see its DEFAULT_CONFIG.json5").format(
-                path=path, error=_short(error)
+                path=path, error=_without_location(error)
             )
         ) from error
     if json.loads(config.get_json("listen/endpoints")) == _DEFAULT_LISTENS:
@@ -197,8 +201,8 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
     try:
         return open_session(config)
     except library().ZError as error:
-        said = _short(error)
-        if _SECURED.search(said) is not None:
+        message = _without_location(error)
+        if _SECURED.search(message) is not None:
             reason = _(
                 "zenoh cannot open a session at '{place}': {error}; is a router there, and does each side "
                 "trust the other one's certificate?"
@@ -207,9 +211,9 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
             reason = _(
                 "zenoh cannot open a session at '{place}': {error}; is a router there, and may it be used?"
             )
-        raise NepError(reason.format(place=place, error=said)) from error
+        raise NepError(reason.format(place=place, error=message)) from error
 
 
-def _short(error: Exception) -> str:
+def _without_location(error: Exception) -> str:
     # Removes the source location from zenoh's message.
     return _TAIL.sub("", str(error)).strip().rstrip(".")

@@ -51,9 +51,11 @@ class ZenohPublisher:
         self._out: Any = session.declare_publisher(
             data_key(spec.topic), congestion_control=zenoh.CongestionControl.DROP
         )
-        self._listener: Any = self._out.declare_matching_listener(callback(self._matched))
+        self._listener: Any = self._out.declare_matching_listener(callback(self._handle_matching))
         self._is_matched = bool(self._out.matching_status.matching)
-        self._hellos: Any = session.declare_queryable(hello_key(spec.topic, spec.id), callback(self._greeted))
+        self._hellos: Any = session.declare_queryable(
+            hello_key(spec.topic, spec.id), callback(self._handle_hello)
+        )
 
     # ---- subscribers
 
@@ -67,18 +69,18 @@ class ZenohPublisher:
         """True if the topic has subscribers, including programs that don't use nep."""
         return self._is_matched or self.subscribers > 0
 
-    def _matched(self, status: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_matching(self, status: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         self._is_matched = bool(status.matching)
 
-    def _greeted(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_hello(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread. Replies with the history and the number of the last message.
         with self._lock:
             history = () if self._is_closed else tuple(self._history)
             header = Header(self.spec.codec.number, 0, self.count, time.time_ns(), self.spec.id)
             is_closed = self._is_closed
         with query:  # without the lock: a querier that doesn't read the reply must not block the others
-            for data, beside in history:
-                query.reply(self._key, data, attachment=beside)
+            for data, attachment in history:
+                query.reply(self._key, data, attachment=attachment)
             if not is_closed:
                 query.reply(self._key, b"", attachment=header.pack())
 
@@ -124,9 +126,9 @@ class ZenohPublisher:
             header = Header(
                 self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size
             )
-            beside = header.pack() + extension
-            self._history.add((data, beside), len(data))
-            self._out.put(data, attachment=beside)
+            attachment = header.pack() + extension
+            self._history.add((data, attachment), len(data))
+            self._out.put(data, attachment=attachment)
 
     # ---- closing
 

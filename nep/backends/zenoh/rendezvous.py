@@ -28,10 +28,10 @@ from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 
 _logger = logging.getLogger("nep")
-_LOCK_S = 5.0
-_LOOK_S = 0.002
-_TRIES = 100
-_STOPPED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
+_LOCK_TIMEOUT_S = 5.0
+_LOCK_POLL_S = 0.002
+_PORT_ATTEMPTS = 100
+_SUSPENDED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
 
 
 class SessionPort(NamedTuple):
@@ -49,7 +49,7 @@ class SessionPort(NamedTuple):
 
 def free_port() -> int:
     """Return a free loopback port, except those of the original NEP. Raises `AddressInUseError`."""
-    for _try in range(_TRIES):
+    for _try in range(_PORT_ATTEMPTS):
         with socket.socket() as probe:
             probe.bind((LOOPBACK, 0))
             port = int(probe.getsockname()[1])
@@ -62,10 +62,10 @@ class Rendezvous:
     """Folder of the sessions with one name. Raises `NepError` if it doesn't belong to the user."""
 
     def __init__(self, name: str) -> None:
-        self._folder = _own_folder(_own_folder(_root()) / name)
+        self._folder = _own_folder(_own_folder(_root_folder()) / name)
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
+    def exclusive(self) -> Iterator[None]:
         """Hold the lock for opening a session. A process that hangs with it delays others by 5 s only."""
         with (self._folder / "lock").open("ab") as file:
             is_held = _lock(file.fileno())
@@ -84,13 +84,13 @@ class Rendezvous:
         """Return the sessions of running programs; delete the files of others."""
         found = []
         for path in self._folder.iterdir():
-            entry = _entry_in(path.name)
+            entry = _parse_entry(path.name)
             if entry is None:
                 continue
-            status = _status(entry)
+            status = _process_status(entry)
             if status is None:
                 path.unlink(missing_ok=True)
-            elif status in _STOPPED:
+            elif status in _SUSPENDED:
                 _logger.warning(
                     "skipping process %d, which is suspended; nodes created now can't reach it", entry.pid
                 )
@@ -100,7 +100,7 @@ class Rendezvous:
 
     def add(self, port: int) -> SessionPort:
         """Create the file of a session that listens at `port`."""
-        entry = SessionPort(port, os.getpid(), _began(os.getpid()))
+        entry = SessionPort(port, os.getpid(), _start_time(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry
 
@@ -110,7 +110,7 @@ class Rendezvous:
             (self._folder / entry.name).unlink(missing_ok=True)
 
 
-def _root() -> Path:
+def _root_folder() -> Path:
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if runtime and Path(runtime).is_dir() and os.access(runtime, os.W_OK):
         return Path(runtime) / "nep-zenoh"
@@ -139,7 +139,7 @@ def _own_folder(folder: Path) -> Path:
     return folder
 
 
-def _entry_in(name: str) -> SessionPort | None:
+def _parse_entry(name: str) -> SessionPort | None:
     words = name.split("-")
     if len(words) != len(SessionPort._fields) or not all(each.isascii() and each.isdigit() for each in words):
         return None
@@ -147,30 +147,30 @@ def _entry_in(name: str) -> SessionPort | None:
     return entry if 0 < entry.port < 65536 and 0 < entry.pid < 2**31 else None
 
 
-def _began(pid: int) -> int:
+def _start_time(pid: int) -> int:
     return round(psutil.Process(pid).create_time() * 100)
 
 
-def _status(entry: SessionPort) -> str | None:
+def _process_status(entry: SessionPort) -> str | None:
     # Returns None if the process has ended.
     try:
         process = psutil.Process(entry.pid)
         status = process.status()
-        is_it = abs(round(process.create_time() * 100) - entry.began) <= 1
+        is_same = abs(round(process.create_time() * 100) - entry.began) <= 1
     except psutil.NoSuchProcess:
         return None
     except psutil.Error:
         return psutil.STATUS_RUNNING
-    return status if is_it and status != psutil.STATUS_ZOMBIE else None
+    return status if is_same and status != psutil.STATUS_ZOMBIE else None
 
 
 def _lock(descriptor: int) -> bool:
     # Returns False on timeout.
-    pause, deadline = threading.Event(), time.monotonic() + _LOCK_S
+    pause, deadline = threading.Event(), time.monotonic() + _LOCK_TIMEOUT_S
     while not _try_lock(descriptor):
         if time.monotonic() > deadline:
             return False
-        pause.wait(_LOOK_S)
+        pause.wait(_LOCK_POLL_S)
     return True
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from typing import TypeVar
 
-from nep.backends.zenoh.keys import Alive
+from nep.backends.zenoh.keys import LiveToken
 from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
 from nep.protocol.service_wire import service_of, topic_of
 from nep.protocol.topic_pattern import is_pattern, matches
 
 _Record = TypeVar("_Record", PublisherRecord, SubscriberRecord)
-_MOST = 100_000
+_MAX_TOKENS = 100_000
 """Maximum number of tokens: any program in the network can create them."""
 
 
@@ -26,10 +26,10 @@ class Roster:
         self._patterns: set[str] = set()
         self._count = 0
 
-    def note(self, alive: Alive, *, is_there: bool) -> None:
+    def note(self, alive: LiveToken, *, is_there: bool) -> None:
         """Add or remove a token (idempotent)."""
         with self._lock:
-            if is_there and self._count >= _MOST:
+            if is_there and self._count >= _MAX_TOKENS:
                 return
             node_id, record = alive
             if isinstance(record, NodeRecord):
@@ -39,9 +39,9 @@ class Roster:
                     self._nodes[node_id] = record
                 self._count += len(self._nodes) - before
             elif isinstance(record, PublisherRecord):
-                self._count += _note(self._publishers, (node_id, record), is_there)
+                self._count += _update(self._publishers, (node_id, record), is_there)
             else:
-                self._count += _note(self._subscribers, (node_id, record), is_there)
+                self._count += _update(self._subscribers, (node_id, record), is_there)
                 if is_pattern(record.topic):
                     self._patterns.discard(record.topic)
                     if record.topic in self._subscribers:
@@ -53,10 +53,10 @@ class Roster:
         if not self._patterns:
             return found
         with self._lock:
-            return found + sum(len(self._subscribers[each]) for each in self._matching(topic))
+            return found + sum(len(self._subscribers[each]) for each in self._matching_locked(topic))
 
-    def _matching(self, topic: str) -> list[str]:
-        # Other topics than `topic`. Call with the lock held.
+    def _matching_locked(self, topic: str) -> list[str]:
+        # Other topics than `topic`.
         return [each for each in self._patterns if each != topic and matches(each, topic)]
 
     @property
@@ -74,24 +74,24 @@ class Roster:
     def servers_of(self, service: str) -> tuple[str, ...]:
         """Return the keys of a service's servers, oldest first."""
         with self._lock:
-            there = self._publishers.get(topic_of(service), {}).values()
-            return tuple(sorted(record.endpoints[0] for _node_id, record in there if record.endpoints))
+            entries = self._publishers.get(topic_of(service), {}).values()
+            return tuple(sorted(record.endpoints[0] for _node_id, record in entries if record.endpoints))
 
     def subscribers_of(self, topic: str) -> tuple[Expected, ...]:
         """Return the subscribers of a topic."""
         with self._lock:
-            there = [
+            entries = [
                 found
-                for each in (topic, *self._matching(topic))
+                for each in (topic, *self._matching_locked(topic))
                 for found in self._subscribers.get(each, {}).values()
             ]
-            return tuple(Expected(each.id, node_id, self._name(node_id)) for node_id, each in there)
+            return tuple(Expected(each.id, node_id, self._name(node_id)) for node_id, each in entries)
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
         """Return the publishers of a topic."""
         with self._lock:
-            there = self._publishers.get(topic, {}).values()
-            return tuple(RemotePublisher(each, node_id, self._name(node_id)) for node_id, each in there)
+            entries = self._publishers.get(topic, {}).values()
+            return tuple(RemotePublisher(each, node_id, self._name(node_id)) for node_id, each in entries)
 
     def remote(self, node_id: str, record: PublisherRecord) -> RemotePublisher:
         """Return a publisher's record with the name of its node."""
@@ -115,24 +115,24 @@ class Roster:
         return "" if node is None else node.name
 
 
-def _note(
+def _update(
     table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_there: bool
 ) -> int:
     # Returns the change of the number of entries.
     record = alive[1]
-    there = table.setdefault(record.topic, {})
-    before = len(there)
-    there.pop(record.id, None)
+    entries = table.setdefault(record.topic, {})
+    before = len(entries)
+    entries.pop(record.id, None)
     if is_there:
-        there[record.id] = alive
-    if not there:
+        entries[record.id] = alive
+    if not entries:
         del table[record.topic]
-    return len(there) - before
+    return len(entries) - before
 
 
 def _by_node(table: dict[str, dict[int, tuple[str, _Record]]]) -> dict[str, list[_Record]]:
     found: dict[str, list[_Record]] = {}
-    for there in table.values():
-        for node_id, record in there.values():
+    for entries in table.values():
+        for node_id, record in entries.values():
             found.setdefault(node_id, []).append(record)
     return found

@@ -31,7 +31,7 @@ from nep.backends.services import (
     too_large,
 )
 from nep.backends.zenoh.keys import serve_key
-from nep.backends.zenoh.library import keep_for_ever, library
+from nep.backends.zenoh.library import keep_forever, library
 from nep.backends.zenoh.session import ZenohSession
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
@@ -46,10 +46,10 @@ from nep.protocol.requests import (
 from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
-_LATE_S = 30.0
+_LATE_REPLY_S = 30.0
 """Time in seconds after the timeout in which a reply is still counted as late."""
-_LONGEST_S = 1e9
-_GONE_S = 0.5
+_UNLIMITED_S = 1e9
+_TOKEN_DELAY_S = 0.5
 """Maximum time in seconds between the end of a server's calls and the removal of its token."""
 
 Then = Callable[[Outcome], None]
@@ -76,14 +76,14 @@ class ZenohServer:
             spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, self.endpoints
         )
         session.check(self.record)
-        self._queryable: Any = session.answering(self._key, self._asked)
+        self._queryable: Any = session.declare_queryable(self._key, self._handle_query)
 
-    def _asked(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_query(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
         data: bytes = b"" if query.payload is None else query.payload.to_bytes()
-        beside: bytes = b"" if query.attachment is None else query.attachment.to_bytes()
+        attachment: bytes = b"" if query.attachment is None else query.attachment.to_bytes()
         try:
-            call = NATIVE.read_call([beside, data])
+            call = NATIVE.read_call([attachment, data])
             if len(data) > PAYLOAD_MAX_BYTES:
                 raise WireError(too_large(len(data)))
         except WireError as error:
@@ -151,22 +151,22 @@ class ZenohServer:
         """Become closed in a forked child."""
         self.is_closed = True
         for query in self._queries:
-            keep_for_ever(query)
+            keep_forever(query)
         self._lock = threading.Lock()
         self.calls.forked()
 
 
 @dataclass(eq=False)
 class _Call:
-    # Call in flight at the server `key`; "" while there is none. `over_at`: deadline for the removal of the
-    # server's token after zenoh has finished the query.
+    # Call in flight at the server `key`; "" while there is none. `finished_at` is the deadline for the removal
+    # of the server's token after zenoh has finished the query.
     number: int
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
     then: Then
     key: str = ""
-    over_at: float = math.inf
+    finished_at: float = math.inf
     size: int = 0
 
     def __post_init__(self) -> None:
@@ -209,7 +209,7 @@ class ZenohClient(ClientCalls[_Call]):
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
-        call = self._added(data, timeout_s, then)
+        call = self._new_call(data, timeout_s, then)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
         return call
@@ -219,7 +219,7 @@ class ZenohClient(ClientCalls[_Call]):
         calls: list[OpenCall] = []
         try:
             for key in self._servers:
-                call = self._added(data, timeout_s, then)
+                call = self._new_call(data, timeout_s, then)
                 calls.append(call)
                 self._send(call, key)
                 self._deadlines.add(call.deadline)
@@ -228,7 +228,7 @@ class ZenohClient(ClientCalls[_Call]):
             raise
         return calls
 
-    def _added(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
+    def _new_call(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -248,61 +248,65 @@ class ZenohClient(ClientCalls[_Call]):
         limit_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = NATIVE.call(call.number, self.spec.codec.number, limit_s, call.data)
         call.data = b""  # the query outlives its timeout: free the payload
-        heard_s = _LONGEST_S if limit_s is None else min(_LONGEST_S, limit_s + _LATE_S)
+        query_s = _UNLIMITED_S if limit_s is None else min(_UNLIMITED_S, limit_s + _LATE_REPLY_S)
         try:
             self._session.call(
-                key, parts, heard_s, lambda reply: self._replied(call, reply), lambda: self._over(call)
+                key,
+                parts,
+                query_s,
+                lambda reply: self._handle_reply(call, reply),
+                lambda: self._handle_finished(call),
             )
         except library().ZError as error:  # the session was closed meanwhile
             _logger.debug("can't send a call of '%s': %s", self.spec.service, error)
-            self._end(call, self._closed_error())
+            self._finish(call, self._closed_error())
 
-    def _replied(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_reply(self, call: _Call, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread, or in the one that sends.
         if reply.ok is None:
             return  # an error of zenoh, such as a timeout
         sample = reply.ok
-        beside = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
         try:
-            number, outcome = NATIVE.read_answer([beside, sample.payload.to_bytes()])
+            number, outcome = NATIVE.read_answer([attachment, sample.payload.to_bytes()])
             if number != call.number:
                 raise WireError(_("it is no answer of a service"))
         except WireError as error:
             if self._refusals.add(error.reason):
-                said = "malformed reply from the server of '%s': %s"
-                _logger.warning(said, self.spec.service, error)
+                log_line = "malformed reply from the server of '%s': %s"
+                _logger.warning(log_line, self.spec.service, error)
             return
-        if not self._end(call, outcome):
+        if not self._finish(call, outcome):
             with self._lock:
                 self.late += 1
 
-    def _over(self, call: _Call) -> None:
+    def _handle_finished(self, call: _Call) -> None:
         # The query is finished: without a reply the server has ended, or never received the call.
         if call.key not in self._servers:
-            self._end(call, ServerGoneError(self.spec.service))
+            self._finish(call, ServerGoneError(self.spec.service))
             return
-        call.over_at = time.monotonic() + _GONE_S
-        self._deadlines.add(call.over_at)
+        call.finished_at = time.monotonic() + _TOKEN_DELAY_S
+        self._deadlines.add(call.finished_at)
 
-    def _end_unanswered(self, call: _Call, now: float) -> None:
+    def _fail_unanswered(self, call: _Call, now: float) -> None:
         # For calls whose query is finished without a reply.
         if call.key not in self._servers:
-            self._end(call, ServerGoneError(self.spec.service))
-        elif call.over_at <= now:
+            self._finish(call, ServerGoneError(self.spec.service))
+        elif call.finished_at <= now:
             reason = _(
                 "the server of '{service}' is there and did not answer; it may not have understood the call, "
                 "or a router's access control forbids '{key}'"
             )
-            self._end(call, NepError(reason.format(service=self.spec.service, key=call.key)))
+            self._finish(call, NepError(reason.format(service=self.spec.service, key=call.key)))
 
-    def _end(self, call: _Call, outcome: Outcome) -> bool:
+    def _finish(self, call: _Call, outcome: Outcome) -> bool:
         # Returns False if the call is no longer in flight.
         with self._lock:
-            if not self._take(call):
+            if not self._remove_locked(call):
                 return False
             self._answered += not isinstance(outcome, NepError)
             self._failed += isinstance(outcome, NepError)
-        self._tell(call, outcome)
+        self._run_callback(call, outcome)
         return True
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
@@ -324,16 +328,16 @@ class ZenohClient(ClientCalls[_Call]):
         for call in waiting:
             self._send(call, key)
         with self._lock:
-            over = [each for each in self._calls.values() if each.over_at < math.inf]
-        for call in over:
-            self._end_unanswered(call, now)
+            finished = [each for each in self._calls.values() if each.finished_at < math.inf]
+        for call in finished:
+            self._fail_unanswered(call, now)
         with self._lock:
             late = [each for each in self._calls.values() if each.deadline <= now]
         for call in late:
             kind = ServiceTimeoutError if call.key else NoServerError
-            self._end(call, kind(self.spec.service, call.timeout_s or 0.0))
+            self._finish(call, kind(self.spec.service, call.timeout_s or 0.0))
         with self._lock:
-            dues = [min(each.deadline, each.over_at) for each in self._calls.values()]
+            dues = [min(each.deadline, each.finished_at) for each in self._calls.values()]
         return min(dues, default=math.inf)
 
     def known(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
@@ -357,4 +361,4 @@ class ZenohClient(ClientCalls[_Call]):
         self._deadlines.forget(self)
         self._on_close(self)
         for call in left:
-            self._tell(call, self._closed_error())
+            self._run_callback(call, self._closed_error())

@@ -55,7 +55,7 @@ _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
 """Extra time in seconds before a query times out here; normally zenoh reports the timeout."""
 _GREETING_S = 10.0
-_REPLIES_MOST, _LISTS_MOST = 100, 20_000
+_MAX_REPLIES, _MAX_LIST_ITEMS = 100, 20_000
 
 
 class ListedServer(Protocol):
@@ -79,30 +79,30 @@ class ListedClient(Protocol):
         """Process a change of the service's servers. Runs in a zenoh thread; must not block."""
 
 
-class Inquiry:
+class PendingQuery:
     """Pending query: replies so far, and whether all have replied."""
 
-    def __init__(self, timeout_s: float, on_over: Callable[[], None] | None = None) -> None:
-        self._on_over = on_over
-        self.answers: dict[str, bytes] = {}
+    def __init__(self, timeout_s: float, on_finished: Callable[[], None] | None = None) -> None:
+        self._on_finished = on_finished
+        self.replies: dict[str, bytes] = {}
         self._ends_at = time.monotonic() + timeout_s + _GRACE_S
-        self._is_over = False
+        self._is_finished = False
         self._changed = threading.Condition()
 
-    def answered(self, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def add_reply(self, reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         """Add a reply. Runs in a zenoh thread."""
         if reply.ok is not None:
             with self._changed:
-                self.answers[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
+                self.replies[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
                 self._changed.notify_all()
 
-    def over(self) -> None:
+    def finish(self) -> None:
         """Finish the query: all have replied, or the timeout has passed."""
         with self._changed:
-            self._is_over = True
+            self._is_finished = True
             self._changed.notify_all()
-        if self._on_over is not None:
-            self._on_over()
+        if self._on_finished is not None:
+            self._on_finished()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
         """Wait for the replies of `wanted`, or of all; return the keys without a reply."""
@@ -110,10 +110,10 @@ class Inquiry:
         with self._changed:
             wait_until(
                 self._changed,
-                lambda: self._is_over or (wanted is not None and wanted <= self.answers.keys()),
+                lambda: self._is_finished or (wanted is not None and wanted <= self.replies.keys()),
                 ends_at - time.monotonic(),
             )
-            return frozenset() if wanted is None else wanted - self.answers.keys()
+            return frozenset() if wanted is None else wanted - self.replies.keys()
 
 
 class ZenohSession:
@@ -136,8 +136,10 @@ class ZenohSession:
         self._zenoh: Any = self._opened.session
         try:
             self._declared = (
-                self._zenoh.liveliness().declare_subscriber(ALL_LIVE, callback(self._noticed), history=True),
-                self._zenoh.declare_queryable(call_key(node.id), callback(self._called)),
+                self._zenoh.liveliness().declare_subscriber(
+                    ALL_LIVE, callback(self._handle_token), history=True
+                ),
+                self._zenoh.declare_queryable(call_key(node.id), callback(self._handle_query)),
             )
         except BaseException:
             self.close(0.0)
@@ -154,7 +156,7 @@ class ZenohSession:
         take: Callable[[Any], None] | None = None,
         over: Callable[[], None] | None = None,
         is_last: bool = False,
-    ) -> Inquiry:
+    ) -> PendingQuery:
         """Query all nodes that reply at `key`; doesn't wait.
 
         Args:
@@ -166,16 +168,16 @@ class ZenohSession:
             is_last: True to send it behind all messages published before.
         """
         zenoh = library()
-        question = Inquiry(timeout_s, over)
+        query = PendingQuery(timeout_s, over)
 
         def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             if take is not None and reply.ok is not None:
                 take(reply.ok)
-            question.answered(reply)
+            query.add_reply(reply)
 
         self._zenoh.get(
             key,
-            callback(answered, question.over),
+            callback(answered, query.finish),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=max(timeout_s, 0.001),
@@ -183,40 +185,40 @@ class ZenohSession:
             priority=zenoh.Priority.BACKGROUND if is_last else zenoh.Priority.DATA,
             payload=None if request is None else encode_request(request, 0),
         )
-        return question
+        return query
 
-    def meet_all(self, timeout_s: float) -> Mapping[str, bytes]:
+    def sync_all(self, timeout_s: float) -> Mapping[str, bytes]:
         """Query every node and wait; return the replies.
 
         Afterwards all earlier declarations are known on both sides.
         """
         if self._opened.meeting is None:
-            self._ask_routers(timeout_s)
-        question = self.ask(ALL_CALLS, requests.Ping(), timeout_s)
-        question.wait()
-        return question.answers
+            self._sync_routers(timeout_s)
+        query = self.ask(ALL_CALLS, requests.Ping(), timeout_s)
+        query.wait()
+        return query.replies
 
-    def _ask_routers(self, timeout_s: float) -> None:
+    def _sync_routers(self, timeout_s: float) -> None:
         # The reply of the routers follows the declarations of all reachable nodes.
-        question = Inquiry(timeout_s)
+        query = PendingQuery(timeout_s)
         self._zenoh.liveliness().get(
-            node_key(self.node), callback(question.answered, question.over), timeout=max(timeout_s, 0.001)
+            node_key(self.node), callback(query.add_reply, query.finish), timeout=max(timeout_s, 0.001)
         )
-        question.wait()
+        query.wait()
 
-    def _called(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_query(self, query: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
         asked = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
         answer = b""
         if isinstance(asked, requests.Look):
-            answer = pack_saturated([encode_request(each, 0) for each in self._presented()])
+            answer = pack_saturated([encode_request(each, 0) for each in self._own_requests()])
         elif isinstance(asked, requests.RemovePublisher):
             for subscriber in self._subscribers:
                 subscriber.bye(asked.id, asked.last_seq)
         with query:
             query.reply(call_key(self.node.id), answer)
 
-    def _presented(self) -> tuple[Request, ...]:
+    def _own_requests(self) -> tuple[Request, ...]:
         # This node's registration and statistics; empty while it has nothing.
         with self._lock:
             publishers, subscribers = self._publishers, self._subscribers
@@ -261,7 +263,7 @@ class ZenohSession:
 
     # ---- discovery
 
-    def _noticed(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _handle_token(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
         alive = parse_live(str(sample.key_expr))
         if alive is None:
@@ -277,12 +279,12 @@ class ZenohSession:
                     client.servers_changed()
             return
         for subscriber in self._subscribers:
-            if subscriber.hears(record.topic):
+            if subscriber.matches_topic(record.topic):
                 if is_there:
-                    subscriber.met(self.roster.remote(alive.node_id, record))
+                    subscriber.add_publisher(self.roster.remote(alive.node_id, record))
                     self._greet(record, subscriber)
                 else:
-                    subscriber.lapsed(record.id)
+                    subscriber.mark_silent(record.id)
 
     def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
         # Greets a publisher that came after its subscriber.
@@ -290,24 +292,24 @@ class ZenohSession:
             hello_key(record.topic, record.id),
             None,
             _GREETING_S,
-            take=subscriber.told,
-            over=lambda: subscriber.greeted((record.id,)),
+            take=subscriber.receive_reply,
+            over=lambda: subscriber.end_greeting((record.id,)),
         )
 
-    def look(self, timeout_s: float) -> GraphView:
+    def query_graph(self, timeout_s: float) -> GraphView:
         """Return the graph; nodes that don't reply in time are listed without statistics.
 
         Raises `NepError` while the router is disconnected.
         """
-        if self._opened.is_cut_off:
+        if self._opened.is_router_lost:
             raise NepError(
                 _("no router of zenoh answers at '{place}' now; start it, and it is found again").format(
                     place=",".join(self._opened.routers)
                 )
             )
-        question = self.ask(ALL_CALLS, requests.Look(), timeout_s)
-        question.wait()
-        told = [_requests_in(key, answer) for key, answer in question.answers.items()]
+        query = self.ask(ALL_CALLS, requests.Look(), timeout_s)
+        query.wait()
+        told = [_requests_in(key, answer) for key, answer in query.replies.items()]
         with self._lock:
             now = time.monotonic()
             spoken = {each.node.id for said in told for each in said if isinstance(each, requests.Join)}
@@ -349,29 +351,29 @@ class ZenohSession:
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
         for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
-            subscriber.met(remote)
+            subscriber.add_publisher(remote)
         key = data_keys(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._outputs[spec.id] = self._zenoh.declare_subscriber(key, callback(subscriber.came))
+            self._outputs[spec.id] = self._zenoh.declare_subscriber(key, callback(subscriber.receive_message))
             self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
 
     def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
         """Greet all publishers of a subscriber's topic, which reply with their history and last number."""
         there = self._publishers_for(subscriber)
         for remote in there:
-            subscriber.met(remote)
+            subscriber.add_publisher(remote)
         spec = subscriber.spec
         key = hellos_keys(spec.topic) if spec.is_pattern else hellos_key(spec.topic)
-        self.ask(key, None, timeout_s, take=subscriber.told).wait()
-        subscriber.greeted(each.publisher.id for each in there)
+        self.ask(key, None, timeout_s, take=subscriber.receive_reply).wait()
+        subscriber.end_greeting(each.publisher.id for each in there)
 
     def _publishers_for(self, subscriber: ZenohSubscriber) -> tuple[RemotePublisher, ...]:
         topics = self.roster.published if subscriber.spec.is_pattern else (subscriber.spec.topic,)
         return tuple(
             remote
             for topic in topics
-            if subscriber.hears(topic)
+            if subscriber.matches_topic(topic)
             for remote in self.roster.publishers_of(topic)
         )
 
@@ -416,7 +418,7 @@ class ZenohSession:
             with suppress(library().ZError):  # closing the session has undeclared it
                 token.undeclare()
 
-    def answering(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
+    def declare_queryable(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
         """Declare a queryable."""
         return self._zenoh.declare_queryable(key, callback(take))
 
@@ -453,14 +455,14 @@ class ZenohSession:
         for token in tokens:
             token.undeclare()
         if tokens and timeout_s > 0.0:
-            self.meet_all(timeout_s)  # a graph queried after this doesn't contain this node any more
+            self.sync_all(timeout_s)  # a graph queried after this doesn't contain this node any more
         close_session(self._zenoh)
 
 
 def _requests_in(key: str, answer: bytes) -> tuple[Request, ...]:
     # Ignores malformed requests and those about other nodes.
     try:
-        bodies = unpack_bounded(answer, _REPLIES_MOST, _LISTS_MOST) if answer else []
+        bodies = unpack_bounded(answer, _MAX_REPLIES, _MAX_LIST_ITEMS) if answer else []
     except ValueError:
         return ()
     if not isinstance(bodies, list) or not all(isinstance(each, bytes) for each in bodies):

@@ -25,13 +25,13 @@ from nep.protocol.topic_pattern import matches
 from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 
 _logger = logging.getLogger("nep")
-_EARS_MAX = 10_000
+_MAX_TOPIC_PARSERS = 10_000
 _BATCH_BYTES = 64 * 2**20
 """Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
 """
 
 
-class _Ear(NamedTuple):
+class _TopicParser(NamedTuple):
     # Parser for one topic. `topic` and `own` are the first parts of messages to all, and to this subscriber
     # alone.
     topic: bytes
@@ -55,35 +55,35 @@ class ZenohSubscriber(WakingSubscriber):
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes - batch)
         self._sources = PublisherTracker()
         self._refusals = RejectionLog()
-        self._early = EarlyMessages[tuple[_Ear, list[bytes]]](self._sources, spec.max_messages)
+        self._early = EarlyMessages[tuple[_TopicParser, list[bytes]]](self._sources, spec.max_messages)
         self._problem = ""
-        self._ear = self._new_ear(spec.topic)
-        self._ears: OrderedDict[str, _Ear] = OrderedDict()
+        self._own_parser = self._new_topic_parser(spec.topic)
+        self._topic_parsers: OrderedDict[str, _TopicParser] = OrderedDict()
         """Parsers of recently received topics (with wildcards), most recent last."""
 
-    def _new_ear(self, topic: str) -> _Ear:
+    def _new_topic_parser(self, topic: str) -> _TopicParser:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
         own = hello_part(spec.id, topic)
         parser = CarefulParser(spec, own, self._sources, self._leave, lambda _publisher, _seq: None)
-        return _Ear(topic_part(topic), own, parser)
+        return _TopicParser(topic_part(topic), own, parser)
 
-    def hears(self, topic: str) -> bool:
+    def matches_topic(self, topic: str) -> bool:
         """Return True if the subscriber receives messages of this topic."""
         return topic == self.spec.topic or (self.spec.is_pattern and matches(self.spec.topic, topic))
 
-    def _ear_of(self, sample: Any) -> _Ear | None:  # noqa: ANN401 - zenoh is not typed
+    def _topic_parser_for(self, sample: Any) -> _TopicParser | None:  # noqa: ANN401 - zenoh is not typed
         # Returns None if the topic doesn't match: zenoh's key expression is wider than the pattern.
         if not self.spec.is_pattern:
-            return self._ear
+            return self._own_parser
         topic = topic_of(str(sample.key_expr))
         with self._inboxes.changed:
-            ear = self._ears.pop(topic, None)
-            if ear is None and not self.hears(topic):
+            topic_parser = self._topic_parsers.pop(topic, None)
+            if topic_parser is None and not self.matches_topic(topic):
                 return None
-            ear = self._ears[topic] = ear or self._new_ear(topic)
-            if len(self._ears) > _EARS_MAX:
-                self._ears.popitem(last=False)
-            return ear
+            topic_parser = self._topic_parsers[topic] = topic_parser or self._new_topic_parser(topic)
+            if len(self._topic_parsers) > _MAX_TOPIC_PARSERS:
+                self._topic_parsers.popitem(last=False)
+            return topic_parser
 
     # ---- reading
 
@@ -138,74 +138,79 @@ class ZenohSubscriber(WakingSubscriber):
 
     # ---- callbacks in zenoh's threads
 
-    def came(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def receive_message(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         """Process a message of the topic."""
-        ear = self._ear_of(sample)
-        if ear is not None:
-            self._take(sample, ear, ear.topic)
+        topic_parser = self._topic_parser_for(sample)
+        if topic_parser is not None:
+            self._process(sample, topic_parser, topic_parser.topic)
 
-    def told(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+    def receive_reply(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         """Process a publisher's reply to a hello: a message of the history, or the number of the last one."""
-        ear = self._ear_of(sample)
-        if ear is not None:
-            self._take(sample, ear, ear.own)
+        topic_parser = self._topic_parser_for(sample)
+        if topic_parser is not None:
+            self._process(sample, topic_parser, topic_parser.own)
 
-    def _take(self, sample: Any, ear: _Ear, first: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
+    def _process(self, sample: Any, topic_parser: _TopicParser, first: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
         payload: bytes = sample.payload.to_bytes()
-        beside: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        rest = [beside[:HEADER_BYTES]]
-        if payload or first == ear.topic or len(beside) > HEADER_BYTES or _is_latched(beside):
+        attachment: bytes = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        rest = [attachment[:HEADER_BYTES]]
+        if (
+            payload
+            or first == topic_parser.topic
+            or len(attachment) > HEADER_BYTES
+            or _is_latched(attachment)
+        ):
             rest.append(payload)
-        if len(beside) > HEADER_BYTES:
-            rest.append(beside[HEADER_BYTES:])
+        if len(attachment) > HEADER_BYTES:
+            rest.append(attachment[HEADER_BYTES:])
         with self._inboxes.changed:
             if not self.is_closed:
-                self._take_parts(ear, first, rest)
+                self._process_parts_locked(topic_parser, first, rest)
 
-    def _take_parts(self, ear: _Ear, first: bytes, rest: list[bytes]) -> None:
+    def _process_parts_locked(self, topic_parser: _TopicParser, first: bytes, rest: list[bytes]) -> None:
         # Call with the lock of the inboxes held.
         try:
             if not rest[0]:
                 raise WireError(_("it has no header; a program of another kind published it"), len(rest[-1]))
-            if first == ear.topic and _is_latched(rest[0]) and self._is_early(ear, rest):
+            if first == topic_parser.topic and _is_latched(rest[0]) and self._is_early(topic_parser, rest):
                 return
-            self._hear(ear.parser.parse(first, rest))
-            if first == ear.own and len(rest) == 1:  # end of the reply to a hello
-                self._take_early(read_header(rest[0]).publisher)
+            self._append(topic_parser.parser.parse(first, rest))
+            if first == topic_parser.own and len(rest) == 1:  # end of the reply to a hello
+                self._release_early(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
                 _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
 
-    def _is_early(self, ear: _Ear, rest: list[bytes]) -> bool:
+    def _is_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:
         header = read_header(rest[0])
-        is_early = self._early.keep(header, (ear, rest), sum(map(len, rest)))
+        is_early = self._early.keep(header, (topic_parser, rest), sum(map(len, rest)))
         if not is_early:  # messages queued before it need not wait either
-            self._take_early(header.publisher)
+            self._release_early(header.publisher)
         return is_early
 
-    def _hear(self, message: Message | None) -> None:
+    def _append(self, message: Message | None) -> None:
         if message is not None:
             self._sources.dropped(self._inbox.put(message))
-            self.tell_waiting()
+            self.notify_waiting()
 
-    def _take_early(self, publisher: int) -> None:
-        for ear, rest in self._early.take(publisher):
-            self._hear(ear.parser.parse(ear.topic, rest))
+    def _release_early(self, publisher: int) -> None:
+        for topic_parser, rest in self._early.take(publisher):
+            self._append(topic_parser.parser.parse(topic_parser.topic, rest))
 
-    def greeted(self, publishers: Iterable[int]) -> None:
+    def end_greeting(self, publishers: Iterable[int]) -> None:
         """Stop waiting for these publishers' replies to a hello."""
         with self._inboxes.changed:
             for publisher in publishers:
-                self._take_early(publisher)
+                self._release_early(publisher)
 
-    def met(self, remote: RemotePublisher) -> None:
+    def add_publisher(self, remote: RemotePublisher) -> None:
         """Add a publisher."""
         with self._inboxes.changed:
             for old in self._sources.replaced_by(remote):
                 self._sources.pop(old)
             self._sources.listed(remote).is_silent = False
 
-    def lapsed(self, publisher: int) -> None:
+    def mark_silent(self, publisher: int) -> None:
         """Mark a publisher as silent; it is kept, because it may only be unreachable."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
@@ -235,8 +240,8 @@ class ZenohSubscriber(WakingSubscriber):
                 return
             self.is_closed = True
             self._inbox.take_all()
-            self.tell_waiting()
-        self._inboxes.stop_pouring(self)
+            self.notify_waiting()
+        self._inboxes.remove_sink(self)
         self._on_close(self)
 
     def forked(self) -> None:
@@ -244,5 +249,5 @@ class ZenohSubscriber(WakingSubscriber):
         self.is_closed = True
 
 
-def _is_latched(beside: bytes) -> bool:
-    return len(beside) >= HEADER_BYTES and bool(beside[2] & 1)
+def _is_latched(attachment: bytes) -> bool:
+    return len(attachment) >= HEADER_BYTES and bool(attachment[2] & 1)

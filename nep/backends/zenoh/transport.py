@@ -19,7 +19,7 @@ from nep.backends.zenoh.library import library
 from nep.backends.zenoh.node_services import ZenohServices
 from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.services import ZenohClient, ZenohServer
-from nep.backends.zenoh.session import Inquiry, ZenohSession
+from nep.backends.zenoh.session import PendingQuery, ZenohSession
 from nep.backends.zenoh.subscriber import ZenohSubscriber
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -28,15 +28,15 @@ from nep.protocol.requests import Expected, NodeRecord, RemovePublisher, Subscri
 from nep.system.forks import give_up, watch
 
 _logger = logging.getLogger("nep")
-_LEAVE_S = 0.3
-_FLUSH_MOST_S = 60.0
+_CLOSE_TIMEOUT_S = 0.3
+_MAX_FLUSH_S = 60.0
 
 
 @dataclass
-class _Farewell:
+class _PendingFlush:
     # Closing publisher with its flush request to the subscribers' nodes.
     session: ZenohSession
-    question: Inquiry
+    query: PendingQuery
     expected: tuple[Expected, ...]
 
 
@@ -52,7 +52,7 @@ class ZenohTransport:
         self._sessions: dict[str, ZenohSession] = {}
         self._publishers: dict[ZenohPublisher, ZenohSession] = {}
         self._subscribers: dict[ZenohSubscriber, ZenohSession] = {}
-        self._farewells: dict[ZenohPublisher, _Farewell] = {}
+        self._pending_flushes: dict[ZenohPublisher, _PendingFlush] = {}
         self._is_closed = False
         self._is_over = False
         self._services = ZenohServices(self._session, node.name)
@@ -62,7 +62,7 @@ class ZenohTransport:
 
     def publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         """Create a publisher. See `Transport.publisher`."""
-        with self._unless_closed():
+        with self._closed_errors():
             return self._publisher(spec)
 
     def _publisher(self, spec: PublisherSpec) -> ZenohPublisher:
@@ -77,9 +77,9 @@ class ZenohTransport:
         publisher = session.publisher(make)
         try:
             session.check(publisher.record)
-            self._keep(self._publishers, publisher, session)
+            self._add(self._publishers, publisher, session)
             session.add_publisher(publisher)
-            answered = session.meet_all(HANDSHAKE_S)
+            answered = session.sync_all(HANDSHAKE_S)
             expected = session.roster.subscribers_of(spec.topic)
             missing = [each for each in expected if call_key(each.node_id) not in answered]
             publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
@@ -91,7 +91,7 @@ class ZenohTransport:
 
     def subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
         """Create a subscriber. See `Transport.subscriber`."""
-        with self._unless_closed():
+        with self._closed_errors():
             return self._subscriber(spec)
 
     def _subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
@@ -99,13 +99,13 @@ class ZenohTransport:
         session.check(SubscriberRecord(spec.id, spec.topic, spec.msg_type))
         session.join()
         subscriber = ZenohSubscriber(spec, self._inboxes, self._close_subscriber)
-        self._keep(self._subscribers, subscriber, session)
+        self._add(self._subscribers, subscriber, session)
         try:
             session.add_subscriber(subscriber)
-            session.meet_all(HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_S)
             session.greet_all(subscriber, HANDSHAKE_S)
             if spec.sink is not None:
-                self._inboxes.pour(subscriber)
+                self._inboxes.add_sink(subscriber)
         except BaseException:
             subscriber.close()
             raise
@@ -113,12 +113,12 @@ class ZenohTransport:
 
     def server(self, spec: ServerSpec) -> ZenohServer:
         """Create a server. See `ServiceTransport.server`."""
-        with self._unless_closed():
+        with self._closed_errors():
             return self._services.server(spec)
 
     def client(self, spec: ClientSpec) -> ZenohClient:
         """Create a client. See `ServiceTransport.client`."""
-        with self._unless_closed():
+        with self._closed_errors():
             return self._services.client(spec)
 
     def survey(self, spec: ClientSpec) -> ZenohClient:
@@ -126,7 +126,7 @@ class ZenohTransport:
         return self.client(spec)
 
     @contextmanager
-    def _unless_closed(self) -> Iterator[None]:
+    def _closed_errors(self) -> Iterator[None]:
         # Converts errors of zenoh to `ClosedError` if the node was closed meanwhile.
         try:
             yield
@@ -137,13 +137,12 @@ class ZenohTransport:
                 raise ClosedError(f"node '{self._node.name}'") from error
             raise
 
-    def _keep(self, table: dict[Any, ZenohSession], made: object, session: ZenohSession) -> None:
+    def _add(self, table: dict[Any, ZenohSession], owner: object, session: ZenohSession) -> None:
         with self._lock:
-            self._check_open()
-            table[made] = session
+            self._check_open_locked()
+            table[owner] = session
 
-    def _check_open(self) -> None:
-        # Call with the lock held.
+    def _check_open_locked(self) -> None:
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
 
@@ -157,7 +156,7 @@ class ZenohTransport:
             )
         with self._opening:  # open only one session per place
             with self._lock:
-                self._check_open()
+                self._check_open_locked()
                 session = self._sessions.get(configuration.master)
             if session is None:
                 session = ZenohSession(self._node, configuration.master, wait_s)
@@ -191,26 +190,28 @@ class ZenohTransport:
         expected = session.roster.subscribers_of(publisher.spec.topic)
         if expected and publisher.count:
             request = RemovePublisher(self._node.id, publisher.spec.id, publisher.count)
-            question = session.ask(ALL_CALLS, request, _FLUSH_MOST_S, is_last=True)
+            query = session.ask(ALL_CALLS, request, _MAX_FLUSH_S, is_last=True)
             with self._lock:
-                self._farewells[publisher] = _Farewell(session, question, expected)
+                self._pending_flushes[publisher] = _PendingFlush(session, query, expected)
 
     def _finish(self, publisher: ZenohPublisher, deadline: float) -> None:
         # Waits for the confirmations until `deadline`; logs undelivered messages.
         with self._lock:
-            farewell = self._farewells.pop(publisher, None)
+            pending_flush = self._pending_flushes.pop(publisher, None)
             session = self._publishers.pop(publisher, None)
-        if farewell is not None:
-            wanted = frozenset(call_key(each.node_id) for each in farewell.expected)
-            silent = farewell.question.wait(wanted, deadline)
-            there = {each.id for each in farewell.session.roster.subscribers_of(publisher.spec.topic)}
-            owed = sum(call_key(each.node_id) in silent and each.id in there for each in farewell.expected)
-            if owed:
+        if pending_flush is not None:
+            wanted = frozenset(call_key(each.node_id) for each in pending_flush.expected)
+            silent = pending_flush.query.wait(wanted, deadline)
+            there = {each.id for each in pending_flush.session.roster.subscribers_of(publisher.spec.topic)}
+            undelivered = sum(
+                call_key(each.node_id) in silent and each.id in there for each in pending_flush.expected
+            )
+            if undelivered:
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
                     publisher.spec.topic,
-                    owed,
+                    undelivered,
                     publisher.count,
                 )
         publisher.release()
@@ -240,8 +241,8 @@ class ZenohTransport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the current graph. See `Transport.graph`."""
-        with self._unless_closed():
-            return self._session(configuration, timeout_s).look(min(timeout_s, HANDSHAKE_S))
+        with self._closed_errors():
+            return self._session(configuration, timeout_s).query_graph(min(timeout_s, HANDSHAKE_S))
 
     def begin_close(self) -> None:
         """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
@@ -267,12 +268,12 @@ class ZenohTransport:
             subscriber.close()
         for publisher in publishers:
             self._finish(publisher, deadline)
-        self._services.close(max(_LEAVE_S, deadline - time.monotonic()))
-        self._inboxes.close(max(_LEAVE_S, deadline - time.monotonic()))
+        self._services.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
+        self._inboxes.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
         with self._opening:
             sessions = list(self._sessions.values())
         for session in sessions:
-            session.close(min(_LEAVE_S, timeout_s))
+            session.close(min(_CLOSE_TIMEOUT_S, timeout_s))
 
     def forked(self) -> None:
         """Close the descriptors of the parent's sockets, see `nep.system.forks`."""

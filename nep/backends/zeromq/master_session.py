@@ -276,7 +276,7 @@ class MasterSession:
         """Report subscribers that didn't complete the handshake."""
         self._calls.tell(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
-    def look(self, timeout_s: float) -> GraphView:
+    def query_graph(self, timeout_s: float) -> GraphView:
         """Return the graph. Raises as `RpcClient.ask` does."""
         self.wait_for_name(timeout_s)
         reply = self._calls.ask(Look(), timeout_s)

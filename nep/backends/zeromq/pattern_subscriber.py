@@ -91,7 +91,7 @@ class PatternSubscriber(WakingSubscriber):
         with self._changed:
             if not self.is_closed:
                 self._dropped += sum(map(self._inbox.put, messages))
-                self.tell_waiting()
+                self.notify_waiting()
 
     # ---- statistics
 
@@ -237,7 +237,7 @@ class PatternSubscriber(WakingSubscriber):
                 return
             self.is_closed = True
             self._inbox.take_all()
-            self.tell_waiting()
+            self.notify_waiting()
             members = list(self._members.values())
         self._on_close(self.spec.id)
         for member in members:

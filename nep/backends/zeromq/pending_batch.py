@@ -41,10 +41,10 @@ class SendPath(Protocol):
     def send_now(self, data: bytes) -> None:
         """Send pending messages, then `data`."""
 
-    def flush(self) -> None:
+    def flush_locked(self) -> None:
         """Send pending messages. Call with the lock held."""
 
-    def flush_soon(self) -> None:
+    def flush_soon_locked(self) -> None:
         """Have the I/O thread send pending messages soon. Call with the lock held."""
 
 
@@ -121,14 +121,14 @@ class PendingBatch:
             count = len(pending)
             if count >= MAX_PENDING or count * len(data) >= FULL_BATCH_BYTES:
                 with lock:
-                    path.flush()
+                    path.flush_locked()
                 batch.has_sent_full = True
                 return
             if count == 1:
                 batch.ends_ns = stamp_ns + MAX_DELAY_NS
             if not batch.is_flush_scheduled:
                 with lock:
-                    path.flush_soon()
+                    path.flush_soon_locked()
             until_ns, ends_ns = stamp_ns + BATCH_WINDOW_NS, batch.ends_ns
             batch.until_ns = until_ns if until_ns < ends_ns else ends_ns  # noqa: FURB136 - takes half the time of min
 

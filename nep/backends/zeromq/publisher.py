@@ -146,7 +146,7 @@ class NativePublisher(GreetedPublisher):
         """Problem of the newest payload; empty if none."""
         self._subscriptions = Subscriptions(spec.topic, spec.id)
         if can_share() and not spec.history:
-            self._subscriptions.shared = SharedPayloads(spec.id, self._offer)
+            self._subscriptions.shared = SharedPayloads(spec.id, self._send_offer_locked)
         self._legacy_filters = self._subscriptions.legacy_filters
         self._history: History[tuple[Part, ...]] = History(spec.history)
         self._polled_ns = self._count_at_check = 0
@@ -191,7 +191,7 @@ class NativePublisher(GreetedPublisher):
         """Bind at these addresses of this computer; return the endpoints. See `Bindings.move`."""
         with self._lock:
             endpoints = () if self._socket.closed else self._bindings.move(hosts)
-            self._read_subscriptions()  # binding may have consumed the edge of ZMQ_FD
+            self._read_subscriptions_locked()  # binding may have consumed the edge of ZMQ_FD
             return endpoints
 
     def unbind_local(self) -> None:
@@ -199,7 +199,7 @@ class NativePublisher(GreetedPublisher):
         with self._lock:
             if not self._socket.closed and self._bindings.is_local:
                 self._bindings.unbind_local()
-                self._read_subscriptions()
+                self._read_subscriptions_locked()
 
     @property
     def refusals(self) -> RejectionLog:
@@ -225,7 +225,7 @@ class NativePublisher(GreetedPublisher):
     def skip(self) -> None:
         """Count a message that is not sent because the topic has no subscribers."""
         with self._lock:
-            self.flush()
+            self.flush_locked()
             self._count += 1
             self._last_stamp_ns = time.time_ns()
 
@@ -261,27 +261,27 @@ class NativePublisher(GreetedPublisher):
         with self._lock:
             if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.flush()
+            self.flush_locked()
             if self._flags:
-                self._greet_before(size)
+                self._greet_before_locked(size)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if total >= self._full_path_at or extension or self._flags:
-                self._send_all(data, extension, size)
+                self._send_all_locked(data, extension, size)
             elif size < _MAX_ONE_PART_BYTES and not self._legacy_filters and type(data) is bytes:
                 head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
                 self._send(b"".join((self._topic, head, data)))
                 self._batch.open_window(stamp_ns)
             else:
-                self._send_in_parts(data, size, seq, stamp_ns)
-            self._poll_subscriptions(stamp_ns)
+                self._send_in_parts_locked(data, size, seq, stamp_ns)
+            self._poll_subscriptions_locked(stamp_ns)
 
-    def _greet_before(self, size: int) -> None:
+    def _greet_before_locked(self, size: int) -> None:
         # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
-        # order. Without a history only if `_send_all` would read them.
+        # order. Without a history only if `_send_all_locked` would read them.
         if self.spec.history > 1 or self._bytes + size >= self._full_path_at:
-            self._read_subscriptions()
+            self._read_subscriptions_locked()
 
     def _send_large(self, payload: bytes | memoryview, extension: bytes | None) -> None:
         # The payload is copied at most once.
@@ -295,11 +295,11 @@ class NativePublisher(GreetedPublisher):
         with self._lock:
             if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            self.flush()
+            self.flush_locked()
             if self._flags:
-                self._greet_before(size)
+                self._greet_before_locked(size)
             number = (
-                shared.place(payload, self._seen, time.monotonic())
+                shared.write(payload, self._seen, time.monotonic())
                 if shared and not self._legacy_filters
                 else None
             )
@@ -319,8 +319,8 @@ class NativePublisher(GreetedPublisher):
                 # subscribers with shared memory accept one part
                 self._send(b"".join((self._topic, head, number)))
             else:
-                self._send_all(b"" if data is None else data, extension, size, number)
-            self._poll_subscriptions(stamp_ns)
+                self._send_all_locked(b"" if data is None else data, extension, size, number)
+            self._poll_subscriptions_locked(stamp_ns)
 
     def lend(self, size_bytes: int) -> memoryview | None:
         """Return writable shared memory for a payload, or None."""
@@ -328,45 +328,44 @@ class NativePublisher(GreetedPublisher):
         with self._lock:
             return None if shared is None or self.is_closed else shared.lend(size_bytes)
 
-    def _offer(self, subscriber: int, generation: int) -> None:
-        # Call with the lock held.
+    def _send_offer_locked(self, subscriber: int, generation: int) -> None:
         notice = pack_quickly(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
-        self._send_parts(self._subscriptions.hellos[subscriber], (notice,))
+        self._send_parts_locked(self._subscriptions.hellos[subscriber], (notice,))
 
-    def _poll_subscriptions(self, stamp_ns: int) -> None:
+    def _poll_subscriptions_locked(self, stamp_ns: int) -> None:
         # Reads subscriptions at most every `_READ_INTERVAL_NS`; the I/O thread checks afterwards.
         if not 0 <= stamp_ns - self._polled_ns < _READ_INTERVAL_NS:
             self._polled_ns = stamp_ns
-            self._read_subscriptions()
+            self._read_subscriptions_locked()
         elif not self._is_io_scheduled:
             self._is_io_scheduled = True
             self._serve_soon(self)
 
-    def _send_in_parts(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
-        # Sends three parts. Call with the lock held.
+    def _send_in_parts_locked(self, data: Part, size: int, seq: int, stamp_ns: int) -> None:
+        # Sends three parts.
         send = self._send
         send(self._topic, _SNDMORE)
         send(pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
         send(data, 0, size < _NO_COPY_BYTES)
 
-    def flush_soon(self) -> None:
+    def flush_soon_locked(self) -> None:
         """Have the I/O thread send pending messages soon. Call with the lock held."""
         if not self._batch.is_flush_scheduled:
             self._batch.is_flush_scheduled = self._is_io_scheduled = True
             self._serve_soon(self)
 
-    def flush(self) -> None:
+    def flush_locked(self) -> None:
         """Send pending messages and count them. Call with the lock held."""
         batch = self._batch
         if batch.is_flushing or not batch.pending:
             return
         batch.is_flushing = True  # a nested flush must not overtake the messages being sent
         try:
-            self._send_batches(batch)
+            self._send_batches_locked(batch)
         finally:
             batch.is_flushing = False
 
-    def _send_batches(self, batch: PendingBatch) -> None:
+    def _send_batches_locked(self, batch: PendingBatch) -> None:
         while batch.pending:
             taken = batch.take()
             self._last_stamp_ns = stamp_ns = taken[-1][1]
@@ -378,30 +377,31 @@ class NativePublisher(GreetedPublisher):
                 self._bytes += size
                 self._send(part)
             else:
-                self._send_each(taken)
-            self._poll_subscriptions(stamp_ns)
+                self._send_each_locked(taken)
+            self._poll_subscriptions_locked(stamp_ns)
 
-    def _send_each(self, taken: Iterable[tuple[bytes, int]]) -> None:
-        # Call with the lock held.
+    def _send_each_locked(self, taken: Iterable[tuple[bytes, int]]) -> None:
         for data, stamp_ns in taken:
             self._last_stamp_ns = stamp_ns
             self._count += 1
             self._bytes += len(data)
-            self._send_all(data, None, len(data))
+            self._send_all_locked(data, None, len(data))
 
-    def _send_all(self, data: Part, extension: bytes | None, size: int, number: bytes | None = None) -> None:
+    def _send_all_locked(
+        self, data: Part, extension: bytes | None, size: int, number: bytes | None = None
+    ) -> None:
         # Full path for messages with flags, and for flow control. Call with the lock held. `number` replaces
         # `data` for subscribers that read shared memory.
-        self.flush()
+        self.flush_locked()
         tail = self._tail(data, extension, size, 0)
         shared = None if number is None else self._tail(number, extension, len(number), SHARED)
         self._history.add(tail, size)
         if self._bytes < self._full_path_at:
-            self._send_to_all(tail, shared)
+            self._send_to_all_locked(tail, shared)
         else:
             if not self._flags:
-                self._read_subscriptions()
-            self._send_with_flow_control(tail, shared, size)
+                self._read_subscriptions_locked()
+            self._send_with_flow_control_locked(tail, shared, size)
 
     def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
@@ -409,29 +409,29 @@ class NativePublisher(GreetedPublisher):
         header = pack_quickly(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
-    def _send_to_all(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
-        # Call with the lock held. `shared` goes to subscribers with shared memory, `tail` to the others.
+    def _send_to_all_locked(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
+        # `shared` goes to subscribers with shared memory, `tail` to the others.
         if shared is None:
-            self._send_parts(self._topic, tail)
+            self._send_parts_locked(self._topic, tail)
             return
         readers = self._shared_readers()
         if readers >= self._seen.keys():
             if len(shared) == 2:  # subscribers with shared memory accept one part
                 self._send(b"".join((self._topic, *cast("tuple[bytes, bytes]", shared))))
             else:
-                self._send_parts(self._topic, shared)
+                self._send_parts_locked(self._topic, shared)
             return
         for each, own in self._subscriptions.hellos.items():
-            self._send_parts(own, shared if each in readers else tail)
+            self._send_parts_locked(own, shared if each in readers else tail)
 
     def _shared_readers(self) -> set[int]:
         shared = self._subscriptions.shared
         return set() if shared is None else shared.readers
 
-    def _send_with_flow_control(
+    def _send_with_flow_control_locked(
         self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None, size: int
     ) -> None:
-        # Call with the lock held. While a subscriber has no room, the message is sent to each of the others
+        # While a subscriber has no room, the message is sent to each of the others
         # alone.
         windows = self._subscriptions.windows
         since = self._bytes - size - self._windowed_bytes  # sent to all
@@ -443,9 +443,9 @@ class NativePublisher(GreetedPublisher):
         has_room = {each: window.has_room(size) for each, window in windows.items()}
         if all(has_room.values()) and (has_acks or self._backlog.has_room(size)):
             if has_acks:
-                self._send_to_all(tail, shared)
+                self._send_to_all_locked(tail, shared)
             else:
-                self._send_tracked(tail, size + since)
+                self._send_tracked_locked(tail, size + since)
             self._full_path_at = self._bytes + (ACK_STEP_BYTES if has_acks else BACKLOG_STEP_BYTES)
             receivers = windows
         else:
@@ -455,7 +455,7 @@ class NativePublisher(GreetedPublisher):
                 if each in receivers:
                     is_shared = shared is not None and each in self._shared_readers()
                     chosen = shared if is_shared and shared is not None else tail
-                    self._send_parts(self._subscriptions.hellos[each], chosen)
+                    self._send_parts_locked(self._subscriptions.hellos[each], chosen)
                 else:
                     window.note_drop()
         for window in receivers.values():
@@ -463,18 +463,18 @@ class NativePublisher(GreetedPublisher):
         now = time.monotonic()
         for each, window in windows.items():
             if window.should_request_ack(now, has_room=has_room[each]):
-                self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
+                self._send_parts_locked(self._subscriptions.hellos[each], (self._notice(0),))
 
-    def _send_tracked(self, tail: tuple[Part, ...], size: int) -> None:
+    def _send_tracked_locked(self, tail: tuple[Part, ...], size: int) -> None:
         # `size` is the number of bytes since the last tracked message, including this one.
         data = tail[1].buffer if isinstance(tail[1], zmq.Frame) else tail[1]
         frame = zmq.Frame(data, track=True, copy=False, copy_threshold=0)
-        self._send_parts(self._topic, (tail[0], frame, *tail[2:]))
+        self._send_parts_locked(self._topic, (tail[0], frame, *tail[2:]))
         self._backlog.sent(frame.tracker, size)
 
-    def _send_parts(self, first: bytes, tail: tuple[Part, ...]) -> None:
-        # Call with the lock held. XPUB never blocks: it drops messages for subscribers whose queue is full.
-        self.flush()
+    def _send_parts_locked(self, first: bytes, tail: tuple[Part, ...]) -> None:
+        # XPUB never blocks: it drops messages for subscribers whose queue is full.
+        self.flush_locked()
         send = self._send
         send(first, _SNDMORE)
         for part in tail[:-1]:
@@ -487,10 +487,10 @@ class NativePublisher(GreetedPublisher):
         """Send pending messages when due, and read subscriptions."""
         with self._lock:
             if not self.is_closed or self._seen:
-                self._read_subscriptions()
+                self._read_subscriptions_locked()
             wait_s = self._batch.next_check_s(_time_ns())
             if not wait_s:
-                self.flush()
+                self.flush_locked()
                 wait_s = self._batch.burst_check_s
             if wait_s:
                 return PollState(due=now + wait_s)
@@ -499,8 +499,8 @@ class NativePublisher(GreetedPublisher):
             self._is_io_scheduled = self._is_io_scheduled and count != self._count and not self.is_closed
             return PollState(due=now + _IO_CHECK_S) if self._is_io_scheduled else PollState()
 
-    def _read_subscriptions(self) -> None:
-        # Call with the lock held. Reads until the socket is empty.
+    def _read_subscriptions_locked(self) -> None:
+        # Reads until the socket is empty.
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             event = self._socket.recv(zmq.DONTWAIT, copy=False)
             own = self._subscriptions.note(event.bytes, self._count, partial(FarConnection.of, event))
@@ -511,26 +511,26 @@ class NativePublisher(GreetedPublisher):
             self.is_heard = self._subscriptions.is_there
             self._batch.allow(reads_batches=self._subscriptions.reads_batches)
             if own is not None:
-                self._greet(own)
+                self._greet_locked(own)
             self._changed.notify_all()
             if self._full_path_at == 0:
-                self._notify_drops()
+                self._notify_drops_locked()
 
-    def _notify_drops(self) -> None:
+    def _notify_drops_locked(self) -> None:
         for each, window in self._subscriptions.windows.items():
             if window.should_notify():
-                self._send_parts(self._subscriptions.hellos[each], (self._notice(0),))
+                self._send_parts_locked(self._subscriptions.hellos[each], (self._notice(0),))
 
-    def _greet(self, own: bytes) -> None:
+    def _greet_locked(self, own: bytes) -> None:
         # The history, then the echo: from here on the subscriber counts losses.
         for kept in self._history:
-            self._send_parts(own, kept)
+            self._send_parts_locked(own, kept)
         if self._history:
             hello = parse_hello(own)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
                 window.sent(self._count, self._history.size_bytes)
-        self._send_parts(own, (self._notice(0),))
+        self._send_parts_locked(own, (self._notice(0),))
 
     def _notice(self, flags: int) -> bytes:
         return pack_quickly(form_of(self._codec, flags), 0, self._count, time.time_ns(), self._id)
@@ -545,15 +545,15 @@ class NativePublisher(GreetedPublisher):
         """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
         with self._changed:
             self.is_closed = True
-            self.flush()
-            self._bye()
+            self.flush_locked()
+            self._send_bye_locked()
 
     def finish(self, deadline: float) -> None:
         """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
-                    self._bye()  # a full queue drops the bye like any message
+                    self._send_bye_locked()  # a full queue drops the bye like any message
             if self._seen:
                 undelivered = [max(self._count - seen, len(self._history)) for seen in self._seen.values()]
                 if any(undelivered):  # otherwise only the bye is missing
@@ -575,8 +575,8 @@ class NativePublisher(GreetedPublisher):
                 self._subscriptions.shared.close()
             self._socket.close(0)
 
-    def _bye(self) -> None:
+    def _send_bye_locked(self) -> None:
         if not self._socket.closed:
             for own in self._subscriptions.hellos.values():
-                self._send_parts(own, (self._notice(BYE),))
-            self._read_subscriptions()
+                self._send_parts_locked(own, (self._notice(BYE),))
+            self._read_subscriptions_locked()

@@ -138,7 +138,7 @@ class RpcClient:
                     self._calls = {number: each for number, each in self._calls.items() if each is not call}
                     raise MasterUnreachable(self.address, timeout_s)
                 call.is_sent = False  # requests are idempotent, so they may be resent
-                self._flush()
+                self._flush_locked()
                 self._after_use()
         if call.view is not None:
             return self._decoded(call.view)
@@ -176,10 +176,10 @@ class RpcClient:
             while not (has_more := len(answers) >= _READ_MAX):
                 events = self._events()
                 if events & zmq.POLLIN:
-                    answer = self._read_one()
+                    answer = self._read_one_locked()
                     if answer is not None:
                         answers.append(answer)
-                elif not self._flush():  # zmq_send may consume input
+                elif not self._flush_locked():  # zmq_send may consume input
                     break
             self.has_more = has_more
             self.is_connected = bool(events & zmq.POLLOUT)
@@ -205,24 +205,24 @@ class RpcClient:
                 return call
             self._calls[number] = call
             if len(self._calls) > _MAX_CALLS:
-                self._drop_oldest()
-            self._flush()
+                self._drop_oldest_locked()
+            self._flush_locked()
             events = self._events()
             if events & zmq.POLLOUT and not call.is_sent:
-                self._flush()  # it connected just now, and this was the only signal
+                self._flush_locked()  # it connected just now, and this was the only signal
                 events = self._events()
         if events & zmq.POLLIN:
             self._after_use()
         return call
 
-    def _drop_oldest(self) -> None:
-        # Call with the lock held. A master that hangs would let requests without a waiting thread pile up.
+    def _drop_oldest_locked(self) -> None:
+        # A master that hangs would let requests without a waiting thread pile up.
         oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
         if oldest is not None:
             del self._calls[oldest]
 
-    def _flush(self) -> bool:
-        # Call with the lock held. Requests without a waiting thread are dropped if they can't be sent.
+    def _flush_locked(self) -> bool:
+        # Requests without a waiting thread are dropped if they can't be sent.
         # Returns True if anything was sent.
         has_sent = False
         for number, call in list(self._calls.items()):
@@ -236,7 +236,7 @@ class RpcClient:
                     del self._calls[number]
         return has_sent
 
-    def _read_one(self) -> ReceivedAnswer | None:
+    def _read_one_locked(self) -> ReceivedAnswer | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
         view_number = call_of_view(body)
         if view_number is not None:

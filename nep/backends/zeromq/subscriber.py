@@ -186,7 +186,7 @@ class SocketSubscriber(Generic[R]):
         self._lock_requests.append(None)
         with self._lock:
             self._lock_requests.pop()
-            return None if self.is_closed else self._next()
+            return None if self.is_closed else self._next_locked()
 
     def receive(self, timeout_s: float) -> Message | None:
         """Return the next message; wait up to `timeout_s` seconds. Reads in the calling thread."""
@@ -194,7 +194,7 @@ class SocketSubscriber(Generic[R]):
             if self.is_closed:
                 return None
             may_wait = self._is_hot and not self._lock_requests and timeout_s >= SHORT_WAIT_S
-            message = self._next(may_wait=may_wait)
+            message = self._next_locked(may_wait=may_wait)
             if message is not None:
                 self._is_hot = True
                 return message
@@ -222,7 +222,7 @@ class SocketSubscriber(Generic[R]):
             if self.is_closed:
                 self._changed.notify_all()
                 return None
-            message = self._next()
+            message = self._next_locked()
             # after a longer wait the short one would only delay each message
             self._is_hot = message is not None and time.monotonic() - began < SHORT_WAIT_S
             return message
@@ -291,7 +291,7 @@ class SocketSubscriber(Generic[R]):
         try:
             while True:
                 with self._lock:
-                    count = 0 if self.is_closed else self._fill(_HANDSHAKE_BATCH)
+                    count = 0 if self.is_closed else self._fill_locked(_HANDSHAKE_BATCH)
                     left = deadline - time.monotonic()
                     if is_met() or left <= 0.0 or self.is_closed:
                         return is_met()
@@ -325,11 +325,11 @@ class SocketSubscriber(Generic[R]):
             self._io_check_at = _INFINITE
             batch: list[Message] = []
             if sink is None:
-                count = self._fill()
+                count = self._fill_locked()
                 if count:
-                    self._wake_waiters()
+                    self._wake_waiters_locked()
             else:
-                count = self._fill_batch(batch)
+                count = self._fill_batch_locked(batch)
         if sink is not None and batch:
             try:
                 sink(batch)
@@ -348,7 +348,7 @@ class SocketSubscriber(Generic[R]):
             self.payloads.clear()
             self.ready.clear()
             self._inbox.take_all()
-            self._wake_waiters()
+            self._wake_waiters_locked()
         self._on_close(self.spec.id)
         self._io.remove(self)
         with self._lock:
@@ -382,18 +382,18 @@ class SocketSubscriber(Generic[R]):
 
     # ---- with the lock held
 
-    def _next(self, *, may_wait: bool = False) -> Message | None:
+    def _next_locked(self, *, may_wait: bool = False) -> Message | None:
         if self._source is not None:
             if self.payloads:
                 self._source.restore(self.ready)
             self._source.wants_payloads = self.wants_payloads and self._may_exceed_bound
         try:
-            return self._next_message(may_wait=may_wait)
+            return self._next_message_locked(may_wait=may_wait)
         finally:
             if self._source is not None:
                 self._source.wants_payloads = False  # applies to the current reader only
 
-    def _next_message(self, *, may_wait: bool) -> Message | None:
+    def _next_message_locked(self, *, may_wait: bool) -> Message | None:
         now = time.monotonic()
         self._leased_until = now + LEASE_S
         if self._io_check_at > now + _MAX_IO_DELAY_S:
@@ -407,20 +407,20 @@ class SocketSubscriber(Generic[R]):
                 if self._ahead.now > 1:
                     self._ahead.begin()
                 message = self._read(self.ready, may_wait=may_wait)
-                return self._bounded(message) if self.ready else message
+                return self._bounded_locked(message) if self.ready else message
             most = self._ahead.more()
             if self._read_into(self.ready, most, _AHEAD_BYTES, may_wait=may_wait) < most:
                 self._ahead.begin()
         if self.ready:
-            return self._bounded(self.ready.popleft())
+            return self._bounded_locked(self.ready.popleft())
         if not self._queues_all:
-            self._fill()
+            self._fill_locked()
         elif self._may_exceed_bound and self._inbox.messages:
             self._inbox.move(self.ready, AHEAD_MOST, _AHEAD_BYTES)
             return self.ready.popleft()
         return self._inbox.take()
 
-    def _bounded(self, message: Message | None) -> Message | None:
+    def _bounded_locked(self, message: Message | None) -> Message | None:
         # Returns the oldest of `message` and those behind it for which there is room; counts the others as
         # dropped.
         over = 0
@@ -431,7 +431,7 @@ class SocketSubscriber(Generic[R]):
             self._readable.dropped(over)
         return message
 
-    def _fill(self, most: int = _BATCH_MESSAGES) -> int:
+    def _fill_locked(self, most: int = _BATCH_MESSAGES) -> int:
         # Reads into the inbox until the socket is empty or a batch is full; returns the number of messages.
         messages: list[Message] = []
         count = self._read_into(messages, most, _BATCH_BYTES)
@@ -440,20 +440,20 @@ class SocketSubscriber(Generic[R]):
             self._readable.dropped(dropped)
         return count
 
-    def _fill_batch(self, batch: list[Message]) -> int:
+    def _fill_batch_locked(self, batch: list[Message]) -> int:
         if self._queues_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
             return self._read_into(batch, _BATCH_MESSAGES, _BATCH_BYTES)
-        count = self._fill()
+        count = self._fill_locked()
         batch += self._inbox.take_all()
         return count
 
-    def _after_use(self) -> None:
+    def _after_use_locked(self) -> None:
         # Call after using the socket without emptying it, which may have consumed the edge of ZMQ_FD.
         if self._readable.has_input:
-            self._wake_waiters()
+            self._wake_waiters_locked()
             self._io.serve_soon(self)
 
-    def _wake_waiters(self) -> None:
+    def _wake_waiters_locked(self) -> None:
         self._woken.update(self._waiters)
         for waker in self._waiters:
             waker.wake()
@@ -509,7 +509,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         """
         with self._requested_lock():
             closed, self._closed_early = self._closed_early or set(), None
-            self._connect(each for each in remotes if each.publisher.id not in closed)
+            self._connect_locked(each for each in remotes if each.publisher.id not in closed)
 
     def expect_all_of(self, publisher: int) -> None:
         """Count losses from the first message of a publisher that was created after this subscriber."""
@@ -521,23 +521,22 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to publishers (idempotent)."""
         with self._requested_lock():
-            self._connect(remotes)
+            self._connect_locked(remotes)
 
-    def _connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        # Call with the lock held.
+    def _connect_locked(self, remotes: Iterable[RemotePublisher]) -> None:
         if not self.is_closed:
             for remote in remotes:
                 self._readable.connect(remote)
-            self._after_use()
+            self._after_use_locked()
 
     def reconnect(self) -> None:
         """Reconnect to publishers on other computers, after the address of this one has changed."""
         with self._requested_lock():
             if not self.is_closed:
-                self._fill()
-                self._wake_waiters()
+                self._fill_locked()
+                self._wake_waiters_locked()
                 self._readable.reconnect()
-                self._after_use()
+                self._after_use_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of publishers: connect to new ones; missing ones are marked as silent."""
@@ -582,4 +581,4 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                     self._readable.reconnect(publisher)
                 for publisher, seq in last_seqs:
                     sources.promised(publisher, seq)
-            self._after_use()
+            self._after_use_locked()

@@ -336,7 +336,6 @@ class ZeromqTransport:
             self._shared.leave()
 
     def _check_open_locked(self) -> None:
-        # Call with the lock held.
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
 
@@ -406,7 +405,7 @@ class ZeromqTransport:
                 waits.waker.close()
 
     def _wake_waits_locked(self) -> None:
-        # Call with the lock held, after setting `_is_terminated`.
+        # Call after setting `_is_terminated`.
         for waits in self._waiting:
             waits.waker.wake()
             if not waits.is_busy:
@@ -447,7 +446,7 @@ class ZeromqTransport:
         if isinstance(configuration, Direct):
             raise NepError(_("a direct connection has no master; ask with a hybrid one"))
         with self._opening():
-            return self._session(configuration.master).look(timeout_s)
+            return self._session(configuration.master).query_graph(timeout_s)
 
     def begin_close(self) -> None:
         """Announce the end to all peers; doesn't wait. See `Transport.begin_close`."""
@@ -497,7 +496,7 @@ class ZeromqTransport:
         self._shared.leave()
 
     def _close_idle_sessions_locked(self) -> None:
-        # Call with the lock held. Closes idle sessions when there are many.
+        # Closes idle sessions when there are many.
         for address, session in list(self._sessions.items()):
             if len(self._sessions) < _MAX_IDLE_SESSIONS:
                 return

@@ -231,7 +231,7 @@ def test_no_reader_keeps_more_of_a_batch_than_it_wants(node: nep.Node) -> None:
     )  # as if they came in one part
     message = sub.receive(0.0)
     assert message is not None
-    bounded = sub._transport._bounded(sub._transport.ready.popleft())
+    bounded = sub._transport._bounded_locked(sub._transport.ready.popleft())
     assert bounded is not None
     assert bytes(bounded.data) == b"\3"
     assert sub.lost == 2
@@ -314,9 +314,9 @@ class _HeardWay:
 
     def send_now(self, data: bytes) -> None: ...
 
-    def flush(self) -> None: ...
+    def flush_locked(self) -> None: ...
 
-    def flush_soon(self) -> None: ...
+    def flush_soon_locked(self) -> None: ...
 
 
 def test_an_encoded_payload_is_not_encoded_again() -> None:

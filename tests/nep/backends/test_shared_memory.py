@@ -472,7 +472,7 @@ def test_without_room_all_goes_through_the_socket(node: nep.Node, monkeypatch: p
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
     monkeypatch.setattr(shared_memory, "_SPARE_BYTES", 2**62)
-    monkeypatch.setattr(shared_memory, "_ASK_S", 0.0)
+    monkeypatch.setattr(shared_memory, "_QUERY_INTERVAL_S", 0.0)
     pub.publish(b"\3" * LARGE)
     message = sub.receive(LONG_S)
     assert message is not None

@@ -250,7 +250,7 @@ def test_what_a_stranger_puts_or_answers_is_refused_and_counted(
 ) -> None:
     node = make("a")
     sub = node.new_sub("t")
-    with Rendezvous(place.removeprefix("local/")).alone():
+    with Rendezvous(place.removeprefix("local/")).exclusive():
         others = [each.port for each in Rendezvous(place.removeprefix("local/")).entries()]
     zenoh = library()
     config = zenoh.Config.from_json5(

@@ -182,7 +182,7 @@ def test_what_is_no_call_is_counted_and_ended(make: Make, place: str, header: by
 def test_a_client_of_nep_calls_a_program_of_zenoh(
     make: Make, routed: str, stranger: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nep.backends.zenoh.services._GONE_S", 0.05)
+    monkeypatch.setattr("nep.backends.zenoh.services._TOKEN_DELAY_S", 0.05)
     seen = []
 
     def answer(query) -> None:

@@ -103,7 +103,7 @@ def test_a_name_that_nobody_answers_holds_up_nobody(shared: SharedContext, maste
             assert sub.listen(timeout_s=30.0) == (True, 1)
             book.may_answer.set()
             link.wait_for_name(30.0)
-            assert "topic" in link.look(30.0).topics
+            assert "topic" in link.query_graph(30.0).topics
             assert book.threads == ["nep-name-robot"]
             assert link.endpoint == f"tcp://127.0.0.1:{port}"
         finally:

@@ -205,11 +205,11 @@ class Ros2Client(ClientCalls[_Call]):
 
     def _end(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
-            if not self._take(call):
+            if not self._remove_locked(call):
                 return
             self._answered += not isinstance(outcome, NepError)
             self._failed += isinstance(outcome, NepError)
-        self._tell(call, outcome)
+        self._run_callback(call, outcome)
 
     def expire(self, now: float) -> float:
         """Send waiting calls; fail expired calls and those whose servers have disappeared."""
@@ -253,4 +253,4 @@ class Ros2Client(ClientCalls[_Call]):
             self._channel.close()
         self._on_close(self)
         for call in left:
-            self._tell(call, self._closed_error())
+            self._run_callback(call, self._closed_error())

@@ -35,15 +35,15 @@ from nep.protocol.service_wire import ORIGINAL, ORIGINAL_CODEC, Framing
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 100
-_FIRST_TRY_S, _LAST_TRY_S = 0.1, 2.0
-_WAITED_TRY_S = 0.8
+_MIN_RETRY_S, _MAX_RETRY_S = 0.1, 2.0
+_PENDING_RETRY_S = 0.8
 """Maximum retry interval while calls are pending."""
 _HAND_OVER_S = 2.0
 """Seconds for which new calls wait for the last replies of a closing server before they go to the next one.
 """
 
 Then = Callable[[Outcome], None]
-_Ended = list[tuple[Then, Outcome]]
+_Outcomes = list[tuple[Then, Outcome]]
 
 
 @dataclass(eq=False)
@@ -76,7 +76,7 @@ class Connection(Protocol):
     def has_input(self) -> bool:
         """True if a reply is available that the descriptor no longer signals."""
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Update `is_open` and `is_over`."""
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
@@ -110,7 +110,7 @@ class SocketClient:
         connect_to: Callable[[str, Callable[[float], PollState]], Connection],
         spec: ClientSpec,
         framing: Framing,
-        soon: Callable[[SocketClient], None],
+        serve_soon: Callable[[SocketClient], None],
         closer: Callable[[SocketClient], None],
         *,
         known_services: Callable[[float], tuple[str, ...]] | None = None,
@@ -122,7 +122,7 @@ class SocketClient:
         self._framing = self._usual_framing = framing
         self._originals: set[int] = set()
         """Ids of servers that are programs of the original NEP."""
-        self._soon = soon
+        self._serve_soon = serve_soon
         self._closer = closer
         self._known_services = known_services
         self._lock = threading.Lock()
@@ -133,7 +133,7 @@ class SocketClient:
         replies without a number come in this order, and it limits what is sent to a server that hangs.
         """
         self._bytes = self._unanswered_bytes = 0
-        self.place = endpoint
+        self.fixed_endpoint = endpoint
         """Endpoint of the server, without a master."""
         self._servers: dict[int, str] = {0: endpoint} if endpoint else {}
         self._current: int | None = None
@@ -141,12 +141,12 @@ class SocketClient:
         """Id of a connected server that is no longer listed but kept, because it may only be suspended and
         there is no other.
         """
-        self._place = ""
+        self._connected_endpoint = ""
         """Endpoint of the current connection; cleared to force a reconnection."""
         self._leave_at = math.inf
         """Time at which the connection to an unlisted server is closed if new calls wait."""
-        self._tries = 0
-        self._try_at = 0.0
+        self._attempts = 0
+        self._retry_at = 0.0
         self._refusals = RejectionLog()
         self._is_closed = False
         self._answered = self._failed = self._late = 0
@@ -198,15 +198,15 @@ class SocketClient:
             self._calls[number] = call
             self._bytes += call.size
             if self._connection is not None:
-                self._connection.look()
-                self._send(call)
-        self._soon(self)  # schedules the deadline, and the socket was used
+                self._connection.update()
+                self._send_locked(call)
+        self._serve_soon(self)  # schedules the deadline, and the socket was used
         return call
 
     def forget(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
-            self._take(call.number)
+            self._remove_locked(call.number)
 
     def known(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server; empty without a master."""
@@ -217,15 +217,15 @@ class SocketClient:
         except NepError:
             return ()
 
-    def _take(self, number: int) -> _Call | None:
-        # Call with the lock held. Returns None if the call is no longer in flight.
+    def _remove_locked(self, number: int) -> _Call | None:
+        # Returns None if the call is no longer in flight.
         call = self._calls.pop(number, None)
         if call is not None:
             self._bytes -= call.size
         return call
 
-    def _send(self, call: _Call) -> None:
-        # Call with the lock held. Calls go only to a connected server that hasn't announced its end.
+    def _send_locked(self, call: _Call) -> None:
+        # Calls go only to a connected server that hasn't announced its end.
         connection = self._connection
         if connection is None or not connection.is_open or self._current not in self._servers:
             return
@@ -241,18 +241,17 @@ class SocketClient:
         """Add further servers."""
         with self._lock:
             for remote in remotes:
-                if self._can_call(remote):
+                if self._can_call_locked(remote):
                     self._servers[remote.publisher.id] = remote.publisher.endpoints[0]
                     if remote.publisher.id == self._unlisted:
                         self._unlisted = None
             if self._unlisted is not None and len(self._servers) > 1:
                 self._servers.pop(self._unlisted, None)
                 self._unlisted = None
-            self._try_at = 0.0
-        self._soon(self)
+            self._retry_at = 0.0
+        self._serve_soon(self)
 
-    def _can_call(self, remote: RemotePublisher) -> bool:
-        # Call with the lock held.
+    def _can_call_locked(self, remote: RemotePublisher) -> bool:
         if remote.publisher.codec == ORIGINAL_CODEC:
             self._originals.add(remote.publisher.id)
             return bool(remote.publisher.endpoints) and self.spec.codec.name == "json"
@@ -266,28 +265,30 @@ class SocketClient:
                 self._originals.discard(server)
             else:
                 self._unlisted = server
-        self._soon(self)
+        self._serve_soon(self)
 
     def reconnect(self) -> None:
         """Reconnect to a server on another computer, after the address of this one has changed."""
         with self._lock:
-            if is_far(self._place):
-                self._place = ""
-        self._soon(self)
+            if is_far(self._connected_endpoint):
+                self._connected_endpoint = ""
+        self._serve_soon(self)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of servers."""
         with self._lock:
             self._originals = {each for each in self._originals if each == self._current}
             listed = {
-                each.publisher.id: each.publisher.endpoints[0] for each in remotes if self._can_call(each)
+                each.publisher.id: each.publisher.endpoints[0]
+                for each in remotes
+                if self._can_call_locked(each)
             }
             current, self._unlisted = self._current, None
             if not listed and current in self._servers and self.is_connected:
                 listed, self._unlisted = {current: self._servers[current]}, current
             self._servers = listed
-            self._try_at = 0.0
-        self._soon(self)
+            self._retry_at = 0.0
+        self._serve_soon(self)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Do nothing: replies have no sequence numbers."""
@@ -308,25 +309,25 @@ class SocketClient:
 
     def _serve(self, now: float) -> float | None:
         # Returns the time of the next call.
-        ended: _Ended = []
+        outcomes: _Outcomes = []
         with self._lock:
             if self._is_closed:
                 return None
             if self._connection is not None:
-                self._connection.look()
-            has_more = self._read(ended)
+                self._connection.update()
+            has_more = self._read(outcomes)
             if not has_more:  # replies received before its end are delivered
-                self._look_at_connection(now, ended)
+                self._check_connection(now, outcomes)
             for call in [each for each in self._calls.values() if not each.is_sent]:
-                self._send(call)
-            self._expire(now, ended)
+                self._send_locked(call)
+            self._expire(now, outcomes)
             due = self._due()
             # zmq_send may consume input, and ZMQ_FD is edge-triggered: check again
             has_more = has_more or (self._connection is not None and self._connection.has_input)
-        self._tell(ended)
+        self._run_callbacks(outcomes)
         return now if has_more else due if due < math.inf else None
 
-    def _read(self, ended: _Ended) -> bool:
+    def _read(self, outcomes: _Outcomes) -> bool:
         # Returns True if there may be more replies.
         if self._connection is None:
             return False
@@ -347,96 +348,98 @@ class SocketClient:
             if self._framing.in_order:
                 number = next(iter(self._unanswered), None)
             self._unanswered_bytes -= self._unanswered.pop(number or 0, 0)
-            call = self._take(number or 0)
+            call = self._remove_locked(number or 0)
             if call is None:
                 self._late += 1
                 continue
             self._answered += 1
-            ended.append((call.then, outcome))
+            outcomes.append((call.then, outcome))
         return True
 
-    def _look_at_connection(self, now: float, ended: _Ended) -> None:
+    def _check_connection(self, now: float, outcomes: _Outcomes) -> None:
         # Call when all replies are read.
         connection = self._connection
         if connection is not None and connection.is_over:
-            self._lose(ended)
-            self._tries, self._try_at = 0, now + connection.again_s
+            self._fail_sent_calls(outcomes)
+            self._attempts, self._retry_at = 0, now + connection.again_s
         elif connection is not None and self._has_moved():
-            self._leave(ended)  # the old connection would stay silent for long
+            self._switch_server(outcomes)  # the old connection would stay silent for long
         elif connection is not None and connection.is_open:
-            self._tries = 0
+            self._attempts = 0
             if self._current not in self._servers:
-                self._hand_over(now, ended)
+                self._hand_over(now, outcomes)
             else:
                 self._leave_at = math.inf
-        if not self.is_connected and now >= self._try_at:
-            self._try(now)
+        if not self.is_connected and now >= self._retry_at:
+            self._connect_next(now)
 
     def _has_moved(self) -> bool:
         # True if an endpoint of the connection has changed.
         known = None if self._current is None else self._servers.get(self._current)
-        return known not in {None, self._place} and (not self._place or is_far(self._place))
+        return known not in {None, self._connected_endpoint} and (
+            not self._connected_endpoint or is_far(self._connected_endpoint)
+        )
 
-    def _hand_over(self, now: float, ended: _Ended) -> None:
+    def _hand_over(self, now: float, outcomes: _Outcomes) -> None:
         # The server closed or was replaced: wait for its last replies, then connect to another one.
         is_waited_for = any(each.is_sent for each in self._calls.values())
         if is_waited_for and self._leave_at == math.inf:
             self._leave_at = now + _HAND_OVER_S
         is_next_due = now >= self._leave_at and any(not each.is_sent for each in self._calls.values())
         if not is_waited_for or is_next_due:
-            self._leave(ended)
+            self._switch_server(outcomes)
 
-    def _lose(self, ended: _Ended) -> None:
+    def _fail_sent_calls(self, outcomes: _Outcomes) -> None:
         # The connection has ended: all calls sent over it fail.
         self._disconnect()
         self._leave_at = math.inf
         self._unanswered.clear()
         self._unanswered_bytes = 0
         for call in [each for each in self._calls.values() if each.is_sent]:
-            self._take(call.number)
+            self._remove_locked(call.number)
             self._failed += 1
-            ended.append((call.then, ServerGoneError(self._name)))
+            outcomes.append((call.then, ServerGoneError(self._name)))
 
-    def _leave(self, ended: _Ended) -> None:
-        self._lose(ended)
+    def _switch_server(self, outcomes: _Outcomes) -> None:
+        self._fail_sent_calls(outcomes)
         self._current = None
-        self._tries, self._try_at = 0, 0.0
+        self._attempts, self._retry_at = 0, 0.0
 
-    def _try(self, now: float) -> None:
+    def _connect_next(self, now: float) -> None:
         # Connects to the next server in turn.
         self._disconnect()
         known = list(self._servers)
         if not known:
-            self._current, self._try_at = None, math.inf
+            self._current, self._retry_at = None, math.inf
             return
-        place = known.index(self._current) + 1 if self._current in self._servers and self._tries else 0
-        self._current = known[place % len(known)]
-        endpoint = self._place = self._servers[self._current]
+        index = known.index(self._current) + 1 if self._current in self._servers and self._attempts else 0
+        self._current = known[index % len(known)]
+        endpoint = self._connected_endpoint = self._servers[self._current]
         self._framing = ORIGINAL if self._current in self._originals else self._usual_framing
-        self._tries += 1
+        self._attempts += 1
         try:
             self._connection = self._connect_to(endpoint, self._serve_connection)
         except (OSError, zmq.ZMQError, NepError) as error:
             _logger.warning("can't connect to a server of '%s' at '%s': %s", self._name, endpoint, error)
-        self._try_at = now + min(_FIRST_TRY_S * 2 ** min(self._tries, 10), _LAST_TRY_S)
+        self._retry_at = now + min(_MIN_RETRY_S * 2 ** min(self._attempts, 10), _MAX_RETRY_S)
 
     def _disconnect(self) -> None:
         connection, self._connection = self._connection, None
         if connection is not None:
             connection.close()
-            self._soon(self)  # cancels scheduled calls for the closed sockets
+            self._serve_soon(self)  # cancels scheduled calls for the closed sockets
 
-    def _expire(self, now: float, ended: _Ended) -> None:
+    def _expire(self, now: float, outcomes: _Outcomes) -> None:
         for call in [each for each in self._calls.values() if each.deadline <= now]:
-            self._take(call.number)
+            self._remove_locked(call.number)
             self._failed += 1
             timeout_s = call.timeout_s or 0.0
             error: NepError = (
                 ServiceTimeoutError(self._name, timeout_s)
                 if call.is_sent
-                else NoServerError(self._name, timeout_s, address=self.place.removeprefix("tcp://"))
+                else NoServerError(self._name, timeout_s, address=self.fixed_endpoint.removeprefix("tcp://"))
             )
-            ended.append((call.then, error))
+            outcomes.append((call.then, error))
 
     def _due(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
@@ -445,15 +448,15 @@ class SocketClient:
         if self.is_connected or not self._servers:
             return due
         if self._calls:
-            self._try_at = min(self._try_at, time.monotonic() + _WAITED_TRY_S)
-        return min(due, self._try_at)
+            self._retry_at = min(self._retry_at, time.monotonic() + _PENDING_RETRY_S)
+        return min(due, self._retry_at)
 
     @property
     def _name(self) -> str:
         return self.spec.service
 
-    def _tell(self, ended: _Ended) -> None:
-        for then, outcome in ended:
+    def _run_callbacks(self, outcomes: _Outcomes) -> None:
+        for then, outcome in outcomes:
             try:
                 then(outcome)
             except Exception:  # a failing callback must not affect other calls
@@ -474,7 +477,7 @@ class SocketClient:
         if connection is not None:  # without the lock: the thread that polls it may wait for that
             connection.close()
         what = _("client of '{service}'").format(service=self._name)
-        self._tell([(each.then, ClosedError(what)) for each in left])
+        self._run_callbacks([(each.then, ClosedError(what)) for each in left])
 
     def forked(self) -> None:
         """Become closed in a forked child, see `nep.system.forks`."""

@@ -66,7 +66,7 @@ class ServerConnection:
         monitor.connect(name)
         self._socket.connect(self.endpoint)
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Update `is_open` and `is_over` from the monitor's events."""
         while self._monitor is not None and _has_input(self._monitor):
             event, _value = _EVENT.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])

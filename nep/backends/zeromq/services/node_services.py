@@ -62,7 +62,7 @@ class ZeromqServices:
         server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.tally.calls))
         with _released(server):
             endpoints = server.move(session.hosts)
-            self._hold(server)
+            self._add(server)
         record = PublisherRecord(
             spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, endpoints, number=spec.number
         )
@@ -79,7 +79,7 @@ class ZeromqServices:
         server = self._new_server(spec, _framing(direct), lambda: None)
         with _released(server):
             server.fixed = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
-            self._hold(server)
+            self._add(server)
         return server
 
     def _tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
@@ -92,7 +92,7 @@ class ZeromqServices:
 
         server = TcpServer(self._shared.io, spec, f"{direct.ip}:{direct.port}", close)
         with _released(server):
-            self._hold(server)
+            self._add(server)
         return server
 
     def _new_server(self, spec: ServerSpec, framing: Framing, unregister: Callable[[], None]) -> RouterServer:
@@ -109,17 +109,16 @@ class ZeromqServices:
         socket = self._shared.socket(zmq.ROUTER, f"a server of '{spec.service}'")
         return RouterServer(socket, spec, framing, self._shared.io.serve_soon, unregister, close)
 
-    def _hold(self, owner: RouterServer | TcpServer | SocketClient) -> None:
+    def _add(self, owner: RouterServer | TcpServer | SocketClient) -> None:
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             if isinstance(owner, SocketClient):
                 self._clients.add(owner)
             else:
                 self._servers.add(owner)
             self._shared.io.add(owner)  # before `close` can remove it, which takes this lock first
 
-    def _check_open(self) -> None:
-        # Call with the lock held.
+    def _check_open_locked(self) -> None:
         if self._is_closed:
             raise ClosedError(f"node '{self._node_name}'")
 
@@ -133,7 +132,7 @@ class ZeromqServices:
         session.wait_for_name(spec.wait_s)
 
         def known(timeout_s: float) -> tuple[str, ...]:
-            services = session.look(timeout_s).services
+            services = session.query_graph(timeout_s).services
             return tuple(sorted(name for name, each in services.items() if each.servers))
 
         client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), known)
@@ -160,12 +159,12 @@ class ZeromqServices:
             session.remove_subscriber(spec.id)
             survey.release()
 
-        def ask_at(endpoint: str) -> SocketClient:
+        def new_client(endpoint: str) -> SocketClient:
             return self._new_client(spec, NATIVE, lambda: None, None, endpoint)
 
-        survey = SurveyClient(spec, ask_at, close)
+        survey = SurveyClient(spec, new_client, close)
         with self._lock:
-            self._check_open()
+            self._check_open_locked()
             self._surveys.add(survey)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
@@ -219,7 +218,7 @@ class ZeromqServices:
             endpoint=endpoint,
         )
         with _released(client):
-            self._hold(client)
+            self._add(client)
         return client
 
     # ---- closing

@@ -30,7 +30,7 @@ _READ_MAX = 100
 _LARGE_BYTES = 65_536
 """Size from which replies are sent without a copy, and tracked until libzmq has sent them."""
 _UNREAD_MAX_BYTES = 256 * 2**20
-_SMALL_UNREAD = 1000
+_REPLY_HIGH_WATER_MARK = 1000
 """High-water mark: number of replies queued for a client that doesn't read them."""
 
 
@@ -59,12 +59,12 @@ class CallReader:
         try:
             header = self._framing.read_call(parts)
         except WireError as error:
-            self.refuse(error)
+            self.reject(error)
             return None
         deadline = None if header.timeout_s is None else now + header.timeout_s
         return IncomingCall(header.data, header.codec, deadline, partial(answer, header.number))
 
-    def refuse(self, error: WireError) -> None:
+    def reject(self, error: WireError) -> None:
         """Count a malformed call."""
         self._tally.add_unreadable()
         if self._refusals.add(error.reason):
@@ -83,7 +83,7 @@ class CallReader:
 class RouterServer:
     """Server over a ROUTER socket.
 
-    `soon` asks the I/O thread to serve it, `closer` closes it, and `unregister` may be called twice.
+    `serve_soon` asks the I/O thread to serve it, `closer` closes it, and `unregister` may be called twice.
     """
 
     is_local = False
@@ -93,7 +93,7 @@ class RouterServer:
         socket: Socket,
         spec: ServerSpec,
         framing: Framing,
-        soon: Callable[[RouterServer], None],
+        serve_soon: Callable[[RouterServer], None],
         unregister: Callable[[], object],
         closer: Callable[[RouterServer, float], None],
     ) -> None:
@@ -104,7 +104,7 @@ class RouterServer:
         """Endpoint of a direct server."""
         self.socket = socket
         self._framing = framing
-        self._soon = soon
+        self._serve_soon = serve_soon
         self._unregister = unregister
         self._closer = closer
         self._lock = threading.Lock()
@@ -113,7 +113,7 @@ class RouterServer:
         self._is_closed = False
         socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # raise an error when a client has disconnected
         socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
-        socket.setsockopt(zmq.SNDHWM, _SMALL_UNREAD)
+        socket.setsockopt(zmq.SNDHWM, _REPLY_HIGH_WATER_MARK)
         socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
         socket.copy_threshold = _LARGE_BYTES
         self._bindings = Bindings(socket, may_be_local=False)
@@ -149,18 +149,18 @@ class RouterServer:
 
     def serve(self, now: float) -> PollState:
         """Queue calls; reject those for which there is no room."""
-        came: list[IncomingCall] = []
+        calls: list[IncomingCall] = []
         with self._lock:
             if self._is_closed:
                 return PollState()
-            has_more = self._read(came, now)
-        for call in came:
+            has_more = self._read_locked(calls, now)
+        for call in calls:
             if not self.calls.put(call):
-                self._refuse(call)
+                self._reject(call)
         return PollState(due=now if has_more else None)
 
-    def _read(self, came: list[IncomingCall], now: float) -> bool:
-        # Call with the lock held. Returns True if there may be more: ZMQ_FD is edge-triggered.
+    def _read_locked(self, calls: list[IncomingCall], now: float) -> bool:
+        # Returns True if there may be more: ZMQ_FD is edge-triggered.
         for _turn in range(_READ_MAX):
             try:
                 route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
@@ -168,7 +168,7 @@ class RouterServer:
                 return False
             call = self._reader.read(parts, now, partial(self._answer, route))
             if call is not None:
-                came.append(call)
+                calls.append(call)
         return True
 
     # ---- replying, in any thread
@@ -184,14 +184,14 @@ class RouterServer:
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
-            is_sent = self._send(route, self._framing.answer(number, reply))
+            is_sent = self._send_locked(route, self._framing.answer(number, reply))
             has_input = bool(int(self.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
         if has_input:
-            self._soon(self)
+            self._serve_soon(self)
         return is_sent
 
-    def _send(self, route: bytes, parts: Sequence[bytes | memoryview]) -> bool:
-        # Call with the lock held. Returns False if the client has disconnected or doesn't read.
+    def _send_locked(self, route: bytes, parts: Sequence[bytes | memoryview]) -> bool:
+        # Returns False if the client has disconnected or doesn't read.
         try:
             self.socket.send(route, zmq.DONTWAIT | zmq.SNDMORE)
             self.socket.send(parts[0], zmq.DONTWAIT | zmq.SNDMORE)
@@ -219,9 +219,9 @@ class RouterServer:
         """Unregister; reject queued and new calls. Idempotent."""
         self._unregister()
         for call in self.calls.close():
-            self._refuse(call)
+            self._reject(call)
 
-    def _refuse(self, call: IncomingCall) -> None:
+    def _reject(self, call: IncomingCall) -> None:
         call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:

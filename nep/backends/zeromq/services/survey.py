@@ -18,7 +18,7 @@ _logger = logging.getLogger("nep")
 Then = Callable[[Outcome], None]
 
 
-class _Asked(NamedTuple):
+class _SentCall(NamedTuple):
     client: SocketClient
     call: OpenCall
 
@@ -28,14 +28,17 @@ class _Asked(NamedTuple):
 
 
 class SurveyClient:
-    """Surveyor. `ask_at` creates a client for the respondent at an endpoint; `closer` closes the surveyor."""
+    """Surveyor. `new_client` connects to the respondent at an endpoint; `closer` closes the surveyor."""
 
     def __init__(
-        self, spec: ClientSpec, ask_at: Callable[[str], SocketClient], closer: Callable[[SurveyClient], None]
+        self,
+        spec: ClientSpec,
+        new_client: Callable[[str], SocketClient],
+        closer: Callable[[SurveyClient], None],
     ) -> None:
         self.spec = spec
         self.is_closed = False
-        self._ask_at = ask_at
+        self._new_client = new_client
         self._closer = closer
         self._lock = threading.Lock()
         self._clients: dict[int, SocketClient] = {}
@@ -64,23 +67,23 @@ class SurveyClient:
             if self.is_closed:
                 raise self._closed_error()
             clients = list(self._clients.values())
-        asked: list[OpenCall] = []
+        sent: list[OpenCall] = []
         try:
             for client in clients:
                 try:
-                    asked.append(_Asked(client, client.begin(data, timeout_s, then)))
+                    sent.append(_SentCall(client, client.begin(data, timeout_s, then)))
                 except ClosedError:  # left meanwhile
                     continue
         except BaseException:
-            self.forget_all(asked)
+            self.forget_all(sent)
             raise
-        return asked
+        return sent
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel these calls."""
-        for asked in calls:
-            if isinstance(asked, _Asked):
-                asked.client.forget(asked.call)
+        for sent in calls:
+            if isinstance(sent, _SentCall):
+                sent.client.forget(sent.call)
 
     def _all(self) -> list[SocketClient]:
         return [*self._clients.values(), *self._leaving]
@@ -106,24 +109,24 @@ class SurveyClient:
         """Add further respondents."""
         with self._lock:
             for remote in remotes:
-                self._meet(remote.publisher.id, remote.publisher.endpoints)
+                self._add_respondent(remote.publisher.id, remote.publisher.endpoints)
 
-    def _meet(self, respondent: int, endpoints: Sequence[str]) -> None:
+    def _add_respondent(self, respondent: int, endpoints: Sequence[str]) -> None:
         if self.is_closed or not endpoints:
             return
         known = self._clients.get(respondent)
-        if known is not None and known.place == endpoints[0]:
+        if known is not None and known.fixed_endpoint == endpoints[0]:
             return
         if known is not None:
-            self._part(respondent)
+            self._remove_respondent(respondent)
         try:
-            self._clients[respondent] = self._ask_at(endpoints[0])
+            self._clients[respondent] = self._new_client(endpoints[0])
         except NepError as error:
             _logger.warning(
                 "can't connect to a respondent of '%s' at '%s': %s", self.spec.service, endpoints[0], error
             )
 
-    def _part(self, respondent: int) -> None:
+    def _remove_respondent(self, respondent: int) -> None:
         client = self._clients.pop(respondent, None)
         if client is not None:
             client.gone(0, 0, is_closed=True)
@@ -138,7 +141,7 @@ class SurveyClient:
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
         """Process the removal of a respondent."""
         with self._lock:
-            self._part(publisher)
+            self._remove_respondent(publisher)
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of respondents."""
@@ -147,9 +150,9 @@ class SurveyClient:
             if not listed and any(each.is_connected for each in self._clients.values()):
                 return  # the master was restarted, and respondents have yet to register
             for respondent in [each for each in self._clients if each not in listed]:
-                self._part(respondent)
+                self._remove_respondent(respondent)
             for respondent, endpoints in listed.items():
-                self._meet(respondent, endpoints)
+                self._add_respondent(respondent, endpoints)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Do nothing: replies have no sequence numbers."""

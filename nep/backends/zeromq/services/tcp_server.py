@@ -25,14 +25,14 @@ from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
 
-_WAITING = 128
+_BACKLOG = 128
 """Backlog of connections to be accepted."""
 _PEERS_MAX = 1000
 _READ_MAX = 100
 _UNREAD_MAX_BYTES = 256 * 2**20
 """Maximum number of bytes queued per client; further replies are dropped."""
 _LISTENER_FILES = 2
-_FULL_S = 0.5
+_ACCEPT_PAUSE_S = 0.5
 """Pause in seconds before accepting again when descriptors have run out."""
 
 
@@ -54,7 +54,7 @@ class TcpServer:
         self._changed = threading.Condition(threading.Lock())
         self._reader = CallReader(spec.service, NATIVE, self.tally)
         self._peers: set[_Peer] = set()
-        self._turned_away = 0
+        self._rejected = 0
         self._listener = _bound(address, spec.service)
         self.fd = self._listener.fileno()
         host, port = self._listener.getsockname()[:2]
@@ -73,22 +73,22 @@ class TcpServer:
                 return PollState()
             except OSError as error:  # the client has disconnected, or descriptors have run out
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
-                    return PollState(pause_reading=True, due=now + _FULL_S)
+                    return PollState(pause_reading=True, due=now + _ACCEPT_PAUSE_S)
                 continue
             if len(self._peers) >= _PEERS_MAX or not has_room(_LISTENER_FILES):
-                self._turn_away(connected)
+                self._reject_connection(connected)
                 continue
             self._accept(connected, f"{host}:{port}")
         return PollState(due=now)
 
-    def _turn_away(self, connected: socket.socket) -> None:
+    def _reject_connection(self, connected: socket.socket) -> None:
         connected.close()
-        self._turned_away += 1
-        if is_logged(self._turned_away):
+        self._rejected += 1
+        if is_logged(self._rejected):
             _logger.warning(
                 "rejected a client of '%s' (%d so far): too many connections",
                 self.spec.service,
-                self._turned_away,
+                self._rejected,
             )
 
     def _accept(self, connected: socket.socket, address: str) -> None:
@@ -102,26 +102,26 @@ class TcpServer:
 
     def serve_peer(self, peer: _Peer, now: float) -> PollState:
         """Queue calls of a client, and send its pending replies."""
-        came: list[IncomingCall] = []
+        calls: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
                 return PollState(pause_reading=True)
             peer.stream.flush()
-            has_more = self._read(peer, came, now)
+            has_more = self._read(peer, calls, now)
             is_over = peer.stream.is_over and not has_more
             if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
                 # otherwise the client has only shut down its sending side and still reads replies
-                self._drop(peer)
+                self._drop_locked(peer)
             elif peer.is_last and not peer.stream.backlog:
                 # keep reading until the client closes: closing first could discard data in flight
                 peer.stream.end_sending()
                 self._changed.notify_all()
-        for call in came:
+        for call in calls:
             if not self.calls.put(call):
-                self._refuse(call)
+                self._reject(call)
         return PollState(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
 
-    def _read(self, peer: _Peer, came: list[IncomingCall], now: float) -> bool:
+    def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
         for turn in range(_READ_MAX):
             try:
@@ -134,16 +134,16 @@ class TcpServer:
                 if parts is None:
                     return False
             except WireError as error:
-                self._reader.refuse(error)
+                self._reader.reject(error)
                 return False
             call = self._reader.read(parts, now, partial(self._answer, peer))
             if call is not None:
-                came.append(call)
+                calls.append(call)
                 peer.waiting += 1
         return True
 
-    def _drop(self, peer: _Peer) -> None:
-        # Call with the lock held, in the I/O thread or after it has stopped serving all peers.
+    def _drop_locked(self, peer: _Peer) -> None:
+        # Call in the I/O thread, or after it has stopped serving all peers.
         self._peers.discard(peer)
         self._io.remove(peer)
         peer.stream.close()
@@ -170,7 +170,7 @@ class TcpServer:
             self._io.serve_soon(peer)
         return True
 
-    def _refuse(self, call: IncomingCall) -> None:
+    def _reject(self, call: IncomingCall) -> None:
         call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
     # ---- closing
@@ -182,7 +182,7 @@ class TcpServer:
     def begin_close(self) -> None:
         """Reject queued and new calls."""
         for call in self.calls.close():
-            self._refuse(call)
+            self._reject(call)
 
     def release(self, deadline: float) -> None:
         """Stop listening; clients can read their replies until `deadline`."""
@@ -239,7 +239,7 @@ def _bound(address: str, service: str) -> socket.socket:
         else:
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(("" if host == "*" else host, port))
-        listener.listen(_WAITING)
+        listener.listen(_BACKLOG)
         listener.setblocking(False)
     except OSError as error:
         listener.close()

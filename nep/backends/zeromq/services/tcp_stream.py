@@ -21,7 +21,7 @@ _SIZE = struct.Struct("<I")
 _CHUNK_BYTES, _TURN_BYTES = 262_144, 1_048_576
 _SMALL_BYTES = 65_536
 """Size below which a copy is cheaper than another system call."""
-_IDLE_S, _AGAIN_S, _TIMES = 4, 2, 4
+_KEEPALIVE_IDLE_S, _KEEPALIVE_INTERVAL_S, _KEEPALIVE_PROBES = 4, 2, 4
 
 
 class TcpStream:
@@ -57,7 +57,7 @@ class TcpStream:
                 break
             except OSError:
                 data = b""
-                self._break()
+                self._abort()
             if not data:
                 self.is_over = True
             self._input += data
@@ -68,19 +68,19 @@ class TcpStream:
 
         Raises `WireError` for an invalid size and for an incomplete pair at the end; the stream is over then.
         """
-        there = len(self._input) - self._start
-        if there < _SIZE.size:
-            self._check_end(there)
+        available = len(self._input) - self._start
+        if available < _SIZE.size:
+            self._check_end(available)
             return None
         (size,) = _SIZE.unpack_from(self._input, self._start)
         if not HEADER_BYTES <= size <= HEADER_BYTES + PAYLOAD_MAX_BYTES:
-            self._forget_input()
+            self._clear_input()
             self.is_over = True
-            self._break()
+            self._abort()
             reason = _("its size is {size} bytes; it is no call, or too large").format(size=size)
             raise WireError(reason, code="call-size")
-        if there < _SIZE.size + size:
-            self._check_end(there)
+        if available < _SIZE.size + size:
+            self._check_end(available)
             return None
         begin = self._start + _SIZE.size
         self._start = begin + size
@@ -90,18 +90,18 @@ class TcpStream:
                 bytes(view[begin + HEADER_BYTES : self._start]),
             ]
         if self._start == len(self._input):
-            self._forget_input()
+            self._clear_input()
         elif self._start > _TURN_BYTES:
             del self._input[: self._start]
             self._start = 0
         return pair
 
-    def _check_end(self, there: int) -> None:
-        if self.is_over and there:
-            self._forget_input()
+    def _check_end(self, available: int) -> None:
+        if self.is_over and available:
+            self._clear_input()
             raise WireError(_("it ends in the middle"), code="call-end")
 
-    def _forget_input(self) -> None:
+    def _clear_input(self) -> None:
         self._input = bytearray()
         self._start = 0
 
@@ -126,7 +126,7 @@ class TcpStream:
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:  # earlier input can still be read
-                self._break()
+                self._abort()
                 return
             self.backlog -= sent
             if sent == len(self._output[0]):
@@ -134,7 +134,7 @@ class TcpStream:
             else:
                 self._output[0] = self._output[0][sent:]
 
-    def _break(self) -> None:
+    def _abort(self) -> None:
         self.is_broken = True
         self._output.clear()
         self.backlog = 0
@@ -149,7 +149,7 @@ class TcpStream:
     def close(self) -> None:
         """Close the socket. The I/O thread must not serve it any more."""
         self.is_over = True
-        self._break()
+        self._abort()
         self._socket.close()
 
     def forked(self) -> None:
@@ -198,7 +198,7 @@ class TcpConnection:
         """False: the descriptor is level-triggered."""
         return False
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Update `is_open`."""
         if self.is_open or self._is_dead:
             return
@@ -249,7 +249,11 @@ def keep_alive(connected: socket.socket, address: str) -> None:
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):
         return
-    for name, value in (("TCP_KEEPIDLE", _IDLE_S), ("TCP_KEEPINTVL", _AGAIN_S), ("TCP_KEEPCNT", _TIMES)):
+    for name, value in (
+        ("TCP_KEEPIDLE", _KEEPALIVE_IDLE_S),
+        ("TCP_KEEPINTVL", _KEEPALIVE_INTERVAL_S),
+        ("TCP_KEEPCNT", _KEEPALIVE_PROBES),
+    ):
         option = getattr(socket, name, None)  # not every system has all options
         if option is not None:
             connected.setsockopt(socket.IPPROTO_TCP, option, value)

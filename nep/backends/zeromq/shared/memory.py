@@ -31,24 +31,24 @@ from nep.system.forks import in_child
 
 SHARED_BYTES = 32 * 2**10
 """Size from which shared memory is faster than the socket."""
-_LARGEST_BYTES = 64 * 2**20
+_MAX_PAYLOAD_BYTES = 64 * 2**20
 _SLOTS_BYTES = 320 * 2**20
-"""Total size of a publisher's slots; at least `_FEWEST` slots."""
-_FEWEST, _MOST = 4, 256
-_SMALLEST_BYTES = 64 * 2**10
+"""Total size of a publisher's slots; at least `_MIN_SLOTS` slots."""
+_MIN_SLOTS, _MAX_SLOTS = 4, 256
+_MIN_SLOT_BYTES = 64 * 2**10
 _HELD_MOST = 12
 """Payloads of a publisher that a reader keeps in their slots; further ones are copied to free the slots."""
-_HEAD = 64
+_HEADER_BYTES = 64
 """Bytes before a payload: number, size, and padding for its alignment."""
-_NUMBERS = struct.Struct("=QQ")
+_HEADER = struct.Struct("=QQ")
 _COPIED_BYTES = 2**18
 """Size up to which payloads requested as bytes are copied on arrival, which frees their slots at once."""
 _LOANS = 4
 _READERS = 64
 _SPARE_BYTES = 64 * 2**20
 """Space to keep free in the shared-memory file system: writing a page without space kills the program."""
-_ASK_S = 0.05
-_ASK_BYTES = _LARGEST_BYTES
+_QUERY_INTERVAL_S = 0.05
+_QUERY_BYTES = _MAX_PAYLOAD_BYTES
 """Validity of a free-space query, in time and in bytes written by one publisher."""
 _MEMORY = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
 _MODULE = "iceoryx2"
@@ -68,8 +68,8 @@ class _Opened:
         return (
             self.node.service_builder(name)
             .publish_subscribe(self.library.Slice[ctypes.c_uint8])
-            .subscriber_max_buffer_size(_MOST)
-            .subscriber_max_borrowed_samples(_MOST)
+            .subscriber_max_buffer_size(_MAX_SLOTS)
+            .subscriber_max_borrowed_samples(_MAX_SLOTS)
             .max_publishers(1)
             .max_subscribers(_READERS)
             .max_nodes(_READERS + 1)
@@ -134,7 +134,7 @@ def _own_folder() -> Path:
     return folder
 
 
-def _keep_for_ever(*inherited: object) -> None:
+def _keep_forever(*inherited: object) -> None:
     # Prevents finalizers in a forked child, which would release the parent's resources.
     for each in inherited:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
@@ -145,14 +145,14 @@ def _forked() -> None:
     global _lock, _forks
     _lock, _forks = threading.Lock(), _forks + 1
     opened = None if _process.opened is None else _process.opened()
-    _keep_for_ever(opened, *_writers.values(), *_readers.values())
+    _keep_forever(opened, *_writers.values(), *_readers.values())
     _process.opened = None
 
 
 in_child(_forked)
 
 
-class _Room:
+class _FreeSpace:
     # Free space, queried at intervals: a query takes as long as a small payload.
     _asked_at = float("-inf")
     _left_bytes = 0
@@ -161,9 +161,9 @@ class _Room:
         if sys.platform != "linux":
             return True
         now = time.monotonic()
-        if now >= self._asked_at + _ASK_S or self._left_bytes < size_bytes:
+        if now >= self._asked_at + _QUERY_INTERVAL_S or self._left_bytes < size_bytes:
             self._asked_at = now
-            self._left_bytes = min(_ASK_BYTES, room_bytes() - _SPARE_BYTES)
+            self._left_bytes = min(_QUERY_BYTES, room_bytes() - _SPARE_BYTES)
         if self._left_bytes < size_bytes:
             return False
         self._left_bytes -= size_bytes
@@ -203,7 +203,7 @@ class Loan:
         self._forks = _forks
         self._port = port  # the memory is valid while the port exists
         self._sample = sample
-        self.address = int(sample.payload_ptr) + _HEAD
+        self.address = int(sample.payload_ptr) + _HEADER_BYTES
 
     @property
     def buffer(self) -> memoryview:
@@ -214,14 +214,14 @@ class Loan:
 
     def send(self, number: int) -> None:
         """Hand the payload to all readers. It must not be changed afterwards."""
-        head = (ctypes.c_uint8 * _NUMBERS.size).from_address(self.address - _HEAD)
-        _NUMBERS.pack_into(head, 0, number, self.size)
+        head = (ctypes.c_uint8 * _HEADER.size).from_address(self.address - _HEADER_BYTES)
+        _HEADER.pack_into(head, 0, number, self.size)
         sample, self._sample = self._sample, None
         sample.assume_init().send()
 
     def __del__(self) -> None:
         if self._forks != _forks:
-            _keep_for_ever(self._port, self._sample)
+            _keep_forever(self._port, self._sample)
 
 
 class SharedWriter:
@@ -234,7 +234,7 @@ class SharedWriter:
         """Number of payloads sent."""
         self._publisher = publisher
         self._slot_bytes = 0
-        self._room = _Room()
+        self._free_space = _FreeSpace()
         self._opened: _Opened | None = None
         self._service: Any = None
         self._port: Any = None
@@ -248,11 +248,11 @@ class SharedWriter:
         """
         if size <= self._slot_bytes:
             return self._port is not None
-        opened = _open() if size <= _LARGEST_BYTES else None
+        opened = _open() if size <= _MAX_PAYLOAD_BYTES else None
         if opened is None:
             return False
-        slot_bytes = max(_SMALLEST_BYTES, 1 << (size - 1).bit_length())
-        slots = max(_FEWEST, min(_MOST, _SLOTS_BYTES // slot_bytes))
+        slot_bytes = max(_MIN_SLOT_BYTES, 1 << (size - 1).bit_length())
+        slots = max(_MIN_SLOTS, min(_MAX_SLOTS, _SLOTS_BYTES // slot_bytes))
         self.close()
         self._opened = opened
         self.generation += 1
@@ -261,7 +261,7 @@ class SharedWriter:
             service = opened.service(self._publisher, self.generation).create()
             self._port = (
                 service.publisher_builder()
-                .initial_max_slice_len(slot_bytes + _HEAD)
+                .initial_max_slice_len(slot_bytes + _HEADER_BYTES)
                 .allocation_strategy(opened.library.AllocationStrategy.Static)
                 .override_sample_preallocation(slots)
                 .max_loaned_samples(_LOANS)
@@ -280,15 +280,15 @@ class SharedWriter:
         sample = self._sample(size)
         if sample is None:
             return None
-        made = Loan(self._port, sample, size)
-        self._loans[made.address] = made
-        return made
+        loan = Loan(self._port, sample, size)
+        self._loans[loan.address] = loan
+        return loan
 
     def _sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
-        if self._port is None or size > self._slot_bytes or not self._room.has(size):
+        if self._port is None or size > self._slot_bytes or not self._free_space.has(size):
             return None
         try:
-            return self._port.loan_slice_uninit(size + _HEAD)
+            return self._port.loan_slice_uninit(size + _HEADER_BYTES)
         except Exception:  # noqa: BLE001 - on any error the payload goes through the socket
             return None
 
@@ -300,10 +300,10 @@ class SharedWriter:
         sample = self._sample(size)
         if sample is None:
             return None
-        slot = self._slots.view(int(sample.payload_ptr), self._slot_bytes + _HEAD)
+        slot = self._slots.view(int(sample.payload_ptr), self._slot_bytes + _HEADER_BYTES)
         self.number = number = self.number + 1
-        _NUMBERS.pack_into(slot, 0, number, size)
-        slot[_HEAD : _HEAD + size] = data if isinstance(data, bytes) else data.cast("B")
+        _HEADER.pack_into(slot, 0, number, size)
+        slot[_HEADER_BYTES : _HEADER_BYTES + size] = data if isinstance(data, bytes) else data.cast("B")
         sample.assume_init().send()
         return number
 
@@ -343,7 +343,7 @@ class _Held:
 
     def __del__(self) -> None:
         if self._forks != _forks:
-            _keep_for_ever(self._sample)
+            _keep_forever(self._sample)
         self._sample = None
         self._returned.append(None)
 
@@ -363,7 +363,7 @@ class SharedReader:
         self._slots = _Slots()
         try:
             self._service = self._opened.service(publisher, generation).open()
-            self._port = self._service.subscriber_builder().buffer_size(_MOST).create()
+            self._port = self._service.subscriber_builder().buffer_size(_MAX_SLOTS).create()
         except Exception as error:
             raise LookupError from error
         _readers[id(self)] = self
@@ -391,14 +391,16 @@ class SharedReader:
             return None
         if sample is None:
             return None
-        number, size = _NUMBERS.unpack_from(self._slots.view(int(sample.payload_ptr), _NUMBERS.size))
+        number, size = _HEADER.unpack_from(self._slots.view(int(sample.payload_ptr), _HEADER.size))
         return number, size, sample
 
     def _payload(self, size: int, sample: Any, *, may_copy: bool) -> bytes | memoryview:  # noqa: ANN401
         address = int(sample.payload_ptr)
         if may_copy and size <= _COPIED_BYTES:
-            return bytes(self._slots.view(address, size + _HEAD)[_HEAD : _HEAD + size])
-        array = (ctypes.c_uint8 * size).from_address(address + _HEAD)
+            return bytes(
+                self._slots.view(address, size + _HEADER_BYTES)[_HEADER_BYTES : _HEADER_BYTES + size]
+            )
+        array = (ctypes.c_uint8 * size).from_address(address + _HEADER_BYTES)
         while self._returned:
             self._returned.popleft()
             self._held -= 1

@@ -14,9 +14,9 @@ from nep.i18n import _
 from nep.protocol.wire import Shares
 
 _NUMBER = struct.Struct("<Q")
-_OFFERS = 4
+_MAX_OFFERS = 4
 """Maximum number of offers to a subscriber; without a reply it can't share memory."""
-_AGAIN_S = 0.5
+_OFFER_RETRY_S = 0.5
 _TIDY_S = 1.0
 
 
@@ -41,13 +41,13 @@ class SharedPayloads:
         self.readers.discard(subscriber)
         self._offered.pop(subscriber, None)
 
-    def place(self, data: bytes | memoryview, seen: Mapping[int, int], now: float) -> bytes | None:
+    def write(self, data: bytes | memoryview, subscribers: Mapping[int, int], now: float) -> bytes | None:
         """Write a payload to shared memory; return the part of the message that refers to it.
 
         Returns None if it must go through the socket: no readers, or no free slot.
         """
         size = data.nbytes if isinstance(data, memoryview) else len(data)
-        if not seen or not self._is_ready(size, seen, now):
+        if not subscribers or not self._is_ready(size, subscribers, now):
             return None
         lent = self._writer.lent(data) if isinstance(data, memoryview) else None
         number = self._writer.copy(data, size) if lent is None else self._writer.send(lent)
@@ -67,12 +67,12 @@ class SharedPayloads:
             self._offered.clear()
         return is_there
 
-    def _is_ready(self, size: int, seen: Mapping[int, int], now: float) -> bool:
+    def _is_ready(self, size: int, subscribers: Mapping[int, int], now: float) -> bool:
         if not self._has_slots(size):
             return False
-        for each in seen if len(self.readers) < len(seen) else ():
+        for each in subscribers if len(self.readers) < len(subscribers) else ():
             times, at = self._offered.get(each, (0, float("-inf")))
-            if each not in self.readers and times < _OFFERS and now >= at + _AGAIN_S:
+            if each not in self.readers and times < _MAX_OFFERS and now >= at + _OFFER_RETRY_S:
                 self._offered[each] = (times + 1, now)
                 self._offer(each, self._writer.generation)
         return bool(self.readers)
