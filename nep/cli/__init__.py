@@ -1,6 +1,6 @@
 """The command `nep`.
 
-`app` puts the commands together; each is one module, such as `echo` for `nep topic echo`.
+`app` assembles the commands; each is one module, such as `echo` for `nep topic echo`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import sys
 __all__ = ["main"]
 
 INTERRUPTED = 130
-"""The exit code of a program that Ctrl+C ended."""
+"""Exit code of a program stopped by Ctrl+C."""
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code. Ctrl+C ends it quietly at any moment."""
+    """Run the command line and exit with its exit code. Ctrl+C never prints a traceback."""
     try:
-        from nep.cli import interrupts  # noqa: PLC0415 - a traceback could be seen only before this line
+        from nep.cli import interrupts  # noqa: PLC0415 - imported here so that Ctrl+C during the import is handled
 
         interrupts.end_at_once()
         code = _run()
@@ -32,9 +32,9 @@ def _run() -> int:
 
     prepare_streams()
     buffer_output()
-    begin()  # before the modules whose help texts are made when they are imported
+    begin()  # before importing modules that translate their help texts at import
     try:
-        from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are heavy
+        from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are slow to import
 
         interrupts.ask_first()
         interrupts.leave_when_told(interrupts.TERMINATED)

@@ -1,4 +1,4 @@
-"""What a master tells beside its work: its alerts, to the terminal that it runs in and to the log records."""
+"""Attachments of `nep master` that report its alerts: on the terminal and as log records."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ _LIBRARY = "nep"
 
 
 class AlertChanges:
-    """Which alerts are new or say something else than before, and which are cured."""
+    """Difference between the alerts of successive graph snapshots."""
 
     def __init__(self) -> None:
         self._known: dict[str, Alert] = {}
 
     def take(self, view: GraphView) -> tuple[Sequence[Alert], Sequence[Alert]]:
-        """(new ones, cured ones) since the last time."""
+        """Return (new or changed alerts, resolved alerts) since the previous call."""
         now = {alert.id: alert for alert in view.alerts}
-        cured = [self._known.pop(id) for id in [known for known in self._known if known not in now]]
+        resolved = [self._known.pop(id) for id in [known for known in self._known if known not in now]]
         new = [alert for id, alert in now.items() if self._known.get(id) != alert]
         self._known.update({alert.id: alert for alert in new})
-        return new, cured
+        return new, resolved
 
 
 class AlertPrinter:
-    """Attached to the master: writes each alert to `out` when it comes, and when it is cured.
+    """Master attachment that prints each alert when it appears and when it is resolved.
 
-    It does so in the master's thread: `out` must not let it wait, see `nep.system.terminal`.
+    Runs in the master's thread, so `out` must not block; see `nep.system.terminal`.
     """
 
     def __init__(self, out: Terminal) -> None:
@@ -44,24 +44,24 @@ class AlertPrinter:
         self._changes = AlertChanges()
 
     def start(self, _master: Master) -> None:
-        """See `Attachment`."""
+        """Do nothing: alerts are printed from the first change on."""
 
     def changed(self, view: GraphView) -> None:
-        """See `Attachment`."""
-        new, cured = self._changes.take(view)
-        for alert in cured:
-            cured_now = escaped(_("cured: {sentence}").format(sentence=alert.sentence))
-            console(out=self._out).print(cured_now, style="green", markup=False)
+        """Print the alerts that are new, changed or resolved in `view`."""
+        new, resolved = self._changes.take(view)
+        for alert in resolved:
+            sentence = escaped(_("resolved: {sentence}").format(sentence=alert.sentence))
+            console(out=self._out).print(sentence, style="green", markup=False)
         show_alerts(new, self._out)
 
     def close(self) -> None:
-        """See `Attachment`."""
+        """Do nothing: the terminal belongs to the caller."""
 
 
 class AlertLog:
-    """Attached to the master: publishes its alerts, and what the library warns of, as log records.
+    """Master attachment that publishes alerts and the library's warnings as log records.
 
-    They come from a node "master", which exists for the others as soon as there is something to tell.
+    The records come from a node named "master".
     """
 
     def __init__(self) -> None:
@@ -69,23 +69,23 @@ class AlertLog:
         self._node: Node | None = None
 
     def start(self, master: Master) -> None:
-        """See `Attachment`."""
+        """Create the node and forward the library's log records to it."""
         self._node = Node("master", master=master.address, wait_s=3.0)
-        self._node.log.propagate = False  # the terminal has the alerts already
+        self._node.log.propagate = False  # AlertPrinter already prints the alerts
         logging.getLogger(_LIBRARY).addHandler(self._node.log_handler)
 
     def changed(self, view: GraphView) -> None:
-        """See `Attachment`."""
+        """Log the alerts that are new, changed or resolved in `view`."""
         if self._node is None:
             return
-        new, cured = self._changes.take(view)
-        for alert in cured:
-            self._node.log.info("cured: %s", alert.sentence)
+        new, resolved = self._changes.take(view)
+        for alert in resolved:
+            self._node.log.info("resolved: %s", alert.sentence)
         for alert in new:
             self._node.log.warning("%s", f"{alert.sentence}. {alert.hint}".removesuffix(". "))
 
     def close(self) -> None:
-        """See `Attachment`."""
+        """Close the node and remove its log handler."""
         node, self._node = self._node, None
         if node is not None:
             logging.getLogger(_LIBRARY).removeHandler(node.log_handler)

@@ -1,4 +1,4 @@
-"""The command `nep` put together: its groups, its help, and how it ends."""
+"""Assembly of the command `nep`: its groups, help texts and exit codes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         web,
         wire,
     )
-else:  # each command line needs one of them
+else:  # a command line needs only one of them
     blackboard, bridge = lazy_module("nep.cli.blackboard"), lazy_module("nep.cli.bridge")
     doctor, log = lazy_module("nep.cli.doctor"), lazy_module("nep.cli.log")
     masters, nodes = lazy_module("nep.cli.masters"), lazy_module("nep.cli.nodes")
@@ -68,24 +68,24 @@ _COMMANDS: Mapping[str, Callable[[], object]] = {
     "recording": lambda: recordings.app,
     "wire": lambda: wire.app,
 }
-"""In the order of the help: what carries a command out, or the group that has more of them."""
+"""Command functions and groups by name, in the order of the help; each is imported on first use."""
 
 
-def _say_version(is_wanted: bool) -> None:
+def _show_version(is_wanted: bool) -> None:
     if is_wanted:
         write(f"nep {__version__}\n")
         raise typer.Exit
 
 
-class _CommandsWhenAsked(Mapping[str, Any]):
-    """The commands of `nep` as click has them: one is imported and put together when it is asked for."""
+class _LazyCommands(Mapping[str, Any]):
+    """Lazy mapping of command names to click commands: each is imported and built on first use."""
 
     def __init__(self) -> None:
         self._built: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - typer's types are not public
         if name not in self._built:
-            self._built[name] = get_group(_told(name)).commands[name]
+            self._built[name] = get_group(_built_command(name)).commands[name]
         return self._built[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -95,21 +95,21 @@ class _CommandsWhenAsked(Mapping[str, Any]):
         return len(_COMMANDS)
 
 
-class _OneAtATime(TranslatedGroup):
-    """The group of all of them, which reads no more of them than a command line needs."""
+class _LazyGroup(TranslatedGroup):
+    """Root group that imports only the commands a command line needs."""
 
     def __init__(self, **named: Any) -> None:  # noqa: ANN401 - see above
-        super().__init__(**{**named, "commands": _CommandsWhenAsked()})
+        super().__init__(**{**named, "commands": _LazyCommands()})
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002
-        """See `click.Group`."""
+        """Return the command names in the order of the help."""
         return list(self.commands)
 
 
 app = typer.Typer(
     name="nep",
-    cls=_OneAtATime,
-    help=_("See and make messages between robots, programs and people."),
+    cls=_LazyGroup,
+    help=_("Publish, inspect and record messages of robots and programs."),
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -121,36 +121,35 @@ app = typer.Typer(
 def common(
     master: Annotated[
         str | None,
-        typer.Option("--master", metavar=_("ADDRESS"), help=_("Where the master is."), show_default=False),
+        typer.Option("--master", metavar=_("ADDRESS"), help=_("Master address."), show_default=False),
     ] = None,
-    version: Annotated[  # noqa: ARG001 - `_say_version` has done it
+    version: Annotated[  # noqa: ARG001 - `_show_version` has done it
         bool,
-        typer.Option("--version", is_eager=True, callback=_say_version, help=_("Say the version, and end.")),
+        typer.Option("--version", is_eager=True, callback=_show_version, help=_("Show version and exit.")),
     ] = False,
 ) -> None:
-    """See and make messages between robots, programs and people."""
+    """Publish, inspect and record messages of robots and programs."""
     if master is not None:
-        os.environ[MASTER_VARIABLE] = master_address(master)  # for the command, and for what it starts
+        os.environ[MASTER_VARIABLE] = master_address(master)  # for this command and its child processes
 
 
 @cache
-def _told(name: str) -> typer.Typer:
-    """One of the commands as typer is told of it, with its docstrings translated."""
-    made, found = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
+def _built_command(name: str) -> typer.Typer:
+    group, found = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
     if isinstance(found, typer.Typer):
-        made.add_typer(found, name=name)
+        group.add_typer(found, name=name)
     elif callable(found):
-        made.command(name)(found)
-    for command, english in _docstrings(made):
+        group.command(name)(found)
+    for command, english in _docstrings(group):
         command.help = _(english)
         command.cls = TranslatedCommand
-    return made
+    return group
 
 
 def docstrings() -> Iterator[tuple[CommandInfo, str]]:
-    """Each command with what its docstring says, which is its help."""
+    """Yield each command with the English docstring that is its help."""
     for name in _COMMANDS:
-        yield from _docstrings(_told(name))
+        yield from _docstrings(_built_command(name))
 
 
 def _docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
@@ -162,13 +161,13 @@ def _docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
 
 
 def run() -> int:
-    """Run the command line; its exit code. What goes wrong is one sentence on the standard error stream.
+    """Run the command line and return its exit code. Errors are printed to stderr as one sentence.
 
-    A reader that has enough (`| head`) ends it without a word, with 1.
+    If the reader of the output has closed it (`| head`), the command ends silently with code 1.
     """
     raised: OSError | None = None
     try:
-        code = _code()
+        code = _exit_code()
     except NepError as error:
         say_error(str(error))
         code = 1
@@ -178,20 +177,18 @@ def run() -> int:
         raised, code = error, 1
     problem = output_problem(raised)
     if problem:
-        say_error(_("the output cannot be written: {problem}").format(problem=problem))
+        say_error(_("can't write the output: {problem}").format(problem=problem))
     return code if problem is None else code or 1
 
 
 @cache
 def _built() -> Callable[[list[str]], object]:
-    """The commands as click runs them: each parameter is looked at once."""
     return get_command(app)
 
 
-def _code() -> int:
-    """The exit code that typer leaves with."""
+def _exit_code() -> int:
     try:
         _built()(words_given())
-    except SystemExit as ended:
-        return ended.code if isinstance(ended.code, int) else 0 if ended.code is None else 1
+    except SystemExit as exit_:
+        return exit_.code if isinstance(exit_.code, int) else 0 if exit_.code is None else 1
     return 0

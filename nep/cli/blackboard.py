@@ -1,4 +1,4 @@
-"""`nep blackboard`: run a blackboard that other programs ask, and look into one."""
+"""`nep blackboard`: run a blackboard for other programs, and show the values of one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ else:
     )
 
 _DEFAULT_TOPIC = "/blackboard"
-"""Where programs of RIZE tell what they perceive."""
+"""Topic on which programs of RIZE publish perceptions."""
 _DEFAULT_NAME = "blackboard"
 _TIMEOUT_S = 5.0
 _RUN = "run"
@@ -44,33 +44,34 @@ _COLUMNS = (
 )
 
 
-def _checked_life(given: float | None) -> float | None:
-    """`given` itself when something can live for so long. Raises `typer.BadParameter`."""
-    if given is not None and not given > 0.0:  # also what is not a number
-        raise typer.BadParameter(_("{given:g} is no life; give seconds, more than 0").format(given=given))
+def _checked_lifetime(given: float | None) -> float | None:
+    if given is not None and not given > 0.0:  # rejects NaN, too
+        raise typer.BadParameter(
+            _("{given:g} is not a valid lifetime; use a number of seconds above 0").format(given=given)
+        )
     return given
 
 
-class _RunByItself(TranslatedGroup):
-    """`nep blackboard TOPIC` is `nep blackboard run TOPIC`."""
+class _DefaultRunGroup(TranslatedGroup):
+    """Group in which `nep blackboard TOPIC` means `nep blackboard run TOPIC`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - see `TranslatedGroup`
-        """See `click.Command`."""
+        """Insert `run` when the first word is not a subcommand."""
         if not args or (args[0] not in self.commands and args[0] not in ctx.help_option_names):
             args = [_RUN, *args]
         return super().parse_args(ctx, args)
 
 
 app: typer.Typer = typer.Typer(
-    cls=_RunByItself,
-    help=_("What is known of the world, and how old it is: run a blackboard, look into one."),
+    cls=_DefaultRunGroup,
+    help=_("Run a blackboard of topics' newest values, or show its values and their ages."),
 )
 _NameOption = Annotated[
     str,
     typer.Option(
         "--name",
         metavar=_("NAME"),
-        help=_("How its services and its topic are called; 'blackboard' when nothing is said."),
+        help=_("Name of the blackboard, prefix of its services and topic (default: blackboard)."),
         show_default=False,
     ),
 ]
@@ -83,8 +84,8 @@ def run(
         typer.Argument(
             metavar="[KEY=]TOPIC",
             help=_(
-                "What to keep, such as human=/perception/humans; '/blackboard' when nothing is said. "
-                "Topics may have wildcards."
+                "Topics or patterns to store, optionally as KEY=TOPIC, such as "
+                "human=/perception/humans (default: /blackboard)."
             ),
             show_default=False,
             autocompletion=complete_topic,
@@ -96,22 +97,21 @@ def run(
         typer.Option(
             "--lives",
             metavar=_("SECONDS"),
-            help=_("Forget a value that was not told again for so long; else it is kept."),
+            help=_("Delete a value that isn't updated for this long (default: never)."),
             show_default=False,
-            callback=_checked_life,
+            callback=_checked_lifetime,
         ),
     ] = None,
     max_keys: Annotated[
         int | None,
-        typer.Option(
-            "--max-keys", min=1, metavar="N", help=_("Keep so many values at most."), show_default=False
-        ),
+        typer.Option("--max-keys", min=1, metavar="N", help=_("Store at most N values."), show_default=False),
     ] = None,
     master: MasterOption = None,
 ) -> None:
-    """Run a blackboard: it keeps the newest values of topics, and answers who asks. Ctrl+C ends it.
+    """Run a blackboard: store the newest values of topics and serve them until Ctrl+C.
 
-    It tells changes on /blackboard/changes, and has the services blackboard/get, set and keys.
+    Changes are published on /blackboard/changes. The services are blackboard/get, blackboard/set and
+    blackboard/keys.
     """
     interrupts.leave_when_told()
     with (
@@ -119,9 +119,9 @@ def run(
         boards.Blackboard(node, max_keys=boards.MAX_KEYS if max_keys is None else max_keys) as board,
         servers.BlackboardServer(node, board, name),
     ):
-        for topic, key in map(_watched, topics or [_DEFAULT_TOPIC]):
+        for topic, key in map(_topic_and_key, topics or [_DEFAULT_TOPIC]):
             board.watch(topic, key=key, lives_s=lives_s)
-        say(_("blackboard '{name}' keeps what comes; Ctrl+C ends it").format(name=name))
+        say(_("running blackboard '{name}'; press Ctrl+C to stop").format(name=name))
         node.spin()
 
 
@@ -131,7 +131,7 @@ def show(
         str,
         typer.Argument(
             metavar=_("PATTERN"),
-            help=_("Keys with wildcards, such as 'human.*.position'; all when nothing is said."),
+            help=_("Keys to show; may have wildcards, such as 'human.*.position' (default: all)."),
             show_default=False,
         ),
     ] = "**",
@@ -141,7 +141,7 @@ def show(
         typer.Option(
             "--timeout",
             metavar=_("SECONDS"),
-            help=_("How long to wait for its answer; {seconds:g} when nothing is said.").format(
+            help=_("How long to wait for the blackboard's reply (default: {seconds:g}).").format(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,
@@ -151,7 +151,7 @@ def show(
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what a blackboard has, with ages: by the publisher's stamp, or by when it came."""
+    """Print the values of a blackboard with their ages, by publisher time stamp or arrival."""
     with Node(f"nep-blackboard-show-{os.getpid()}", master=master) as node:
         client = node.new_client(servers.service_of(name, "get"), timeout_s=timeout_s)
         try:
@@ -167,29 +167,27 @@ def show(
     if entries:
         show_table(_COLUMNS, [_row(each) for each in entries])
     else:
-        say(_("it has nothing that matches now"))
+        say(_("no matching values"))
     more = answer.get("more") if isinstance(answer, Mapping) else 0
     if more:
         say(_("and {count} more values").format(count=more))
 
 
-def _watched(word: str) -> tuple[str, str | None]:
-    """The topic, and the key that is given for it."""
+def _topic_and_key(word: str) -> tuple[str, str | None]:
     key, equals, topic = word.partition("=")
     return (topic, key) if equals and "/" not in key else (word, None)
 
 
 def _no_blackboard(name: str) -> NepError:
     return NepError(
-        _("no blackboard is called '{name}' here; start one with 'nep blackboard'").format(name=escaped(name))
+        _("no blackboard '{name}' is running; start one with 'nep blackboard'").format(name=escaped(name))
     )
 
 
 def _entries(answer: object) -> Sequence[Mapping[str, object]]:
-    """Raises `NepError` for an answer of something else."""
     found = answer.get("entries") if isinstance(answer, Mapping) else None
     if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
-        raise NepError(_("what answered is no blackboard; give another --name"))
+        raise NepError(_("the service that replied is not a blackboard; use another --name"))
     return found
 
 

@@ -1,4 +1,4 @@
-"""`nep bridge`: join topics of two back ends."""
+"""`nep bridge`: forward topics between two back ends."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from nep.text import escaped, shortened
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-_EVERY_S = 1.0
-_SLICE_S = 0.1
-_SETTLE_S = 1.5
-_CELL = 10
-_NAME_MOST = 60
-_NOTES_MOST = 100
-_ALWAYS = 6
-"""So many of the columns are there also when they are all 0."""
+_REPORT_PERIOD_S = 1.0
+_WAIT_SLICE_S = 0.1
+_ROBOT_DISCOVERY_S = 1.5
+_CELL_WIDTH = 10
+_MAX_NAME_WIDTH = 60
+_MAX_NOTES = 100
+_MIN_COLUMNS = 6
+"""Number of leading columns that are shown even if all their figures are 0."""
 _HEADS = (
     lazy("rate"),
     lazy("received"),
@@ -57,7 +57,7 @@ _HEADS = (
 WhatArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        help=_("A TOML file, or the two sides of one topic, such as zeromq:/chatter ros:/chatter."),
+        help=_("A TOML file, or the two ends of one topic, such as zeromq:/chatter ros:/chatter."),
         metavar=_("FILE | A B"),
         show_default=False,
     ),
@@ -65,7 +65,7 @@ WhatArgument = Annotated[
 DirectionOption = Annotated[
     str,
     typer.Option(
-        "--direction", metavar=_("WAY"), help=_("Which way, for one topic: 'a->b', 'b->a' or 'both'.")
+        "--direction", metavar=_("WAY"), help=_("Direction for one topic: 'a->b', 'b->a' or 'both'.")
     ),
 ]
 RateOption = Annotated[
@@ -73,14 +73,14 @@ RateOption = Annotated[
     typer.Option(
         "--rate",
         metavar="HZ",
-        help=_("So many messages a second at most, for one topic; the newest are kept."),
+        help=_("For one topic: forward at most HZ messages per second and drop older ones."),
         show_default=False,
     ),
 ]
-CheckOption = Annotated[bool, typer.Option("--check", help=_("Say whether the file is right, and end."))]
-ExampleOption = Annotated[bool, typer.Option("--example", help=_("Print a file to begin with, and end."))]
+CheckOption = Annotated[bool, typer.Option("--check", help=_("Validate the file and exit."))]
+ExampleOption = Annotated[bool, typer.Option("--example", help=_("Print an example file and exit."))]
 CountOption = Annotated[
-    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N reports; 0 goes on."))
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N reports (0: never)."))
 ]
 
 
@@ -94,12 +94,12 @@ def bridge(
     allow_moving: AllowMovingOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Join topics of two back ends, as a file says, or one topic at once. Ctrl+C ends it.
+    """Forward topics between two back ends until Ctrl+C, as a file describes or for one topic.
 
-    Messages pass as they are where both sides have the same form, else by what is in them. What a bridge has
-    brought over is not brought back. Each second it shows what it has carried, what was lost before it, and
-    what it left out because more came than the file allows. What moves a robot on either side is carried only
-    with --allow-moving. A network that is not there is waited for.
+    Messages are forwarded unchanged if both back ends use the same encoding, else they are converted.
+    Forwarded messages are not sent back. Once a second a table shows what was forwarded, lost and dropped
+    because of a rate limit. Topics that move a robot are forwarded only with --allow-moving. If a network is
+    down, the bridge waits for it.
     """
     if example:
         write(EXAMPLE)
@@ -108,61 +108,57 @@ def bridge(
     _check_reach(configuration)
     if check:
         check_installed(configuration)
-        _say_right(configuration)
+        _show_configuration(configuration)
         return
     interrupts.leave_when_told()
     allowed = allow_moving or ()
     _check_types(configuration, allowed)
     with _warnings() as notes, Bridge(configuration, allow_moving=allowed) as running, _published(running):
-        for refusal in running.refusals(_SETTLE_S):
+        for refusal in running.refusals(_ROBOT_DISCOVERY_S):
             raise typer.BadParameter(refusal)
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
-            said = _("{name} joins a, {a}, and b, {b}; Ctrl+C ends it")
+            said = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
             say(said.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
         _run(report, count)
 
 
 def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -> BridgeConfiguration:
-    """What the command line asks for. Raises `NepError`."""
     if len(what) == 2:
         if rate_hz is not None and not 1e-6 <= rate_hz <= 1e6:
             raise typer.BadParameter(
-                _("{given:g} is none; give messages a second, such as 10").format(given=rate_hz),
+                _("{given:g} is not a valid rate; use messages per second, such as 10").format(given=rate_hz),
                 param_hint="--rate",
             )
         way = direction_named(direction)
         return join_line(*what, name=str(os.getpid()), direction=way, max_rate_hz=rate_hz or 0.0)
     if len(what) != 1:
         raise NepError(
-            _("give a file, or two sides such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
+            _("give a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
         )
     if direction != "both" or rate_hz is not None:
-        raise NepError(_("with a file its own lines decide; leave out --direction and --rate"))
+        raise NepError(_("--direction and --rate can't be used with a file; set them in the file"))
     path = Path(what[0])
     if ":" in what[0] and not path.exists():
         raise NepError(
-            _("'{word}' is one side, and no file; name the other, too, such as 'ros:/chatter'").format(
-                word=what[0]
-            )
+            _("'{word}' is only one end; add the other one, such as 'ros:/chatter'").format(word=what[0])
         )
     return read_configuration(path)
 
 
 def _check_reach(configuration: BridgeConfiguration) -> None:
-    """Raises `NepError` for a network that this process cannot be in."""
     for side in (configuration.a, configuration.b):
         if side.backend.is_in_process:
             raise NepError(
                 _(
-                    "nodes of '{name}' meet within one program only; join them there by "
-                    "nep.programs.bridges.Bridge"
+                    "the back end '{name}' connects nodes of one program only; use "
+                    "nep.programs.bridges.Bridge in that program"
                 ).format(name=side.backend.name)
             )
 
 
 def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> None:
-    """Raises `typer.BadParameter` for a topic that moves a robot whoever is there, by its type or name."""
+    # Rejects topics that move a robot by their type or name, even if no robot is connected.
     for topic in configuration.topics:
         for origin in topic.origins:
             end = topic.b if origin == "a" else topic.a
@@ -171,37 +167,34 @@ def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> 
                 raise typer.BadParameter(refusal)
 
 
-def _say_right(configuration: BridgeConfiguration) -> None:
-    """One line for each topic, as it was understood."""
+def _show_configuration(configuration: BridgeConfiguration) -> None:
     ways = {"a->b": "→", "b->a": "←", "both": "↔"}
     for topic in configuration.topics:
         ends = f"{topic.a.name} {ways[topic.direction]} {topic.b.name}"
         write(escaped(ends) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
-    said = _("the file is right: {name} joins {a} and {b}")
+    said = _("the file is valid: {name} connects {a} and {b}")
     say(said.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
 
 
-# ---- what is said beside the table
+# ---- messages beside the table
 
 
 class _Notes(logging.Handler):
-    """Warnings of the library, until the table has room for them; without one they are said at once."""
+    """Log handler for the library's warnings: buffers them while a live table is shown, else prints them."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self.kept: deque[str] | None = None
+        self.buffered: deque[str] | None = None
 
     def emit(self, record: logging.LogRecord) -> None:
-        """See `logging.Handler`."""
-        if self.kept is None:
+        if self.buffered is None:
             say(record.getMessage())
         else:
-            self.kept.append(record.getMessage())
+            self.buffered.append(record.getMessage())
 
-    def taken(self) -> Iterator[str]:
-        """What was kept."""
-        while self.kept:
-            yield self.kept.popleft()
+    def pop_all(self) -> Iterator[str]:
+        while self.buffered:
+            yield self.buffered.popleft()
 
 
 @contextmanager
@@ -216,7 +209,6 @@ def _warnings() -> Iterator[_Notes]:
 
 @contextmanager
 def _published(running: Bridge) -> Iterator[None]:
-    """Both nodes publish the library's warnings as log records, for `nep log` and Studio's Console."""
     logger = logging.getLogger("nep")
     handlers = [side.node.log_handler for side in running.sides.values()]
     for each in handlers:
@@ -232,7 +224,7 @@ def _published(running: Bridge) -> Iterator[None]:
 
 
 class _Row(NamedTuple):
-    """One route: its name, its figures in the order of `_HEADS`, and why something went wrong with it."""
+    """One route: its name, its figures in the order of `_HEADS`, and its problem."""
 
     name: str
     figures: tuple[str, ...]
@@ -240,7 +232,7 @@ class _Row(NamedTuple):
 
 
 class _Report:
-    """What the routes carry, read each second."""
+    """Counts of all routes, shown once a second."""
 
     def __init__(self, running: Bridge) -> None:
         self._running = running
@@ -248,23 +240,18 @@ class _Report:
         names = [running.configuration.side(side).backend.name for side in ("a", "b")]
         self._sides: Mapping[str, str] = dict(zip("ab", names if names[0] != names[1] else "ab", strict=True))
 
-    def begin(self) -> None:
-        """Before the first report."""
+    def begin(self) -> None: ...
 
     def show(self) -> None:
-        """Report."""
         raise NotImplementedError
 
     def end(self) -> None:
-        """Report for the last time."""
         self.show()
 
     def rows(self) -> list[_Row]:
-        """All routes."""
         return [self._row(route, route.counts()) for route in self._running.routes]
 
     def rate_hz(self, route: Route, counts: RouteCounts) -> float | None:
-        """Messages a second that it carries."""
         meter = self._meters.setdefault(route, Meter())
         meter.add(time.monotonic(), counts.sent, counts.bytes)
         rates = meter.rates()
@@ -284,26 +271,28 @@ class _Report:
 
 def _problem(route: Route, counts: RouteCounts) -> str:
     if route.rival:
-        return _("the bridge '{name}' carries it; end one of the two").format(name=escaped(route.rival))
+        return _("the bridge '{name}' forwards this topic, too; stop one of the two").format(
+            name=escaped(route.rival)
+        )
     return escaped(route.trouble or counts.problem)
 
 
 class _JsonReport(_Report):
-    """One JSON text a second, as on `/nep/bridges`, with rates."""
+    """One JSON line per second: the status as on `/nep/bridges`, with rates."""
 
     def show(self) -> None:
         status = self._running.status()
         rates = [self.rate_hz(route, route.counts()) for route in self._running.routes]
         routes = status["routes"]
-        told = [
+        routes_with_rates = [
             {**each, "rate_hz": rate_hz}
             for each, rate_hz in zip(routes if isinstance(routes, list) else [], rates, strict=False)
         ]
-        show_json({"stamp_ns": time.time_ns(), **status, "routes": told})
+        show_json({"stamp_ns": time.time_ns(), **status, "routes": routes_with_rates})
 
 
 class _PlainReport(_Report):
-    """Lines of those routes whose figures have changed, for a file or a program."""
+    """Lines of the routes whose counts have changed, for a file or a pipe."""
 
     def __init__(self, running: Bridge) -> None:
         super().__init__(running)
@@ -327,12 +316,12 @@ class _PlainReport(_Report):
 
     def _line(self, name: str, figures: Sequence[str]) -> str:
         return padded(name, self._width) + "".join(
-            padded(figure, max(_CELL, cells(figure) + 1), "right") for figure in figures
+            padded(figure, max(_CELL_WIDTH, cells(figure) + 1), "right") for figure in figures
         )
 
 
 class _LiveReport(_Report):
-    """A table that each report takes the place of; what is said beside it stands above."""
+    """Table that is redrawn in place; warnings are printed above it."""
 
     def __init__(self, running: Bridge, notes: _Notes) -> None:
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
@@ -345,13 +334,13 @@ class _LiveReport(_Report):
 
     def begin(self) -> None:
         self._live.start()
-        self._notes.kept = deque(maxlen=_NOTES_MOST)
+        self._notes.buffered = deque(maxlen=_MAX_NOTES)
         self.show()
 
     def show(self) -> None:
         from rich.text import Text  # noqa: PLC0415 - see above
 
-        for note in self._notes.taken():
+        for note in self._notes.pop_all():
             self._live.console.print(Text(escaped(note), "yellow"))
         self._live.update(self._table(), refresh=True)
 
@@ -360,7 +349,7 @@ class _LiveReport(_Report):
             self.show()
         finally:
             self._live.stop()
-            self._notes.kept = None
+            self._notes.buffered = None
 
     def _table(self) -> RenderableType:
         from rich import box  # noqa: PLC0415 - see above
@@ -369,21 +358,23 @@ class _LiveReport(_Report):
         from rich.text import Text  # noqa: PLC0415
 
         rows = self.rows()
-        most = max(1, shutil.get_terminal_size().lines - 6)
-        rows, left = rows[:most], len(rows) - most
+        max_rows = max(1, shutil.get_terminal_size().lines - 6)
+        rows, left = rows[:max_rows], len(rows) - max_rows
         used = [
-            at for at in range(len(_HEADS)) if at < _ALWAYS or any(row.figures[at] != "0" for row in rows)
+            at
+            for at in range(len(_HEADS))
+            if at < _MIN_COLUMNS or any(row.figures[at] != "0" for row in rows)
         ]
         table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
-        table.add_column(_("topic"), style="bold", overflow="fold")  # it gives way, numbers never do
+        table.add_column(_("topic"), style="bold", overflow="fold")  # only the name is folded, never numbers
         for at in used:
             table.add_column(_(_HEADS[at]), justify="right", no_wrap=True)
         for row in rows:
-            table.add_row(Text(shortened(row.name, _NAME_MOST)), *(row.figures[at] for at in used))
+            table.add_row(Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.figures[at] for at in used))
         below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
         if left > 0:
             below.append(Text(_("and {count} more topics").format(count=left), "dim"))
-        return Group(table, *below[: max(1, most - len(rows) + 1)])
+        return Group(table, *below[: max(1, max_rows - len(rows) + 1)])
 
 
 def _report_for(running: Bridge, notes: _Notes, *, as_json: bool) -> _Report:
@@ -393,13 +384,12 @@ def _report_for(running: Bridge, notes: _Notes, *, as_json: bool) -> _Report:
 
 
 def _run(report: _Report, count: int) -> None:
-    """Report each second until Ctrl+C, or `count` times."""
     never, started = threading.Event(), time.monotonic()
     try:
         report.begin()
         for number in itertools.count(1):
-            while (left := started + number * _EVERY_S - time.monotonic()) > 0:
-                never.wait(min(left, _SLICE_S))  # in slices: Windows does not interrupt a wait for Ctrl+C
+            while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
+                never.wait(min(left, _WAIT_SLICE_S))  # in slices: Ctrl+C does not interrupt a wait on Windows
             if number == count:
                 return
             report.show()

@@ -1,4 +1,4 @@
-"""`nep doctor`: why programs do not find each other, and what to do."""
+"""`nep doctor`: find out why programs can't connect, and how to fix it."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from nep.text import escaped
 
 if TYPE_CHECKING:
     from nep.programs import doctor as doctors
-else:  # the other commands need not wait for it
+else:  # imported on use, to keep the other commands fast
     doctors = lazy_module("nep.programs.doctor")
 
 MissedArgument = Annotated[
-    str, typer.Argument(help=_("The topic that you miss."), metavar=_("TOPIC"), show_default=False)
+    str, typer.Argument(help=_("Topic whose messages don't arrive."), metavar=_("TOPIC"), show_default=False)
 ]
 
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
 _SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
 _PLAIN_SIGNS = dict(zip(_STYLES, "x!-+", strict=True))
-"""For terminals and files that are not Unicode, as Windows has them."""
+"""ASCII signs, for terminals and files that are not Unicode, as on Windows."""
 
 
 def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: MissedArgument = "") -> None:
-    """Look for what keeps programs from finding each other, and say what to do about it.
+    """Check why programs can't find each other, and print how to fix it.
 
-    With a topic also why nothing is seen of it: a name that is written otherwise, a publisher that is silent,
-    that cannot be reached or sends what cannot be read.
+    With a topic, also check why its messages don't arrive: a misspelled name, a publisher that sends nothing,
+    can't be reached, or sends messages that can't be decoded.
 
-    Ends with 0 when all is well, 1 with a warning, 2 when something is wrong.
+    Exit code: 0 if all checks passed, 1 with warnings, 2 with errors.
     """
     found = doctors.look(master, topic)
     if as_json:

@@ -1,4 +1,4 @@
-"""`nep topic echo`: the messages of topics as they come."""
+"""`nep topic echo`: print messages as they arrive."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
 
-_SHOWN_BYTES = 64
-_SHOWN_LETTERS = 2_000
-_COLOURED = 100_000
-"""Letters; a longer message is not coloured, which takes a second for each megabyte."""
-_SLICE_S = 0.02
-"""How long one topic is waited for while others may have something."""
+_MAX_SHOWN_BYTES = 64
+_MAX_SHOWN_CHARACTERS = 2_000
+_MAX_COLOURED_CHARACTERS = 100_000
+"""Characters; longer messages are not coloured, because that takes a second per megabyte."""
+_RECEIVE_SLICE_S = 0.02
+"""Wait per receive while several topics are subscribed."""
 
 
 TopicArgument = Annotated[
@@ -101,7 +101,7 @@ def echo(
     lists and texts; files and pipes get all of them.
     """
     if as_csv and as_json:
-        raise typer.BadParameter(_("--csv and --json are two ways to write; choose one"))
+        raise typer.BadParameter(_("--csv and --json can't be combined; choose one"))
     condition = None if expression is None else MessageFilter(expression)
     with node_for("echo", master, backend) as node:
         graph = node.graph()
@@ -129,24 +129,27 @@ def echo(
 def _messages(
     node: Node, topics: Sequence[str], graph: GraphView, timeout_s: float | None
 ) -> Generator[Message, None, None]:
-    """Subscribe to topics and patterns, and yield their messages as `_coming` does."""
+    # Yields messages as `_receive_all` does, after subscribing to topics and patterns.
     exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
     patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
     waiting = TopicWait(node, exact)
-    waiting.look(graph)
+    waiting.update(graph)
     subscribers: list[Subscriber] = []
     with ExitStack() as opened:
 
-        def hear(topics: Sequence[tuple[str, str]]) -> None:
+        def subscribe(topics: Sequence[tuple[str, str]]) -> None:
             for name, msg_type in topics:
                 subscribers.append(opened.enter_context(node.new_sub(name, msg_type)))
 
-        hear([(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph))
-        yield from _coming(subscribers, timeout_s, waiting, patterns, hear)
+        subscribe([(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph))
+        yield from _receive_all(subscribers, timeout_s, waiting, patterns, subscribe)
 
 
 def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tuple[list[str], list[str]]:
-    """The topics and fields that words mean. Topics: what is one now, begins with "/", or is a pattern."""
+    """Split the words of a command line into topics and fields.
+
+    Words that the graph knows, that begin with "/" or that are patterns are topics.
+    """
     topics, fields = [topic], []
     for word in more:
         if word in graph.topics or word.startswith("/") or is_pattern(word):
@@ -159,53 +162,52 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
     return list(dict.fromkeys(topics)), fields
 
 
-def _coming(
+def _receive_all(
     subscribers: Sequence[Subscriber],
     timeout_s: float | None,
     waiting: TopicWait,
     patterns: TopicPatterns,
-    hear: Callable[[Sequence[tuple[str, str]]], None],
+    subscribe_new: Callable[[Sequence[tuple[str, str]]], None],
 ) -> Iterator[Message]:
-    """Their messages as they come; what was lost between them is said. Raises `WaitTimeoutError`.
-
-    `hear` adds to the subscribers what matches the patterns and is new.
-    """
+    # Reports lost messages on stderr. `subscribe_new` adds topics that match the patterns and are new. Raises
+    # `WaitTimeoutError`.
     lost: dict[str, int] = {}
     last, never = time.monotonic(), threading.Event()
     while True:
-        hear(patterns.look_again())
-        came = [message for each in subscribers if (message := each.receive(0.0)) is not None]
-        if not came and not subscribers:
+        subscribe_new(patterns.poll())
+        received = [message for each in subscribers if (message := each.receive(0.0)) is not None]
+        if not received and not subscribers:
             never.wait(waiting.slice_s(timeout_s))
-        elif not came:
-            message = subscribers[0].receive(_SLICE_S if len(subscribers) > 1 else waiting.slice_s(timeout_s))
-            came = [] if message is None else [message]
+        elif not received:
+            message = subscribers[0].receive(
+                _RECEIVE_SLICE_S if len(subscribers) > 1 else waiting.slice_s(timeout_s)
+            )
+            received = [] if message is None else [message]
         now = time.monotonic()
-        if came:
+        if received:
             last = now
             for each in subscribers:
                 missing = (each.lost or 0) - lost.get(each.topic, 0)
                 if missing > 0:
                     lost[each.topic] = each.lost or 0
                     said = ngettext(
-                        "{count} message of '{topic}' did not arrive here",
-                        "{count} messages of '{topic}' did not arrive here",
+                        "{count} message of '{topic}' was lost",
+                        "{count} messages of '{topic}' were lost",
                         missing,
                     )
                     say(said.format(count=missing, topic=each.topic))
-            yield from came
-            waiting.heard({message.topic for message in came})
+            yield from received
+            waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:
             names = listed(
                 [f"'{each}'" for each in (*(sub.topic for sub in subscribers), *patterns.patterns)], "or"
             )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         else:
-            waiting.look_again()
+            waiting.poll()
 
 
 def _passes(condition: MessageFilter, message: Message) -> bool:
-    """Whether a message is shown; one that can't be decoded is not."""
     try:
         return condition.matches(dict(message.extension) if message.codec == "image" else message.payload)
     except DecodeError:
@@ -213,7 +215,7 @@ def _passes(condition: MessageFilter, message: Message) -> bool:
 
 
 def show_record(message: Message, fields: Fields | None = None) -> None:
-    """One message as one line of JSON; with `fields` these in the place of the payload."""
+    """Print one message as a line of JSON; with `fields`, these replace the payload."""
     record: dict[str, object] = {
         "topic": message.topic,
         "msg_type": message.msg_type,
@@ -240,12 +242,18 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
 
 
 class Lines:
-    """Messages for people: when, which, how big, and what, coloured on a terminal."""
+    """Printer of messages for people: time, number, topic and payload, coloured on a terminal."""
 
     def __init__(
         self, fields: Fields | None = None, *, names_topic: bool = False, whole: bool = False
     ) -> None:
-        """`names_topic`: several topics come; `whole`: nothing is shortened, as in a file."""
+        """Initialize the printer.
+
+        Args:
+            fields: Fields to print; None prints the whole payload.
+            names_topic: Print the topic of each message.
+            whole: Print long values in full, as into a file.
+        """
         self._fields = fields
         self._names_topic = names_topic
         self._console = console()
@@ -253,7 +261,7 @@ class Lines:
         self._whole = whole or self._paint is None
 
     def __call__(self, message: Message) -> None:
-        """Show one message."""
+        """Print one message."""
         head = _head(message)
         if self._names_topic:
             head += f"  {escaped(message.topic)}"
@@ -265,7 +273,7 @@ class Lines:
             body = presented(self._fields.plain(values), whole=self._whole)
         else:
             body = _body(message, room, whole=self._whole)
-        if self._paint is None or len(body) > _COLOURED:
+        if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
             write(f"{head}  {body}\n")
         else:
             self._console.print(self._paint(head, body))
@@ -284,13 +292,12 @@ def _head(message: Message) -> str:
 
 
 def _body(message: Message, room: int, *, whole: bool) -> str:
-    """What a message says: on one line if `room` cells are enough or nothing can be laid out."""
     if message.codec == "image":
-        return _picture(message)
+        return _image_summary(message)
     try:
         payload = message.payload
     except DecodeError as error:
-        said = _("{size_bytes}, no {codec}: {hexadecimal} ({reason})").format(
+        said = _("{size_bytes}, not valid {codec}: {hexadecimal} ({reason})").format(
             size_bytes=size(message.size_bytes),
             codec=message.codec,
             hexadecimal=_hexadecimal(message.data),
@@ -298,10 +305,10 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
         )
         return cleaned(said)
     if isinstance(payload, str):
-        return cleaned(payload if whole else shortened(payload, _SHOWN_LETTERS))
+        return cleaned(payload if whole else shortened(payload, _MAX_SHOWN_CHARACTERS))
     if isinstance(payload, bytes):
         return f"{size(len(payload))}: {_hexadecimal(payload)}"
-    # decoded JSON is written again in a hundredth of the time that looking at each value takes
+    # re-encoding decoded JSON is 100 times faster than formatting each value
     is_exact = whole and message.codec == "json" and not _has_nan(message.data)
     line = json_of(payload).decode() if is_exact else presented(payload, whole=whole)
     if len(line) <= room and cells(line) <= room:
@@ -313,17 +320,16 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
 
 
 def _has_nan(data: memoryview) -> bool:
-    """Whether JSON may hold NaN or infinity, as some programs of the original NEP send them."""
     raw = bytes(data)
     return b"NaN" in raw or b"Infinity" in raw
 
 
 def _hexadecimal(data: bytes | memoryview) -> str:
-    return bytes(data[:_SHOWN_BYTES]).hex(" ") + (" …" if len(data) > _SHOWN_BYTES else "")
+    return bytes(data[:_MAX_SHOWN_BYTES]).hex(" ") + (" …" if len(data) > _MAX_SHOWN_BYTES else "")
 
 
-def _picture(message: Message) -> str:
-    shape, told = message.extension.get("shape"), message.extension.get("encoding", _("picture"))
+def _image_summary(message: Message) -> str:
+    shape, told = message.extension.get("shape"), message.extension.get("encoding", _("image"))
     encoding = escaped(shortened(str(told), 40))
     if (
         isinstance(shape, (list, tuple))

@@ -1,4 +1,4 @@
-"""`nep topic hz`, `bw` and `delay`: how often topics are published, how much that is, and how late it is."""
+"""`nep topic hz`, `bw` and `delay`: rate, bandwidth and latency of topics."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 
-_EVERY_S = 1.0
-_SLICE_S = 0.1
-_NARROWEST = 12
-_MEAN_WIDTH, _AGE_WIDTH = 22, 16
-_COMPARED_AFTER = 3
-"""Reports: before that the master has not had the time."""
+_REPORT_PERIOD_S = 1.0
+_WAIT_SLICE_S = 0.1
+_MIN_TOPIC_WIDTH = 12
+_MEAN_COLUMN_WIDTH, _LATENCY_COLUMN_WIDTH = 22, 16
+_CLOCK_WARNING_REPORTS = 3
+"""Reports after which the master should have compared the clocks."""
 
 TopicsArgument = Annotated[
     list[str],
@@ -68,8 +68,8 @@ def hz(
 ) -> None:
     """Print the rate of topics and the gaps between their messages, once a second until Ctrl+C.
 
-    Gaps are measured with the publishers' stamps; programs of the original NEP send none, so arrival times
-    are used. Messages that a publisher kept for new subscribers are left out.
+    Gaps are measured with the publishers' time stamps; programs of the original NEP send none, so arrival
+    times are used. Latched messages from before the start are not counted.
     """
     heads = (lazy("rate"), lazy("shortest"), lazy("longest"), lazy("std dev"), lazy("messages"), lazy("lost"))
     _Report(topics, window_s, heads, _frequency_cells).run(count, timeout_s, master, backend, as_json=as_json)
@@ -105,17 +105,17 @@ def delay(
     timeout_s: TimeoutOption = None,
     backend: BackendOption = None,
 ) -> None:
-    """Print the age of messages when they arrive here, once a second until Ctrl+C.
+    """Print the latency of messages, once a second until Ctrl+C.
 
-    Between two computers the age is corrected by the difference of their clocks, which the master measures
-    within two seconds; its uncertainty follows after ±. Programs of the original NEP send no stamps. Messages
-    that were kept for new subscribers count with their full age.
+    Between two computers the latency is corrected by the difference of their clocks, which the master
+    measures within two seconds; the uncertainty follows after ±. Programs of the original NEP send no time
+    stamps. Latched messages count with their full age.
     """
     _DelayReport(topics, window_s).run(count, timeout_s, master, backend, as_json=as_json)
 
 
 class _Report:
-    """Windows of some topics, and a report of them every second."""
+    """Sliding windows of topics, reported once a second."""
 
     def __init__(
         self,
@@ -130,8 +130,8 @@ class _Report:
         self._subscribers: dict[str, Subscriber] = {}
         self._totals: dict[str, int] = {}
         self._never = threading.Event()
-        self._heard_at = time.monotonic()
-        self._width = max(_NARROWEST, *map(cells, topics))
+        self._last_received_at = time.monotonic()
+        self._width = max(_MIN_TOPIC_WIDTH, *map(cells, topics))
 
     def run(
         self,
@@ -142,48 +142,47 @@ class _Report:
         *,
         as_json: bool,
     ) -> None:
-        """Report until Ctrl+C, or `count` times. Raises `BadTopicError`, `WaitTimeoutError`."""
+        # Raises `BadTopicError`, `WaitTimeoutError`.
         with ExitStack() as opened, node_for("measure", master, backend) as node:
             waiting = TopicWait(node, list(self._windows))
-            waiting.look(node.graph())
+            waiting.update(node.graph())
             for topic in self._windows:
-                heard = self._listen(node, topic, waiting.msg_type(topic))
-                self._subscribers[topic] = opened.enter_context(heard)
+                subscription = self._subscribe(node, topic, waiting.msg_type(topic))
+                self._subscribers[topic] = opened.enter_context(subscription)
             if not as_json:
-                say(_("measuring; Ctrl+C ends it"))
+                say(_("measuring; press Ctrl+C to stop"))
                 write(f"{self._line(_('topic'), [_(head) for head in self._heads])}\n")
             started = time.monotonic()
             for number in itertools.count(1):
-                while (left := started + number * _EVERY_S - time.monotonic()) > 0:
-                    self._rest(node, min(left, _SLICE_S))
+                while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
+                    self._wait(node, min(left, _WAIT_SLICE_S))
                 for topic in self._windows:
                     (self._show_json if as_json else self._show)(topic)
                 if number == count:
                     return
-                self._judge(waiting, timeout_s)
+                self._check_silence(waiting, timeout_s)
 
-    def _rest(self, node: Node, seconds: float) -> None:  # noqa: ARG002 - its thread brings messages
-        """Let time pass."""
+    def _wait(self, node: Node, seconds: float) -> None:  # noqa: ARG002 - the sink runs in the node's thread
         self._never.wait(seconds)
 
-    def _judge(self, waiting: TopicWait, timeout_s: float | None) -> None:
-        """Say what is published no more; raises `WaitTimeoutError` when nothing came for so long."""
+    def _check_silence(self, waiting: TopicWait, timeout_s: float | None) -> None:
+        # Reports topics without publishers. Raises `WaitTimeoutError` if no topic received a message in time.
         totals = {topic: window.total for topic, window in self._windows.items()}
-        came = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
+        received = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
         now = time.monotonic()
-        if came:
-            self._totals, self._heard_at = totals, now
-            waiting.heard(came)
-        if timeout_s is not None and now - self._heard_at >= timeout_s:
+        if received:
+            self._totals, self._last_received_at = totals, now
+            waiting.mark_received(received)
+        if timeout_s is not None and now - self._last_received_at >= timeout_s:
             names = listed([repr(topic) for topic in totals], "or")
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
-        if len(came) < len(totals):
-            waiting.look_again()
+        if len(received) < len(totals):
+            waiting.poll()
 
-    def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
+    def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window, replays = self._windows[topic], ReplayFilter(time.monotonic())
 
-        def take(messages: Sequence[Message]) -> None:
+        def on_messages(messages: Sequence[Message]) -> None:
             now = time.monotonic()
             for message in messages:
                 if replays.is_replay(message, now):
@@ -191,7 +190,7 @@ class _Report:
                 stamp_s = None if message.stamp_ns is None else message.stamp_ns / 1e9
                 window.add(now, stamp_s, message.size_bytes)
 
-        return node.new_sub(topic, msg_type, sink=take)
+        return node.new_sub(topic, msg_type, sink=on_messages)
 
     def _show(self, topic: str) -> None:
         found, figures = self._figures(self._windows[topic], time.monotonic())
@@ -213,13 +212,13 @@ class _Report:
 
 
 class _DelayReport(_Report):
-    """Each message is looked at when it comes, in this thread: a sink gets them 5 ms later."""
+    """Report of latencies. Uses callbacks instead of a sink, which would add up to 5 ms."""
 
     def __init__(self, topics: Sequence[str], window_s: float) -> None:
         heads = (
             lazy("mean"),
-            lazy("least"),
-            lazy("greatest"),
+            lazy("min"),
+            lazy("max"),
             lazy("std dev"),
             lazy("messages"),
             lazy("lost"),
@@ -227,23 +226,27 @@ class _DelayReport(_Report):
         super().__init__(topics, window_s, heads, self._delay_cells)
         self._ages = {topic: AgeWindow(window_s) for topic in topics}
         self._windows = self._ages
-        self._timeless: set[str] = set()
+        self._unstamped: set[str] = set()
         self._uncompared: dict[str, int] = {}
         """Topics whose clocks are not compared, and since how many reports."""
 
-    def _listen(self, node: Node, topic: str, msg_type: str) -> Subscriber:
+    def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
         window = self._ages[topic]
 
-        def take(message: Message) -> None:
+        def on_messages(message: Message) -> None:
             age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
             window.add_age(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
-            if age_s is None and topic not in self._timeless:
-                self._timeless.add(topic)
-                say(_("messages of '{topic}' have no time; their age is not known").format(topic=topic))
+            if age_s is None and topic not in self._unstamped:
+                self._unstamped.add(topic)
+                say(
+                    _("messages of '{topic}' have no time stamp; their latency is unknown").format(
+                        topic=topic
+                    )
+                )
 
-        return node.new_callback(topic, msg_type, take, with_message=True)
+        return node.new_callback(topic, msg_type, on_messages, with_message=True)
 
-    def _rest(self, node: Node, seconds: float) -> None:
+    def _wait(self, node: Node, seconds: float) -> None:
         node.spin(seconds)
 
     def _delay_cells(self, window: RateWindow, now: float) -> tuple[Delay | None, Sequence[str]]:
@@ -257,7 +260,10 @@ class _DelayReport(_Report):
         return found, (*ages, gap(found.std_s))
 
     def _line(self, topic: str, figures: Sequence[str]) -> str:
-        wide = [figures[0].rjust(_MEAN_WIDTH), *(each.rjust(_AGE_WIDTH) for each in figures[1:3])]
+        wide = [
+            figures[0].rjust(_MEAN_COLUMN_WIDTH),
+            *(each.rjust(_LATENCY_COLUMN_WIDTH) for each in figures[1:3]),
+        ]
         return super()._line(topic, (*wide, *figures[3:]))
 
     def _show(self, topic: str) -> None:
@@ -268,8 +274,11 @@ class _DelayReport(_Report):
             self._uncompared.pop(topic, None)
             return
         self._uncompared[topic] = self._uncompared.get(topic, 0) + 1
-        if self._uncompared[topic] == _COMPARED_AFTER:
-            words = _("'{topic}': clocks of two computers, not corrected; ages are wrong by what they differ")
+        if self._uncompared[topic] == _CLOCK_WARNING_REPORTS:
+            words = _(
+                "'{topic}': the clocks of the two computers are not compared; the latency includes "
+                "their difference"
+            )
             say(words.format(topic=topic))
 
 
@@ -289,14 +298,14 @@ def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Se
 
 
 def age(seconds: float, uncertainty_s: float | None) -> str:
-    """An age. One below 0, which only seems so because clocks are not known better, is under that."""
+    """Format a latency; a negative one within the clock uncertainty is shown as an upper bound."""
     if uncertainty_s and -uncertainty_s <= seconds < 0:
         return _("under {gap}").format(gap=gap(uncertainty_s))
     return gap(seconds)
 
 
 def gap(seconds: float) -> str:
-    """A time between messages, or an age, with three digits that count."""
+    """Format a duration with three significant digits."""
     if seconds < 0:
         return f"-{gap(-seconds)}"
     if seconds >= 1:

@@ -1,6 +1,7 @@
-"""What Ctrl+C does to a command: before and after its work it ends at once, in between it is asked to end.
+"""Signal handling of a command: Ctrl+C, SIGTERM and SIGHUP.
 
-An interrupt in the middle of an import, or of the end of the interpreter, would be seen as a traceback.
+Before and after the command's work Ctrl+C exits at once, because an interrupt during an import or the
+interpreter's shutdown would print a traceback. In between it raises `KeyboardInterrupt`.
 """
 
 from __future__ import annotations
@@ -19,62 +20,62 @@ from nep.cli import INTERRUPTED
 __all__ = ["TERMINATED", "ask_first", "call_first", "end_at_once", "leave_when_told"]
 
 TERMINATED = 143
-"""The exit code of a program that SIGTERM ended."""
+"""Exit code of a program stopped by SIGTERM."""
 
-AGAIN_S = 0.02
+RETRY_S = 0.02
 GRACE_S = 3.0
-"""So long may a command take to end that was asked to: nodes say goodbye within 2 s."""
+"""Time a command has to stop after Ctrl+C; nodes leave the master within 2 s."""
 
 
 def end_at_once() -> None:
-    """From now on Ctrl+C ends the program without a word: there is nothing to tidy up."""
-    _handle_with(_end)
+    """Make Ctrl+C exit silently at once, while there is nothing to clean up."""
+    _handle_interrupt(_end)
 
 
 def ask_first() -> None:
-    """From now on Ctrl+C raises `KeyboardInterrupt`, so that nodes say goodbye.
+    """Make Ctrl+C raise `KeyboardInterrupt`, so that nodes leave the master.
 
-    Once more, or when that takes too long, ends it at once: a terminal may take nothing any more.
+    A second Ctrl+C, or `GRACE_S` after the first, exits at once: the terminal may be blocked.
     """
-    _handle_with(_ask)
+    _handle_interrupt(_ask)
 
 
 def call_first(action: Callable[[], object]) -> None:
-    """From now on Ctrl+C, SIGTERM and SIGHUP call `action`, which lets the command come to its end.
+    """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which asks the command to finish.
 
-    Once more ends it at once. For commands that must end well: a recording writes what it has. `action` only
-    sets something.
+    A second signal exits at once. For commands that must finish cleanly, such as a recording. `action` runs
+    in a signal handler: it should only set a flag.
     """
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
         end_at_once()
-        _end_requests_with(signal.SIG_DFL)
+        _handle_termination(signal.SIG_DFL)
         action()
 
     _callers.add(handle)
-    _handle_with(handle)
-    _end_requests_with(handle)
+    _handle_interrupt(handle)
+    _handle_termination(handle)
 
 
 _callers: set[signal._HANDLER] = set()
 
 
 def leave_when_told(code: int = 0) -> None:
-    """From now on SIGTERM and SIGHUP leave with `code`, through what closes nodes; once more ends at once.
+    """Make SIGTERM and SIGHUP exit with `code` after cleanup; a second one exits at once.
 
-    `docker stop`, systemd, `kill` and `timeout` send SIGTERM, a terminal that is closed sends SIGHUP.
+    `docker stop`, systemd, `kill` and `timeout` send SIGTERM; a closing terminal sends SIGHUP.
     """
 
     def leave(_signal: int, _frame: FrameType | None) -> None:
-        _end_requests_with(signal.SIG_DFL)
+        _handle_termination(signal.SIG_DFL)
         sys.exit(code)
 
     _callers.add(leave)
-    _end_requests_with(leave)
+    _handle_termination(leave)
 
 
-def _end_requests_with(handler: signal._HANDLER) -> None:
-    """Handle SIGTERM and SIGHUP, unless whoever started this wants it to go on (`nohup`)."""
+def _handle_termination(handler: signal._HANDLER) -> None:
+    # Keeps handlers that the parent has set to ignore (`nohup`).
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in {signal.SIG_DFL, *_callers}:
@@ -87,15 +88,13 @@ def _end(_signal: int, _frame: FrameType | None) -> None:
 
 
 def _ask(_signal: int, frame: FrameType | None) -> None:
-    if _is_in_finalizer(frame):  # what is raised there is printed as ignored, and is lost
+    if _is_in_finalizer(frame):  # exceptions in __del__ are printed and ignored
         with suppress(RuntimeError):
             _thread.start_new_thread(_interrupt_again, ())
         return
     end_at_once()
-    with suppress(
-        RuntimeError
-    ):  # no thread can be had; `Thread` has locks that whoever was interrupted may hold
-        _thread.start_new_thread(_end_later, ())
+    with suppress(RuntimeError):  # no more threads; not Thread, whose locks the interrupted code may hold
+        _thread.start_new_thread(_exit_after_grace, ())
     raise KeyboardInterrupt
 
 
@@ -108,20 +107,22 @@ def _is_in_finalizer(frame: FrameType | None) -> bool:
 
 
 def _interrupt_again() -> None:
-    threading.Event().wait(AGAIN_S)
+    threading.Event().wait(RETRY_S)
     if hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)  # also where it waits
+        signal.pthread_kill(
+            threading.main_thread().ident or 0, signal.SIGINT
+        )  # interrupts blocking calls, too
     else:
         _thread.interrupt_main()
 
 
-def _end_later() -> None:
+def _exit_after_grace() -> None:
     threading.Event().wait(GRACE_S)
     os._exit(INTERRUPTED)
 
 
-def _handle_with(handler: signal._HANDLER) -> None:
-    """Unless whoever started this wants it to go on (`nohup`, `&` in a script) or handles it otherwise."""
+def _handle_interrupt(handler: signal._HANDLER) -> None:
+    # Keeps a handler that the parent set (`nohup`, `&` in a script) or that somebody installed.
     if signal.getsignal(signal.SIGINT) in {signal.default_int_handler, _end, _ask, *_callers}:
-        with suppress(ValueError):  # only the main thread may, and only there does an interrupt come
+        with suppress(ValueError):  # signals are handled in the main thread only
             signal.signal(signal.SIGINT, handler)

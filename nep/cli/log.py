@@ -1,4 +1,4 @@
-"""`nep log`: what programs log, as it comes."""
+"""`nep log`: print log records of nodes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,11 @@ def log(
     level: Annotated[
         str,
         typer.Option(
-            "--level", "-l", metavar=_("LEVEL"), help=_("From this level on."), autocompletion=_complete_level
+            "--level",
+            "-l",
+            metavar=_("LEVEL"),
+            help=_("Lowest level to print."),
+            autocompletion=_complete_level,
         ),
     ] = "info",
     node: Annotated[
@@ -55,46 +59,45 @@ def log(
         typer.Option(
             "--node",
             metavar=_("NAME"),
-            help=_("Of this node."),
+            help=_("Only records of this node."),
             show_default=False,
             autocompletion=complete_node,
         ),
     ] = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N records; 0 goes on."))
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N records (0: never)."))
     ] = 0,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what programs log: the last errors of those that are there, then what comes. Ctrl+C ends it.
+    """Print log records: the last errors of running nodes, then new records until Ctrl+C.
 
-    Robots' drivers, behaviours and the master log here; in a program of your own use node.log.
+    Robot drivers, behaviours and the master log here; your own program does with node.log.
     """
     if level.lower() not in {*LEVELS, "warn"}:
         raise typer.BadParameter(
-            _("no level '{level}'; {did_you_mean}").format(
+            _("unknown level '{level}'; {did_you_mean}").format(
                 level=level, did_you_mean=did_you_mean(level, LEVELS)
             ),
             param_hint="--level",
         )
-    least = LEVELS.index(level_of(level))
+    min_level = LEVELS.index(level_of(level))
     with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
-            say(_("waiting for log records; Ctrl+C ends it"))
+            say(_("waiting for log records; press Ctrl+C to stop"))
         wanted = (
             record
-            for record in _coming(own, subscriber)
-            if LEVELS.index(record.level) >= least and node in {None, record.node}
+            for record in _records(own, subscriber)
+            if LEVELS.index(record.level) >= min_level and node in {None, record.node}
         )
         for record in itertools.islice(wanted, count or None):
             show_json(record.to_plain()) if as_json else _show(record)
 
 
-def _coming(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
-    """The last errors of the programs that are there, then the records as they come; each error once."""
+def _records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
     shown = ShownErrors()
-    with own.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as kept:
-        lists = iter(partial(kept.receive, 0.0), None)  # what was kept came while it connected
+    with own.new_sub(LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE) as latched:
+        lists = iter(partial(latched.receive, 0.0), None)  # latched messages arrived while connecting
         last = [record for each in lists for record in _last_errors(each, shown)]
     yield from sorted(last, key=lambda record: record.stamp_ns)
     while True:

@@ -1,4 +1,4 @@
-"""`nep master`: the program that knows who publishes and who subscribes."""
+"""`nep master`: run the master, at which nodes register and find each other."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nep.programs import doctor
     from nep.programs.doctor import collect
     from nep.programs.gateway import attachment
-else:  # the other commands need not wait for them
+else:  # imported on use, to keep the other commands fast
     doctor, collect = lazy_module("nep.programs.doctor"), lazy_module("nep.programs.doctor.collect")
     attachment = lazy_module("nep.programs.gateway.attachment")
 
@@ -35,8 +35,8 @@ _ListenOption = Annotated[
     typer.Option(
         metavar=_("ADDRESS"),
         help=_(
-            "Serve other computers, too, at this address of this one; 0.0.0.0 is all of them. "
-            "There is no password: whoever is in that network can read and command everything."
+            "Also accept other computers at this address of this computer; 0.0.0.0 means all. "
+            "There is no password: everyone in that network can read and send everything."
         ),
         show_default=False,
     ),
@@ -45,7 +45,7 @@ _OwnerOption = Annotated[
     int | None,
     typer.Option(
         metavar="PID",
-        help=_("End when this process is gone and no program needs the master."),
+        help=_("Exit when this process has ended and no node is registered."),
         show_default=False,
     ),
 ]
@@ -58,7 +58,7 @@ def master(
         typer.Option(
             min=1,
             max=65535,
-            help=_("The port; else that of --master or NEP_MASTER, else 7780."),
+            help=_("Port (default: that of --master or NEP_MASTER, or 7780)."),
             show_default=False,
         ),
     ] = None,
@@ -67,38 +67,38 @@ def master(
     gateway: Annotated[
         bool,
         typer.Option(
-            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help=_("Join programs of the original NEP.")
+            "--gateway/--no-gateway", envvar="NEP_GATEWAY", help=_("Let programs of the original NEP join.")
         ),
     ] = True,
 ) -> None:
-    """Run the master: it knows who publishes and who subscribes. Ctrl+C ends it.
+    """Run the master until Ctrl+C: nodes register there and find each other.
 
-    Messages never pass through it; while it is away, programs that have found each other go on.
+    Messages never pass through it; connected nodes keep exchanging messages while it is down.
     """
     address = _address(master, port)
-    with Terminal(sys.stderr) as terminal:  # one that takes nothing must not stop the master
+    with Terminal(sys.stderr) as terminal:  # a blocked terminal must not stop the master
         log_to(terminal, logging.WARNING)
-        running = _started(address, owner_pid, terminal, joins_originals=gateway)
+        running = _start(address, owner_pid, terminal, joins_originals=gateway)
         try:
             running.listen(listen or ())
-            _say_running(running.address, terminal, joins_originals=gateway)
+            _show_address(running.address, terminal, joins_originals=gateway)
             problem = collect.loopback_problem()
             if problem:
                 say(
                     _(
-                        "but programs of this computer cannot reach it: {problem}; 'nep doctor' says more"
+                        "but programs on this computer can't reach it: {problem}; run 'nep "
+                        "doctor' for details"
                     ).format(problem=problem),
                     terminal,
                 )
-            _warn_of_others(running.address, listen or (), terminal)
+            _show_remote_addresses(running.address, listen or (), terminal)
             interrupts.leave_when_told()
             running.wait()
         finally:
             running.close()
 
 
-def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
-    """Raises `NepError` with the reason why it can't be started."""
+def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
     allow_many()
     attachments: list[Attachment] = [AlertPrinter(terminal), AlertLog()]
     if joins_originals:
@@ -108,14 +108,14 @@ def _started(address: str, owner_pid: int | None, terminal: Terminal, *, joins_o
     except AddressInUseError as error:
         if is_running(address):
             raise NepError(
-                _("a master already runs at '{address}'; use it, or choose another --port").format(
+                _("a master is already running at '{address}'; use it, or choose another --port").format(
                     address=address
                 )
             ) from error
-        hindered = doctor.start_obstacle(address)
-        if hindered is None:
+        obstacle = doctor.start_obstacle(address)
+        if obstacle is None:
             raise
-        raise NepError(hindered.as_error) from error
+        raise NepError(obstacle.as_error) from error
 
 
 def _address(master: str | None, port: int | None) -> str:
@@ -125,22 +125,22 @@ def _address(master: str | None, port: int | None) -> str:
     if not is_loopback(address):
         raise NepError(
             _(
-                "a master answers at 127.0.0.1; use that and add --listen {host_of} for other computers"
+                "a master always listens on 127.0.0.1; use that, and add --listen {host_of} for"
+                " other computers"
             ).format(host_of=host_of(address))
         )
     return address
 
 
-def _say_running(address: str, terminal: Terminal, *, joins_originals: bool) -> None:
+def _show_address(address: str, terminal: Terminal, *, joins_originals: bool) -> None:
     out = console(out=terminal)
     out.print(_("[bold green]●[/] master at [bold]{address}[/]").format(address=address))
     if joins_originals:
-        out.print(_("  programs of the original NEP join it too"), style="dim")
-    out.print(_("  Ctrl+C ends it"), style="dim")
+        out.print(_("  programs of the original NEP can join"), style="dim")
+    out.print(_("  press Ctrl+C to stop"), style="dim")
 
 
-def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
-    """Say that others can connect, and what they type."""
+def _show_remote_addresses(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
     out = console(out=terminal)
     port = address.rpartition(":")[2]
     chosen = [own.host for own in own_addresses()] if ANY in hosts else hosts
@@ -152,5 +152,5 @@ def _warn_of_others(address: str, hosts: Sequence[str], terminal: Terminal) -> N
         )
     if hosts:
         out.print(
-            _("  whoever is in that network can read and command everything: no password"), style="yellow"
+            _("  everyone in that network can read and send everything: there is no password"), style="yellow"
         )

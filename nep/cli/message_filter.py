@@ -1,6 +1,6 @@
 """Filter expressions of `nep topic echo --filter`, such as `pose.x > 1.5 and state == "moving"`.
 
-The syntax is the part of Python's that compares fields with values; it is parsed with `ast` and never
+The syntax is the subset of Python that compares fields with values; it is parsed with `ast` and never
 evaluated as Python. Fields are written as for `nep topic echo`; `m` is the whole message.
 """
 
@@ -35,28 +35,28 @@ class _UnsupportedError(Exception):
 
 
 class MessageFilter:
-    """Condition on payloads. A comparison with a field that a message lacks, or of other types, is false."""
+    """Condition on payloads. Comparisons with missing fields or values of another type are false."""
 
     def __init__(self, text: str) -> None:
-        """Parse `text`. Raises `NepError` that names what is not understood."""
+        # Raises `NepError` naming the part that is not supported.
         if len(text) > _MAX_LENGTH:
             raise NepError(_("a filter has at most {count} characters").format(count=_MAX_LENGTH))
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of Python's own about odd comparisons
+                warnings.simplefilter("ignore")  # Python's SyntaxWarnings about odd comparisons
                 tree = parse_expression(text.strip())
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            said = _("'{text}' is not a filter; write it like '{example}'")
-            raise NepError(said.format(text=quotable(text), example=_EXAMPLE)) from error
+            message = _("'{text}' is not a filter; write it like '{example}'")
+            raise NepError(message.format(text=quotable(text), example=_EXAMPLE)) from error
         try:
             self._term = _condition(tree.body)
         except _UnsupportedError as error:
             part = ast.get_source_segment(text.strip(), error.node) or text
-            said = _("a filter can't use '{part}'; it compares fields with values, like '{example}'")
-            raise NepError(said.format(part=quotable(part), example=_EXAMPLE)) from error
+            message = _("a filter can't use '{part}'; it compares fields with values, like '{example}'")
+            raise NepError(message.format(part=quotable(part), example=_EXAMPLE)) from error
 
     def matches(self, payload: object) -> bool:
-        """Whether the condition holds for a payload."""
+        """Return whether the condition holds for a payload."""
         return _is_true(self._term(payload))
 
 

@@ -1,4 +1,4 @@
-"""Nodes and graph views for commands: through the master, or over the back end that `--backend` names."""
+"""Nodes and graph snapshots for commands: through the master, or over the back end of `--backend`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BackendOption = Annotated[
         "--backend",
         metavar=_("NAME"),
         help=_(
-            "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master is then its place."
+            "Use this back end instead of the master: 'zenoh', 'ros2', 'ros'. --master is then its address."
         ),
         show_default=False,
         callback=_checked_backend,
@@ -40,12 +40,12 @@ BackendOption = Annotated[
 
 
 def node_for(command: str, master: str | None, backend: str | None = None) -> Node:
-    """Open a node for one run of a topic command. Its name has the process id, because two may run."""
+    """Open a node for one run of a topic command. Its name ends with the process id to be unique."""
     return open_node(f"nep-topic-{command}", master, backend)
 
 
 def open_node(name: str, master: str | None, backend: str | None = None) -> Node:
-    """Open a node. NEP_MASTER is the place of the default back end only.
+    """Open a node whose name ends with the process id. NEP_MASTER applies to the default back end only.
 
     Raises `UnknownBackendError`, `BackendUnavailableError`.
     """
@@ -57,7 +57,7 @@ def open_node(name: str, master: str | None, backend: str | None = None) -> Node
 
 
 def graph_of(master: str | None, backend: str | None = None) -> GraphView:
-    """Return the graph without the node that asks. Raises `MasterUnreachable`, and as `open_node` does."""
+    """Return the graph without the querying node. Raises `MasterUnreachable`, and as `open_node` does."""
     if backend is None:
         return view(master)
     with open_node("nep-graph", master, backend) as node:

@@ -1,4 +1,4 @@
-"""`nep node`: the programs that are there."""
+"""`nep node`: list and inspect running nodes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SERVICE_COLUMNS = (
     TextColumn(lazy("serves"), style="green"),
     TextColumn(lazy("calls"), style="cyan"),
 )
-"""When there are services."""
+"""Shown if there are services."""
 _WIRES = {
     "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",
@@ -65,7 +65,7 @@ def list_nodes(
     elif nodes:
         show_table(_COLUMNS, [_row(graph, node) for node in nodes])
     else:
-        say(_("no nodes yet; they appear as soon as a program makes one"))
+        say(_("no nodes; start a program that creates one"))
     show_alerts(graph.alerts)
 
 
@@ -88,9 +88,9 @@ def info(
     graph = graph_of(master, backend)
     found = [each for each in graph.nodes.values() if node in {each.name, each.id}]
     if not found:
-        said = _("no node '{node}'; {meant}'nep node list' shows all nodes")
+        message = _("no node '{node}'; {meant}'nep node list' shows all nodes")
         near = meant(node, [each.name for each in graph.nodes.values()])
-        raise NepError(said.format(node=quotable(node), meant=near))
+        raise NepError(message.format(node=quotable(node), meant=near))
     found.sort(key=lambda each: each.id)
     if as_json:
         show_json([_record(graph, each) for each in found])
@@ -101,7 +101,6 @@ def info(
 
 
 def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
-    """As `nep node list --json` has it, with the types of its topics and services."""
     topics = {
         role: {name: _topic_type(graph, name) for name in names}
         for role, names in _topics_of(graph, node).items()
@@ -160,12 +159,12 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
 
 def _topics_of(graph: GraphView, node: NodeInfo) -> dict[str, list[str]]:
     topics = graph.topics.values()
-    heard = [each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)]
-    wide = graph.patterns.values()
-    heard += [each.name for each in wide if any(one.node_id == node.id for one in each.subscribers)]
+    subscribed = [each.name for each in topics if any(one.node_id == node.id for one in each.subscribers)]
+    patterns = graph.patterns.values()
+    subscribed += [each.name for each in patterns if any(one.node_id == node.id for one in each.subscribers)]
     return {
         "publishes": [each.name for each in topics if any(one.node_id == node.id for one in each.publishers)],
-        "subscribes": sorted(set(heard)),
+        "subscribes": sorted(set(subscribed)),
     }
 
 

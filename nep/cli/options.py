@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ AllowMovingOption = Annotated[
         "--allow-moving",
         metavar=_("ROBOT"),
         help=_(
-            "Allow this robot to be moved, virtual or not; can be repeated. A topic stands for the robots "
-            "that it moves. Make sure that nobody is in the way."
+            "Allow this robot to be moved, virtual or not; can be repeated. A topic stands for "
+            "the robots that it moves. Make sure that nobody is in the way."
         ),
         show_default=False,
     ),
@@ -35,9 +35,11 @@ JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
 def checked_time(given: float | None) -> float | None:
-    """`given` itself when it is a time: 0 or more seconds. Raises `typer.BadParameter`."""
-    if given is not None and not given >= 0.0:  # also what is not a number
-        raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=given))
+    """Return `given` if it is a duration of 0 or more seconds, else raise `typer.BadParameter`."""
+    if given is not None and not given >= 0.0:  # rejects NaN, too
+        raise typer.BadParameter(
+            _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=given)
+        )
     return given
 
 

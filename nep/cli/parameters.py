@@ -1,4 +1,4 @@
-"""`nep param`: the parameters of a node: list, get, set, watch, and all of them to a file and back."""
+"""`nep param`: list, get, set and watch parameters of a node; dump them to a file and load them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from nep.text import bounded_str, escaped, shortened
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
-    help=_("Values of a node that can be set while it runs."),
+    help=_("List, get, set and watch parameters of a running node."),
 )
 _COLUMNS = (
     TextColumn(lazy("parameter"), style="bold", is_whole=True),
@@ -42,42 +42,42 @@ _COLUMNS = (
     TextColumn(lazy("allowed")),
     TextColumn(lazy("description")),
 )
-_LOOK_S = 1.0
-"""So often it is seen whether the node is still there."""
+_PRESENCE_CHECK_S = 1.0
+"""Interval at which the node's presence is checked."""
 _NodeArgument = Annotated[
     str,
     typer.Argument(
         metavar=_("NODE"),
-        help=_("The node, by its name or id."),
+        help=_("Name or id of the node."),
         show_default=False,
         autocompletion=complete_node,
     ),
 ]
 _NameArgument = Annotated[
-    str, typer.Argument(metavar=_("NAME"), help=_("The parameter."), show_default=False)
+    str, typer.Argument(metavar=_("NAME"), help=_("Name of the parameter."), show_default=False)
 ]
 
 
 @app.command("list")
 def list_parameters(node: _NodeArgument, master: MasterOption = None, as_json: JsonOption = False) -> None:
     """List the parameters of a node, with their types and limits."""
-    with _parameters(node, master) as theirs:
-        found = theirs.list()
+    with _parameters(node, master) as parameters:
+        found = parameters.list()
     if as_json:
         show_json(list(found))
     elif found:
         show_table(_COLUMNS, [_row(each) for each in found])
     else:
-        say(_("it has none now"))
+        say(_("the node has no parameters"))
 
 
 @app.command("get")
 def get(
     node: _NodeArgument, name: _NameArgument, master: MasterOption = None, as_json: JsonOption = False
 ) -> None:
-    """Write the value of a parameter."""
-    with _parameters(node, master) as theirs:
-        value = theirs.get(name)
+    """Print the value of a parameter."""
+    with _parameters(node, master) as parameters:
+        value = parameters.get(name)
     if as_json:
         show_json(value)
     else:
@@ -92,16 +92,16 @@ def set_value(
         str,
         typer.Argument(
             metavar=_("VALUE"),
-            help=_("JSON, such as 0.5, true or [1, 2]; anything else is a text."),
+            help=_("Value as JSON, such as 0.5, true or [1, 2]; anything else is taken as text."),
             show_default=False,
         ),
     ],
     master: MasterOption = None,
 ) -> None:
-    """Give a parameter another value; the node may refuse it and says why."""
-    with _parameters(node, master) as theirs:
-        kinds = {each.get("name"): each.get("type") for each in theirs.list()}
-        theirs.set(name, value if kinds.get(name) == "str" else _meant(value))
+    """Set a parameter. Fails with the reason if the node rejects the value."""
+    with _parameters(node, master) as parameters:
+        kinds = {each.get("name"): each.get("type") for each in parameters.list()}
+        parameters.set(name, value if kinds.get(name) == "str" else _parse_value(value))
 
 
 @app.command("watch")
@@ -109,18 +109,16 @@ def watch(
     node: _NodeArgument,
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar=_("NAME"), help=_("Only this one; all when nothing is said."), show_default=False
-        ),
+        typer.Argument(metavar=_("NAME"), help=_("Parameter to watch (default: all)."), show_default=False),
     ] = None,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N lines; 0 goes on."))
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N lines (0: never)."))
     ] = 0,
     timeout_s: TimeoutOption = None,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the parameters of a node now, and each again when it changes. Ctrl+C ends it."""
+    """Print the parameters of a node, and again whenever one changes, until Ctrl+C."""
     with Node(f"nep-param-{os.getpid()}", master=master) as own:
         found = node_with_parameters(own.graph(), node)
         with own.new_sub(place_of(found), MSG_TYPE) as subscriber:
@@ -138,14 +136,14 @@ def dump(
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar=_("FILE"), help=_("Where to; the output when nothing is said."), show_default=False
+            metavar=_("FILE"), help=_("File to write (default: standard output)."), show_default=False
         ),
     ] = None,
     master: MasterOption = None,
 ) -> None:
-    """Write all parameters as JSON, for `nep param load`."""
-    with _parameters(node, master) as theirs:
-        values = {bounded_str(each.get("name")): each.get("value") for each in theirs.list()}
+    """Write all parameters of a node as JSON, for `nep param load`."""
+    with _parameters(node, master) as parameters:
+        values = {bounded_str(each.get("name")): each.get("value") for each in parameters.list()}
     data = json_of(values, indent=True) + b"\n"
     if file is None:
         write(data.decode())
@@ -155,7 +153,7 @@ def dump(
         unfinished.write_bytes(data)
         replace_file(unfinished, file)
     except OSError as error:
-        said = _("'{file}' cannot be written: {problem}; choose another place")
+        said = _("can't write '{file}': {problem}; choose another file")
         raise NepError(said.format(file=escaped(str(file)), problem=error.strerror or error)) from error
 
 
@@ -163,33 +161,39 @@ def dump(
 def load(
     node: _NodeArgument,
     file: Annotated[
-        Path, typer.Argument(metavar=_("FILE"), help=_("What `nep param dump` wrote."), show_default=False)
+        Path,
+        typer.Argument(metavar=_("FILE"), help=_("File written by `nep param dump`."), show_default=False),
     ],
     master: MasterOption = None,
 ) -> None:
-    """Set the parameters that a file has: all of them, or none."""
+    """Set the parameters in a file: all of them, or none if one is rejected."""
     shown = escaped(str(file))
     values = parse_json(text_of(read_file(file, "json"), str(file)), file=str(file))
     if not isinstance(values, dict):
-        raise NepError(_("'{file}' has no map of names and values").format(file=shown))
-    with _parameters(node, master) as theirs:
-        theirs.set_all(values)
+        raise NepError(_("'{file}' is not a JSON object of names and values").format(file=shown))
+    with _parameters(node, master) as parameters:
+        parameters.set_all(values)
 
 
 @contextmanager
 def _parameters(node: str, master: str | None) -> Iterator[RemoteParameters]:
-    with Node(f"nep-param-{os.getpid()}", master=master) as own, own.parameters_of(node) as theirs:
-        yield theirs
+    with Node(f"nep-param-{os.getpid()}", master=master) as own, own.parameters_of(node) as parameters:
+        yield parameters
 
 
 def _states(
     own: Node, subscriber: Subscriber, node_id: str, timeout_s: float | None
 ) -> Iterator[Mapping[str, object]]:
-    """Name → value, now and after each change. Raises `WaitTimeoutError`; `NepError` when the node goes."""
+    # Yields name → value, now and after each change. Raises `WaitTimeoutError`, or `NepError` when the node
+    # leaves.
     deadline = None if timeout_s is None else time.monotonic() + timeout_s
-    look_at = time.monotonic() + _LOOK_S
+    check_at = time.monotonic() + _PRESENCE_CHECK_S
     while True:
-        slice_s = _LOOK_S if deadline is None else min(_LOOK_S, max(0.0, deadline - time.monotonic()))
+        slice_s = (
+            _PRESENCE_CHECK_S
+            if deadline is None
+            else min(_PRESENCE_CHECK_S, max(0.0, deadline - time.monotonic()))
+        )
         message = subscriber.receive(slice_s)
         if message is not None:
             values = _values(message)
@@ -198,15 +202,14 @@ def _states(
             deadline = None if timeout_s is None else time.monotonic() + timeout_s
         elif deadline is not None and time.monotonic() >= deadline:
             raise WaitTimeoutError(_("a change of the parameters"), timeout_s or 0.0)
-        if time.monotonic() >= look_at:
-            look_at = time.monotonic() + _LOOK_S
-            with suppress(MasterUnreachable):  # it is away: who is connected stays connected
+        if time.monotonic() >= check_at:
+            check_at = time.monotonic() + _PRESENCE_CHECK_S
+            with suppress(MasterUnreachable):  # connections survive while the master is down
                 if node_id not in own.graph().nodes:
-                    raise NepError(_("the node has gone; watch it anew when it is started again"))
+                    raise NepError(_("the node has left; watch it again after it is restarted"))
 
 
 def _values(message: Message) -> Mapping[str, object] | None:
-    """Name → value, as the node tells them; None for anything else: anybody may publish there."""
     try:
         state = message.payload
     except DecodeError:
@@ -219,12 +222,12 @@ def _values(message: Message) -> Mapping[str, object] | None:
 
 
 def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterator[tuple[str, object]]:
-    """Names and values that are new or have changed. Raises `NepError` when there is none of this name."""
+    # Yields names and values that are new or have changed. Raises `NepError` if `name` does not exist.
     before: dict[str, object] = {}
     for values in states:
         if name is not None and not before and name not in values:
-            said = did_you_mean(name, tuple(values)) if values else _("there are none")
-            raise NepError(_("no parameter '{name}'; {said}").format(name=escaped(name), said=said))
+            said = did_you_mean(name, tuple(values)) if values else _("the node has no parameters")
+            raise NepError(_("unknown parameter '{name}'; {said}").format(name=escaped(name), said=said))
         for each, value in values.items():
             is_same = each in before and json_of(before[each]) == json_of(value)  # 1 and 1.0 and True differ
             if not is_same:
@@ -233,7 +236,7 @@ def _changes(states: Iterator[Mapping[str, object]], name: str | None) -> Iterat
                     yield each, value
 
 
-def _meant(word: str) -> object:
+def _parse_value(word: str) -> object:
     try:
         return orjson.loads(word)
     except orjson.JSONDecodeError:
@@ -256,11 +259,11 @@ def _allowed(parameter: Mapping[str, object]) -> str:
     choices = parameter.get("choices")
     if choices:
         return presented(choices, whole=False)
-    least, most = parameter.get("min"), parameter.get("max")
-    if least is None and most is None:
+    minimum, maximum = parameter.get("min"), parameter.get("max")
+    if minimum is None and maximum is None:
         return UNKNOWN
     return "".join((
-        "" if least is None else f"{presented(least, whole=True)} ≤ ",
+        "" if minimum is None else f"{presented(minimum, whole=True)} ≤ ",
         "…",
-        "" if most is None else f" ≤ {presented(most, whole=True)}",
+        "" if maximum is None else f" ≤ {presented(maximum, whole=True)}",
     ))  # fmt: skip

@@ -1,4 +1,4 @@
-"""`nep play`: a recording's messages onto the network again, those that a person names."""
+"""`nep play`: publish messages of a recording."""
 
 from __future__ import annotations
 
@@ -39,33 +39,33 @@ if TYPE_CHECKING:
 
     from nep.recordings import player, reader
     from nep.recordings.formats import damage
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     damage = lazy_module("nep.recordings.formats.damage")
     player = lazy_module("nep.recordings.player")
     reader = lazy_module("nep.recordings.reader")
 
-_LOOK_S = 0.2
-_SETTLE_S = 1.0
-"""How long descriptions of robots may take to arrive; until then their programs' topics are not sent."""
+_STATUS_PERIOD_S = 0.2
+_ROBOT_DISCOVERY_S = 1.0
+"""Time for robot descriptions to arrive; until then the topics of their programs are blocked."""
 _MAX_TOPICS = 1_000
-"""Each has a publisher, of which the whole network is told."""
+"""Each topic needs a publisher, which is announced to the whole network."""
 
 
 def play(
     file: FileArgument,
     topics: RecordedTopicsArgument = None,
     publish_all: Annotated[
-        bool, typer.Option("--all", help=_("All topics, but those that move robots."))
+        bool, typer.Option("--all", help=_("Publish all topics except those that move robots."))
     ] = False,
     allow_moving: AllowMovingOption = None,
     arm: Annotated[
         bool,
-        typer.Option("--arm", help=_("Allow every robot to be moved by the topics that are named.")),
+        typer.Option("--arm", help=_("Allow the named topics to move any robot.")),
     ] = False,
     speed: Annotated[
-        float, typer.Option("--speed", metavar=_("FACTOR"), help=_("0.1 to 10 times as fast."))
+        float, typer.Option("--speed", metavar=_("FACTOR"), help=_("Playback speed, 0.1 to 10."))
     ] = 1.0,
-    loop: Annotated[bool, typer.Option("--loop", help=_("Again and again, until Ctrl+C."))] = False,
+    loop: Annotated[bool, typer.Option("--loop", help=_("Repeat until Ctrl+C."))] = False,
     from_s: FromOption = None,
     to_s: ToOption = None,
     remap: Annotated[
@@ -76,50 +76,49 @@ def play(
     ] = None,
     master: MasterOption = None,
 ) -> None:
-    """Publish what was recorded, in the time in which it came. Ctrl+C ends it.
+    """Publish the messages of a recording with their original timing, until its end or Ctrl+C.
 
-    Nothing is sent that is not named: topics, patterns in quotes, or --all. What moves a robot, by the
-    recording or by the robots that are there now, is sent only with --allow-moving, or with --arm when it is
-    named. A robot that comes later is not moved either.
+    Only the named topics are published: names, patterns in quotes, or --all. Topics that move a robot,
+    according to the recording or to a connected robot, need --allow-moving, or --arm if they are named.
+    Robots that connect later are protected, too.
     """
     with reader.Recording(file) as recording:
-        named = _named(recording, topics or (), publish_all=publish_all)
+        named = _named_topics(recording, topics or (), publish_all=publish_all)
         chosen = list(recording.topics) if publish_all else named
         if not any(recording.topics[each].message_count for each in chosen):
-            said = _("nothing of '{file}' can be played: it has no such messages").format(file=file)
+            said = _("nothing to play: '{file}' has no messages of these topics").format(file=file)
             words = damage.damage_words(recording.damage, recording.start_ns)
             raise NepError(f"{said}; {words}" if words else said)
         if len(chosen) > _MAX_TOPICS:
-            said = _("'{file}' has {count} such topics; name {most} of them at most")
+            said = _("'{file}' has {count} matching topics; name at most {most}")
             raise NepError(said.format(file=file, count=len(chosen), most=_MAX_TOPICS))
-        names = _names(chosen, remap or ())
+        names = _remapped_names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
-        limits = _Limits(recording, names, frozenset(allow_moving or ()), armed)
-        chosen = limits.checked(chosen, named)
+        limits = _MotionLimits(recording, names, frozenset(allow_moving or ()), armed)
+        chosen = limits.filter_allowed(chosen, named)
         try:
             playback = player.Playback(recording, topics=chosen, remap=names)
             playback.speed = speed
-            _set_part(recording, playback, span_ns(recording, from_s, to_s), loop=loop)
+            _select_part(recording, playback, span_ns(recording, from_s, to_s), loop=loop)
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
         with node_for("play", master) as node:
             limits.guard = MotionGuard(node)
-            limits.guard.settle(_SETTLE_S)
-            chosen = limits.checked(chosen, named)
+            limits.guard.settle(_ROBOT_DISCOVERY_S)
+            chosen = limits.filter_allowed(chosen, named)
             if not chosen:
-                raise NepError(_("nothing is left to publish"))
+                raise NepError(_("nothing to publish: all chosen topics are blocked"))
             playback.choose(chosen)
             with _Sender(node, recording, chosen, limits) as sender:
                 _play(recording, playback, sender)
                 said = ngettext("published {count} message", "published {count} messages", sender.count)
                 say(said.format(count=sender.count))
         end_with_damage(recording)
-        if limits.was_named_refused:
+        if limits.was_named_blocked:
             raise typer.Exit(1)
 
 
-def _named(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
-    """The topics that words name. Raises `typer.BadParameter`, also when nothing is to be published."""
+def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
     if not words and not publish_all:
         known = listed([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
@@ -128,8 +127,8 @@ def _named(recording: reader.Recording, words: Sequence[str], *, publish_all: bo
     return chosen_topics(recording, words)
 
 
-class _Limits:
-    """Which topics may not be published, because they move robots that nobody has allowed to move."""
+class _MotionLimits:
+    """Topics that must not be published because they would move robots without permission."""
 
     def __init__(
         self,
@@ -140,80 +139,82 @@ class _Limits:
     ) -> None:
         self.names = names
         self.guard: MotionGuard | None = None
-        self.was_named_refused = False
+        self.was_named_blocked = False
         self._topics = recording.topics
         self._recorded = player.moving_topics(recording)
         self._allowed, self._armed = allowed, armed
-        self._named: frozenset[str] = frozenset()
-        self._seen: MovingTopics | None = None
-        self._refused: dict[str, str] = {}
+        self._named_topics: frozenset[str] = frozenset()
+        self._checked_moving: MovingTopics | None = None
+        self._blocked: dict[str, str] = {}
 
-    def checked(self, chosen: Sequence[str], named: Sequence[str]) -> list[str]:
-        """Those that may be published. Raises `typer.BadParameter` for a named one that may not."""
-        self._named = frozenset(named)
+    def filter_allowed(self, chosen: Sequence[str], named: Sequence[str]) -> list[str]:
+        # Returns the topics that may be published. Raises `typer.BadParameter` if a named one is blocked.
+        self._named_topics = frozenset(named)
         kept = []
         for topic in chosen:
-            refusal = self._refusal(topic)
-            if not refusal:
+            reason = self._block_reason(topic)
+            if not reason:
                 kept.append(topic)
-            elif topic in self._named:
-                raise typer.BadParameter(refusal)
+            elif topic in self._named_topics:
+                raise typer.BadParameter(reason)
             else:
-                say(_("not sent: {reason}").format(reason=refusal))
+                say(_("not published: {reason}").format(reason=reason))
         return kept
 
     def allows(self, topic: str) -> bool:
-        """Whether a message may go out under this name now; says once why not."""
-        if self.guard is not None and self.guard.moving is not self._seen:
-            self._seen = self.guard.moving
-            self._refused = self._refusals(self._refused)
-        return topic not in self._refused
+        # Reports a topic that becomes blocked once on stderr.
+        if self.guard is not None and self.guard.moving is not self._checked_moving:
+            self._checked_moving = self.guard.moving
+            self._blocked = self._find_blocked(self._blocked)
+        return topic not in self._blocked
 
-    def _refusals(self, before: Mapping[str, str]) -> dict[str, str]:
-        refused = {}
+    def _find_blocked(self, before: Mapping[str, str]) -> dict[str, str]:
+        blocked = {}
         for recorded in self._topics:
             name = self.names.get(recorded, recorded)
-            refusal = self._refusal(recorded)
-            if refusal:
-                refused[name] = refusal
+            reason = self._block_reason(recorded)
+            if reason:
+                blocked[name] = reason
                 if name not in before:
-                    say(_("not sent: {reason}").format(reason=refusal))
-                    self.was_named_refused |= recorded in self._named
-        return refused
+                    say(_("not published: {reason}").format(reason=reason))
+                    self.was_named_blocked |= recorded in self._named_topics
+        return blocked
 
-    def _refusal(self, recorded: str) -> str:
+    def _block_reason(self, recorded: str) -> str:
         name = self.names.get(recorded, recorded)
         if recorded in self._armed or recorded in self._allowed:
             return ""
         live = () if self.guard is None else self.guard.moving.moved_by(name)
         known = self._recorded.moved_by(recorded, self._topics[recorded].msg_type)
         known = known or self._recorded.moved_by(name)
-        # live names are what moves now; a topic in their place says less than the recording
+        # names of connected robots win, unless the guard only knows the topic
         robots = known or live if live in ((), (name,)) else live
         return refusal_words(name, robots, self._allowed)
 
 
-def _names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
-    """New names by the old ones. Raises `typer.BadParameter`, `BadTopicError` for what can be no topic."""
+def _remapped_names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
+    # Returns new names by old ones. Raises `typer.BadParameter`, `BadTopicError`.
     names: dict[str, str] = {}
     for each in remap:
         old, separator, new = each.partition("=")
         if not separator or not new or old not in chosen:
             raise typer.BadParameter(
-                _("'{word}' is none; write --remap OLD=NEW of a topic that is played").format(word=each)
+                _(
+                    "'{word}' is not a valid remapping; use --remap OLD=NEW with a topic that is played"
+                ).format(word=each)
             )
         names[old] = check_topic(new)
     return names
 
 
-def _set_part(
+def _select_part(
     recording: reader.Recording,
     playback: player.Playback,
     part: tuple[int | None, int | None],
     *,
     loop: bool,
 ) -> None:
-    """Raises `ValueError` for a part without length."""
+    # Raises `ValueError` for an empty part.
     start, end = part
     if start is not None or end is not None:
         playback.loop(start or recording.start_ns, recording.end_ns if end is None else end)
@@ -225,20 +226,20 @@ def _set_part(
 
 
 class _Sender:
-    """Publishes messages, with a publisher for each topic that has any."""
+    """Publisher of replayed messages, with one publisher per topic and type."""
 
     def __init__(
-        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _Limits
+        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _MotionLimits
     ) -> None:
         self.limits, names = limits, limits.names
         self._opened = ExitStack()
-        self._heard: dict[Publisher, int] = {}
+        self._subscriber_counts: dict[Publisher, int] = {}
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node = node
         self.count = 0
         latched = player.latched_topics(recording, chosen)
         self._latched = {names.get(each, each) for each in latched}
-        for topic in chosen:  # before the first message, so that who listens hears it
+        for topic in chosen:  # before the first message, so that subscribers connect in time
             self._publisher(names.get(topic, topic), recording.topics[topic].msg_type)
 
     def _publisher(self, topic: str, msg_type: str) -> Publisher:
@@ -249,20 +250,18 @@ class _Sender:
         return self._publishers[key]
 
     def send(self, messages: Sequence[Message]) -> None:
-        """Publish their bytes as they were."""
         for each in messages:
             publisher = self._publisher(each.topic, player.published_type(each))
-            heard = publisher.subscribers
-            if heard != self._heard.get(publisher):  # a robot may have come
-                self._heard[publisher] = heard
-                self.look()
+            subscriber_count = publisher.subscribers
+            if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
+                self._subscriber_counts[publisher] = subscriber_count
+                self.poll_guard()
             if not self.limits.allows(each.topic):
                 continue
             publisher.publish_bytes(bytes(each.data), dict(each.extension) or None)
             self.count += 1
 
-    def look(self) -> None:
-        """Find out which robots are there now."""
+    def poll_guard(self) -> None:
         if self.limits.guard is not None:
             self.limits.guard.look()
 
@@ -279,10 +278,10 @@ def _play(recording: reader.Recording, playback: player.Playback, sender: _Sende
     interrupts.leave_when_told()
 
     def wait() -> bool:
-        sender.look()
-        return ended.wait(_LOOK_S)
+        sender.poll_guard()
+        return ended.wait(_STATUS_PERIOD_S)
 
-    with player.Player(playback, sender.send, on_jump=_nothing, on_end=ended.set) as playing:
+    with player.Player(playback, sender.send, on_jump=_ignore_jump, on_end=ended.set) as playing:
         playing.order(lambda each: each.play())
         if out.is_terminal:
             with out.status("") as shown:
@@ -295,8 +294,9 @@ def _play(recording: reader.Recording, playback: player.Playback, sender: _Sende
         raise playing.problem
 
 
-def _nothing(_messages: Sequence[Message]) -> None:
-    """What was before the part is not published."""
+def _ignore_jump(_messages: Sequence[Message]) -> None:
+    # Messages before the chosen part are not published.
+    ...
 
 
 def _line(recording: reader.Recording, status: player.PlayerStatus) -> str:
@@ -304,7 +304,7 @@ def _line(recording: reader.Recording, status: player.PlayerStatus) -> str:
     line = _("{time} of {whole}").format(time=at, whole=clock_text(recording.duration_s))
     true_speed = status.true_speed
     if true_speed is not None and true_speed < 0.9 * status.speed:
-        line += "  " + _("asked {asked}, is {is_now} x").format(
+        line += "  " + _("{is_now}x instead of {asked}x").format(
             asked=number(status.speed, "g"), is_now=number(true_speed, ".1f")
         )
     return line

@@ -1,4 +1,4 @@
-"""`nep topic pub`: publish by hand."""
+"""`nep topic pub`: publish messages by hand."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
 from nep.text import escaped
 
-_MOST_BYTES = 10**9
-"""What a file may have: far more than a message, but a device such as /dev/zero has no end."""
+_MAX_FILE_BYTES = 10**9
+"""Size limit of input files: far above any message, but a device such as /dev/zero never ends."""
 _MAX_CATCH_UP_S = 0.01
 _WAIT_SLICE_S = 0.02
 _TEXT_TYPES = frozenset({"string"})
@@ -51,7 +51,7 @@ _Payload = Annotated[
 ]
 
 
-def _type(given: str | None) -> str | None:
+def _checked_type(given: str | None) -> str | None:
     try:
         return text("it", given) if given else None
     except ValueError as error:
@@ -66,7 +66,7 @@ _TypeOption = Annotated[
         metavar=_("TYPE"),
         help=_("Message type (default: the topic's, or json)."),
         show_default=False,
-        callback=_type,
+        callback=_checked_type,
     ),
 ]
 _RateOption = Annotated[
@@ -125,10 +125,10 @@ def publish(
 ) -> None:
     """Publish a message once, or with --rate repeatedly until Ctrl+C.
 
-    The message is sent without asking, also on a topic that moves a robot.
+    There is no confirmation, even if the topic moves a robot.
     """
     if rate_hz is not None and not 0 < rate_hz <= 10_000:
-        raise typer.BadParameter(_("a rate is more than 0 and at most 10000 a second"), param_hint="--rate")
+        raise typer.BadParameter(_("the rate must be above 0 and at most 10000 Hz"), param_hint="--rate")
     with node_for("pub", master, backend) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
@@ -141,15 +141,14 @@ def publish(
             else:
                 repeat(partial(publisher.publish, value), rate_hz or 1.0, count if rate_hz is not None else 1)
             said = _("published {count} on '{topic}' ({kind}) to {people}")
-            people = _people(publisher.subscribers)
+            people = _subscriber_text(publisher.subscribers)
             say(said.format(count=publisher.count, topic=topic, kind=kind, people=people))
             if latched:
-                say(_("kept for whoever subscribes later; Ctrl+C ends it"))
+                say(_("keeping the message for later subscribers; press Ctrl+C to stop"))
                 _wait_for_ever()
 
 
 def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
-    """Say that others publish the topic with another type, or that a type is nearly the name of a codec."""
     if known is not None and known.publishers and known.msg_type != kind:
         say(
             _("'{topic}' is published with the type '{msg_type}'; yours is '{kind}'").format(
@@ -163,14 +162,17 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
 
 
 def encoded_of(text: str, msg_type: str, first_line: int = 1) -> Encoded:
-    """Return the encoded `value_of`, so that what can't be sent is an error at once. Raises as it does."""
+    """Encode `value_of(text)`, so that invalid values fail before publishing. Raises as it does."""
     return codec_for(msg_type).encode(value_of(text, msg_type, first_line))
 
 
 def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
     """Return the payload that `text` stands for. Raises `NepError`.
 
-    `first_line` is the number of the text's first line in the standard input.
+    Args:
+        text: JSON, text, or @FILE.
+        msg_type: Message type of the topic.
+        first_line: Line number of `text` in standard input, for error messages.
     """
     file: str | None = None
     if text.startswith("@"):
@@ -181,48 +183,47 @@ def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
-        return _bytes_typed(text)
+        return _encode_typed(text)
     if msg_type in _BYTE_TYPES:
         raise EncodeError(msg_type, "str", _("name a JPEG or PNG file: @picture.jpg"))
     allow_nan = codec_for(msg_type).name == "msgpack"
     return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
 
 
-def _bytes_typed(text: str) -> bytes:
-    """What a person typed, also where that is no UTF-8. Raises `EncodeError`."""
+def _encode_typed(text: str) -> bytes:
+    # surrogateescape restores typed bytes that are not UTF-8.
     try:
         return text.encode("utf-8", "surrogateescape")
     except UnicodeEncodeError as error:
-        raise EncodeError("bytes", "str", _("it holds half of a surrogate pair")) from error
+        raise EncodeError("bytes", "str", _("it contains half of a surrogate pair")) from error
 
 
 def read_file(file: Path, msg_type: str) -> bytes:
-    """What is in it, up to what a message may have. Raises `EncodeError`."""
+    """Read a file of at most `_MAX_FILE_BYTES`. Raises `EncodeError`."""
     shown = escaped(str(file))
     try:
-        with file.open("rb") as opened:  # it may be a pipe, or a device that has no end
-            data = opened.read(_MOST_BYTES + 1)
+        with file.open("rb") as opened:  # bounded: it may be a pipe or an endless device
+            data = opened.read(_MAX_FILE_BYTES + 1)
     except OSError as error:
         raise EncodeError(
-            msg_type, "file", _("'{file}' cannot be read: {reason}").format(file=shown, reason=error.strerror)
+            msg_type, "file", _("can't read '{file}': {reason}").format(file=shown, reason=error.strerror)
         ) from error
-    except ValueError as error:  # letters that no file's name has here
+    except ValueError as error:  # characters that this system doesn't allow in file names
         raise EncodeError(
-            msg_type, "file", _("'{file}' is no name of a file here").format(file=shown)
+            msg_type, "file", _("'{file}' is not a valid file name").format(file=shown)
         ) from error
-    if len(data) > _MOST_BYTES:
+    if len(data) > _MAX_FILE_BYTES:
         raise EncodeError(
             msg_type,
             "file",
-            _("'{file}' has more than the {most} that a message may have").format(
-                file=shown, most=size(_MOST_BYTES)
+            _("'{file}' is larger than {most}, the limit of a message").format(
+                file=shown, most=size(_MAX_FILE_BYTES)
             ),
         )
     return data
 
 
 def _publish_lines(publisher: Publisher, msg_type: str) -> None:
-    """Publish each line of the standard input, which is UTF-8 or, on a terminal, what that has."""
     for number, line in enumerate(_lines(), 1):
         data = line.rstrip(b"\r\n")
         if msg_type == "bytes":
@@ -231,21 +232,23 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
         try:
             text = data.decode()
         except UnicodeDecodeError as error:
-            said = _("byte {byte} of line {line} is no UTF-8; save the text as UTF-8, or use --type bytes")
+            said = _(
+                "byte {byte} of line {line} is not valid UTF-8; convert the text to UTF-8, or use "
+                "--type bytes"
+            )
             raise NepError(said.format(byte=error.start + 1, line=number)) from error
         publisher.publish(encoded_of(text, msg_type, number))
 
 
 def _lines() -> Iterator[bytes]:
-    """Raises `NepError` when they cannot be read."""
     try:
-        if sys.stdin.isatty():  # the console of Windows has letters, not bytes
+        if sys.stdin.isatty():  # the Windows console gives text, not bytes
             yield from (line.encode("utf-8", "surrogateescape") for line in sys.stdin)
         else:
             yield from sys.stdin.buffer
     except OSError as error:
         why = _("it is closed") if error.errno == errno.EBADF else (error.strerror or str(error)).lower()
-        raise NepError(_("the standard input cannot be read: {why}").format(why=why)) from error
+        raise NepError(_("can't read the standard input: {why}").format(why=why)) from error
 
 
 def repeat(
@@ -256,10 +259,10 @@ def repeat(
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> None:
-    """Call `send` `count` times, 0 for ever, in phase with the clock so that small delays don't add up.
+    """Call `send` `count` times (0: forever) at `rate_hz`, in phase with the clock.
 
-    After a delay of more than `_MAX_CATCH_UP_S` (the computer slept, the program was stopped) the missed
-    turns are skipped: sent at once they would be a burst.
+    After a delay of more than `_MAX_CATCH_UP_S` (suspended computer or process) missed calls are skipped, not
+    sent as a burst.
     """
     wait_s, period_s = wait or threading.Event().wait, 1 / rate_hz
     due = clock()
@@ -275,12 +278,12 @@ def repeat(
 
 
 def wait_for_subscribers(publisher: Publisher, count: int) -> None:
-    """Return when `count` subscribers are connected."""
+    """Block until `count` subscribers are connected."""
     if publisher.subscribers >= count:
         return
     said = ngettext(
-        "waiting for {count} subscriber; Ctrl+C ends it",
-        "waiting for {count} subscribers; Ctrl+C ends it",
+        "waiting for {count} subscriber; press Ctrl+C to stop",
+        "waiting for {count} subscribers; press Ctrl+C to stop",
         count,
     )
     say(said.format(count=count))
@@ -292,10 +295,10 @@ def wait_for_subscribers(publisher: Publisher, count: int) -> None:
 def _wait_for_ever() -> None:
     never = threading.Event()
     while not never.wait(0.1):
-        pass  # in slices: Windows does not interrupt a wait for Ctrl+C
+        pass  # in slices: Ctrl+C does not interrupt a wait on Windows
 
 
-def _people(subscribers: int) -> str:
+def _subscriber_text(subscribers: int) -> str:
     if subscribers == 0:
-        return _("nobody")
+        return _("no subscribers")
     return ngettext("{count} subscriber", "{count} subscribers", subscribers).format(count=subscribers)

@@ -1,4 +1,4 @@
-"""What `nep topic hz`, `bw` and `delay` work out: figures of the messages of the last seconds."""
+"""Sliding windows behind `nep topic hz`, `bw` and `delay`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 from nep.messages.message import Message
 
-__all__ = ["MOST", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow", "ReplayFilter"]
+__all__ = ["MAX_MESSAGES", "AgeWindow", "Bandwidth", "Delay", "Frequency", "RateWindow", "ReplayFilter"]
 
-MOST = 100_000
-"""Messages that a window holds at most; a faster topic is measured over a shorter time."""
+MAX_MESSAGES = 100_000
+"""Capacity of a window in messages; faster topics are measured over a shorter time."""
 
 
 @dataclass(frozen=True)
 class Frequency:
-    """How often: messages a second, and the shortest, longest and standard deviation of the gaps (s)."""
+    """Rate (Hz), and the minimum, maximum and standard deviation of the gaps (s)."""
 
     rate_hz: float
     min_s: float
@@ -30,7 +30,7 @@ class Frequency:
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """How much: bytes a second, and the mean, smallest and largest size of a message (bytes)."""
+    """Bandwidth (bytes/s), and the mean, minimum and maximum message size (bytes)."""
 
     bandwidth_Bps: float  # noqa: N815 - B/s
     mean_bytes: float
@@ -41,9 +41,9 @@ class Bandwidth:
 
 @dataclass(frozen=True)
 class Delay:
-    """How old messages are when they arrive: mean, least, greatest and standard deviation (s).
+    """Latency: mean, minimum, maximum and standard deviation (s).
 
-    All may be wrong by `uncertainty_s`, to either side; None when nobody has compared the clocks.
+    `uncertainty_s` is the error bound in either direction, None if the clocks are not compared.
     """
 
     mean_s: float
@@ -55,25 +55,28 @@ class Delay:
 
 
 class RateWindow:
-    """The messages of one topic that arrived within the last `seconds`. Works in any thread."""
+    """Messages of one topic from the last `seconds`. Thread-safe."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._lock = threading.Lock()
-        self._kept: deque[tuple[float, float, int]] = deque(maxlen=MOST)
+        self._messages: deque[tuple[float, float, int]] = deque(maxlen=MAX_MESSAGES)
         self.total = 0
 
     def add(self, arrived: float, stamp_s: float | None, size_bytes: int) -> None:
-        """A message arrived (s, monotonic), was published (s, its publisher's clock) and has so many bytes.
+        """Add a message.
 
-        Without a stamp (programs of the original NEP) its arrival stands for it.
+        Args:
+            arrived: Arrival time (s, monotonic).
+            stamp_s: Publishing time (s, the publisher's clock); None (original NEP) uses the arrival time.
+            size_bytes: Size of the encoded message.
         """
         with self._lock:
             self.total += 1
-            self._kept.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
+            self._messages.append((arrived, arrived if stamp_s is None else stamp_s, size_bytes))
 
     def frequency(self, now: float) -> Frequency | None:
-        """None as long as there are fewer than two messages."""
+        """Return the figures at `now`, or None with fewer than two messages."""
         moments = sorted(stamp for _, stamp, _ in self._recent(now))
         if len(moments) < 2 or moments[-1] <= moments[0]:
             return None
@@ -83,7 +86,7 @@ class RateWindow:
         return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
 
     def traffic(self, now: float) -> Bandwidth | None:
-        """None as long as there are fewer than two messages."""
+        """Return the figures at `now`, or None with fewer than two messages."""
         recent = self._recent(now)
         if len(recent) < 2:
             return None
@@ -91,19 +94,19 @@ class RateWindow:
         span = recent[-1][0] - recent[0][0]
         if span <= 0:
             return None
-        # the first message came at the beginning of the span: it belongs to the time before
+        # the first message marks the start of the span; its bytes belong to the time before
         bandwidth = sum(sizes[1:]) / span
         return Bandwidth(bandwidth, sum(sizes) / len(sizes), min(sizes), max(sizes), len(sizes))
 
     def _recent(self, now: float) -> Sequence[tuple[float, float, int]]:
         with self._lock:
-            while self._kept and now - self._kept[0][0] > self._seconds:
-                self._kept.popleft()
-            return list(self._kept)
+            while self._messages and now - self._messages[0][0] > self._seconds:
+                self._messages.popleft()
+            return list(self._messages)
 
 
 class ReplayFilter:
-    """Recognizes messages that latched publishers kept for new subscribers: they say nothing about the rate.
+    """Detector of latched messages from before the subscription, which would distort the rate.
 
     `opened` is when the subscription began (s, monotonic). Not thread-safe.
     """
@@ -113,7 +116,7 @@ class ReplayFilter:
         self._publishers: set[int | None] = set()
 
     def is_replay(self, message: Message, now: float) -> bool:
-        """Whether a message that arrived `now` (s, monotonic) was published before the subscription began.
+        """Return whether a message that arrived at `now` (s, monotonic) predates the subscription.
 
         While the publisher's clock isn't compared with this one, the first message of each latched publisher
         counts as a replay.
@@ -127,36 +130,41 @@ class ReplayFilter:
 
 
 class AgeWindow(RateWindow):
-    """How old the messages of one topic were that arrived within the last `seconds`. Works in any thread."""
+    """Latencies of one topic's messages from the last `seconds`. Thread-safe."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__(seconds)
-        self._uncertain_s: float | None = None
+        self._uncertainty_s: float | None = None
 
     def add_age(
         self, arrived: float, age_s: float | None, size_bytes: int, uncertainty_s: float | None = None
     ) -> None:
-        """A message arrived (s, monotonic) and was so old (s); None is only counted: nobody knows.
+        """Add a message and its latency.
 
-        It may be wrong by `uncertainty_s`, None: by anything. Below 0 the publisher's clock is ahead.
-        Ages from before and after the clocks were compared have nothing to do with each other: when that
-        changes, those from before are forgotten.
+        Latencies from before and after the clocks were compared can't be combined: when `uncertainty_s`
+        changes between None and a number, earlier ones are dropped.
+
+        Args:
+            arrived: Arrival time (s, monotonic).
+            age_s: Latency (s), negative if the publisher's clock is ahead; None only counts the message.
+            size_bytes: Size of the encoded message.
+            uncertainty_s: Error bound of the latency, None if the clocks are not compared.
         """
         if age_s is None:
             with self._lock:
                 self.total += 1
             return
         with self._lock:
-            if (self._uncertain_s is None) != (uncertainty_s is None):
-                self._kept.clear()
-            self._uncertain_s = uncertainty_s
+            if (self._uncertainty_s is None) != (uncertainty_s is None):
+                self._messages.clear()
+            self._uncertainty_s = uncertainty_s
         self.add(arrived, age_s, size_bytes)
 
     def delay(self, now: float) -> Delay | None:
-        """None as long as there is no message whose age is known."""
+        """Return the figures at `now`, or None without a message of known latency."""
         ages = [age for _, age, _ in self._recent(now)]
         if not ages:
             return None
         mean = sum(ages) / len(ages)
         deviation = math.sqrt(sum((age - mean) ** 2 for age in ages) / len(ages))
-        return Delay(mean, min(ages), max(ages), deviation, len(ages), self._uncertain_s)
+        return Delay(mean, min(ages), max(ages), deviation, len(ages), self._uncertainty_s)

@@ -1,4 +1,4 @@
-"""`nep record`: what is published, into a file."""
+"""`nep record`: record published messages to a file."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from nep.text import quotable
 if TYPE_CHECKING:
     from nep.recordings import recorder, writer
     from nep.recordings import split as splits
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     recorder = lazy_module("nep.recordings.recorder")
     splits = lazy_module("nep.recordings.split")
     writer = lazy_module("nep.recordings.writer")
 
-_LOOK_S = 0.2
+_STATUS_PERIOD_S = 0.2
 _SIZE = re.compile(r"(\d{1,15}(?:[.,]\d{1,6})?) ?([kMGT]?)B?", re.IGNORECASE)
 _UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
 
@@ -44,78 +44,81 @@ def record(
             "--output",
             "-o",
             metavar="FILE.mcap",
-            help=_("The file; else one that is named after the time."),
+            help=_("File to write (default: named after the time)."),
             show_default=False,
             dir_okay=False,
         ),
     ] = None,
-    left_out: Annotated[
+    excluded: Annotated[
         list[str] | None,
         typer.Option(
             "--not",
             metavar=_("TOPIC|PATTERN"),
-            help=_("What to leave out; it wins."),
+            help=_("Topics to exclude, even if they match a pattern."),
             show_default=False,
             autocompletion=complete_topic,
         ),
     ] = None,
     note: Annotated[
-        str, typer.Option("--note", metavar=_("TEXT"), help=_("Words about it."), show_default=False)
+        str,
+        typer.Option(
+            "--note", metavar=_("TEXT"), help=_("Note to store in the recording."), show_default=False
+        ),
     ] = "",
     duration_s: Annotated[
         float | None,
-        typer.Option("--duration", metavar=_("SECONDS"), help=_("End after so long."), show_default=False),
+        typer.Option("--duration", metavar=_("SECONDS"), help=_("Stop after this long."), show_default=False),
     ] = None,
     max_size: Annotated[
         str | None,
         typer.Option(
             "--max-size",
             metavar=_("SIZE"),
-            help=_("End with a file of this size, such as 500MB or 2GB; with --split, begin the next one."),
+            help=_("Stop at this file size, such as 500MB or 2GB; with --split, start the next file."),
             show_default=False,
         ),
     ] = None,
     split: Annotated[
         bool,
-        typer.Option("--split", help=_("Go on in another file: NAME-001.mcap, NAME-002.mcap, ...")),
+        typer.Option("--split", help=_("Split into files: NAME-001.mcap, NAME-002.mcap, ...")),
     ] = False,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Record published messages to an MCAP file. Ctrl+C, SIGTERM and SIGHUP end it cleanly.
+    """Record published messages to an MCAP file until Ctrl+C, SIGTERM or SIGHUP.
 
-    Topics that appear later are recorded too. A pattern means all topics that match it: * is any letters
-    between slashes, ? is one letter, ** is any parts or none. Put it into quotes, for the shell has patterns
-    too. The file is MCAP, the format of Foxglove and Lichtblick; how many messages were lost stands in it.
+    Topics that appear later are recorded, too. A pattern stands for all matching topics: * for any characters
+    between slashes, ? for one character, ** for any number of parts. Put it in quotes, because the shell
+    expands patterns, too. Foxglove and Lichtblick can open the file; it includes the number of lost messages.
     """
     if duration_s is not None and not 0.0 < duration_s < 1e9:
         raise typer.BadParameter(
-            _("{given:g} is no time; give seconds, 0 or more").format(given=duration_s),
+            _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=duration_s),
             param_hint="--duration",
         )
-    most_bytes = _most_bytes(max_size, split=split)
+    max_bytes = _max_bytes(max_size, split=split)
     path = output or Path(datetime.now().astimezone().strftime("recording-%Y-%m-%d-%H-%M-%S.mcap"))
-    selection = recorder.TopicSelection(tuple(topics or ()), tuple(left_out or ()))
+    selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     ended = threading.Event()
     with node_for("record", master) as node:
-        node.graph()  # so that a master that is not there is said before a file is made
-        parts = splits.SplitFiles(path, most_bytes) if split and most_bytes is not None else None
+        node.graph()  # fail before creating a file if there is no master
+        parts = splits.SplitFiles(path, max_bytes) if split and max_bytes is not None else None
         file = writer.RecordingWriter(parts or path, note=note, on_problem=lambda _reason: ended.set())
         try:
             with recorder.Recorder(node, file, selection):
                 interrupts.call_first(ended.set)
                 if not as_json:
-                    said = _("recording into '{path}'; Ctrl+C ends it")
+                    said = _("recording to '{path}'; press Ctrl+C to stop")
                     say(said.format(path=path if parts is None else parts.paths[0]))
-                _wait(ended, file, duration_s, None if split else most_bytes)
+                _wait(ended, file, duration_s, None if split else max_bytes)
         finally:
             status = file.close()
-    _tell_end([path] if parts is None else parts.paths, status, as_json=as_json)
+    _show_result([path] if parts is None else parts.paths, status, as_json=as_json)
     if status.problem:
         raise RecordingError(str(path), status.problem)
 
 
-def _tell_end(paths: Sequence[Path], status: writer.RecordingStatus, *, as_json: bool) -> None:
+def _show_result(paths: Sequence[Path], status: writer.RecordingStatus, *, as_json: bool) -> None:
     if as_json:
         show_json(
             {
@@ -129,7 +132,7 @@ def _tell_end(paths: Sequence[Path], status: writer.RecordingStatus, *, as_json:
             }
         )
         return
-    _say_end(paths[0], status)
+    _show_summary(paths[0], status)
     if len(paths) > 1:
         said = ngettext(
             "in {count} file, the last is '{path}'", "in {count} files, the last is '{path}'", len(paths)
@@ -137,8 +140,7 @@ def _tell_end(paths: Sequence[Path], status: writer.RecordingStatus, *, as_json:
         say(said.format(count=len(paths), path=paths[-1]))
 
 
-def _most_bytes(text: str | None, *, split: bool) -> int | None:
-    """The size in bytes; None without one. Raises `typer.BadParameter`."""
+def _max_bytes(text: str | None, *, split: bool) -> int | None:
     if text is None:
         if split:
             raise typer.BadParameter(_("--split needs a size: --max-size 500MB"), param_hint="--split")
@@ -147,7 +149,9 @@ def _most_bytes(text: str | None, *, split: bool) -> int | None:
     size_bytes = round(float(found[1].replace(",", ".")) * _UNITS[found[2].lower()]) if found else 0
     if not splits.MIN_PART_BYTES <= size_bytes < 2**63:
         raise typer.BadParameter(
-            _("'{given}' is no size; give 100kB or more, such as 500MB or 2GB").format(given=quotable(text)),
+            _("'{given}' is not a valid size; use 100kB or more, such as 500MB or 2GB").format(
+                given=quotable(text)
+            ),
             param_hint="--max-size",
         )
     return size_bytes
@@ -157,16 +161,15 @@ def _wait(
     ended: threading.Event,
     file: writer.RecordingWriter,
     duration_s: float | None,
-    most_bytes: int | None,
+    max_bytes: int | None,
 ) -> None:
-    """Until it is to end; how far it is stands on a terminal's last line."""
     out = console(stderr=True)
     until = None if duration_s is None else time.monotonic() + duration_s
 
     def has_ended() -> bool:
-        if most_bytes is not None and file.status.size_bytes >= most_bytes:
+        if max_bytes is not None and file.status.size_bytes >= max_bytes:
             return True
-        left = _LOOK_S if until is None else min(_LOOK_S, until - time.monotonic())
+        left = _STATUS_PERIOD_S if until is None else min(_STATUS_PERIOD_S, until - time.monotonic())
         return left <= 0.0 or ended.wait(left)
 
     if not out.is_terminal:
@@ -180,7 +183,7 @@ def _wait(
 
 def _line(status: writer.RecordingStatus) -> str:
     lost = sum(each.lost or 0 for each in status.topics.values())
-    return _("{time}  {messages} messages, {size}, lost on the way {lost}, lost in writing {unkept}").format(
+    return _("{time}  {messages} messages, {size}, {lost} lost, {unkept} write errors").format(
         time=clock_text(status.duration_s),
         messages=status.message_count,
         size=size(status.size_bytes),
@@ -189,7 +192,7 @@ def _line(status: writer.RecordingStatus) -> str:
     )
 
 
-def _say_end(path: Path, status: writer.RecordingStatus) -> None:
+def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
     topics = ngettext("{count} topic", "{count} topics", len(status.topics))
     said = ngettext(
         "{count} message of {topics} in {time}, {size}: '{path}'",
@@ -209,8 +212,8 @@ def _say_end(path: Path, status: writer.RecordingStatus) -> None:
         missing = (each.lost or 0) + each.unkept
         if missing:
             said = ngettext(
-                "{count} message of '{topic}' is missing: {lost} lost on the way, {unkept} in writing",
-                "{count} messages of '{topic}' are missing: {lost} lost on the way, {unkept} in writing",
+                "'{topic}' lacks {count} message: {lost} lost, {unkept} write errors",
+                "'{topic}' lacks {count} messages: {lost} lost, {unkept} write errors",
                 missing,
             )
             say(said.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))

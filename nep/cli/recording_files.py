@@ -1,4 +1,4 @@
-"""What the commands about recordings share: their arguments, topics of a file, progress, times."""
+"""Shared parts of the recording commands: arguments, topic selection, progress, times."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from nep.text import quotable
 if TYPE_CHECKING:
     from nep.recordings import reader
     from nep.recordings.formats import damage
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     damage = lazy_module("nep.recordings.formats.damage")
     reader = lazy_module("nep.recordings.reader")
 
@@ -42,14 +42,14 @@ __all__ = [
 
 _MAX_COMPARED, _MAX_NAMED = 1_000, 20
 FileArgument = Annotated[
-    Path, typer.Argument(metavar=_("FILE"), help=_("The recording."), show_default=False, dir_okay=False)
+    Path, typer.Argument(metavar=_("FILE"), help=_("Recording file."), show_default=False, dir_okay=False)
 ]
 FromOption = Annotated[
     str | None,
     typer.Option(
         "--from",
         metavar=_("SECONDS|CLOCK"),
-        help=_("So long after its start (0 is its start), or from this time of day on: 15:04:05."),
+        help=_("Begin this long after the start of the recording, or at this time: 15:04:05."),
         show_default=False,
     ),
 ]
@@ -58,7 +58,10 @@ ToOption = Annotated[
     typer.Option(
         "--to",
         metavar=_("SECONDS|CLOCK"),
-        help=_("Up to so long after its start, or to this time: 15:04:05.5, 2026-11-17T14:04:05Z."),
+        help=_(
+            "End this long after the start of the recording, or at this time: 15:04:05.5, "
+            "2026-11-17T14:04:05Z."
+        ),
         show_default=False,
     ),
 ]
@@ -66,7 +69,7 @@ TopicsToRecord = Annotated[
     list[str] | None,
     typer.Argument(
         metavar=_("TOPIC|PATTERN"),
-        help=_("What to record: topics, or patterns such as '/arm/*'; all when none is named."),
+        help=_("Topics to record, or patterns such as '/arm/*' (default: all)."),
         show_default=False,
         autocompletion=complete_topic,
     ),
@@ -74,7 +77,6 @@ TopicsToRecord = Annotated[
 
 
 def _complete_recorded(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Topics of the file that the line names already. Nothing here may print or raise."""
     path = ctx.params.get("file")
     if path is None:
         return []
@@ -97,7 +99,11 @@ RecordedTopicsArgument = Annotated[
 
 
 def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
-    """The topics that words mean, in their order. Raises `typer.BadParameter` for one that there is not."""
+    """Return the topics that names and patterns select, in their order.
+
+    Raises:
+        typer.BadParameter: A word matches no topic.
+    """
     chosen: dict[str, None] = {}
     for word in words:
         found = [name for name in recording.topics if glob_matches(word, name)]
@@ -117,7 +123,7 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
 
 
 def end_with_damage(recording: reader.Recording) -> None:
-    """Say what of the file could not be read so far, and leave with 1; nothing for a whole one."""
+    """Report damage found in the file and exit with 1; do nothing for an intact file."""
     words = damage.damage_words(recording.damage, recording.start_ns)
     if words:
         say(words)
@@ -127,21 +133,27 @@ def end_with_damage(recording: reader.Recording) -> None:
 def span_ns(
     recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
-    """Times in ns since 1970 of a part of a recording; see `time_ns`. Raises `typer.BadParameter`."""
+    """Return begin and end of a part of a recording in ns since 1970; see `time_ns`.
+
+    Raises:
+        typer.BadParameter: A time is invalid, or the part is empty.
+    """
     first = None if begin is None else time_ns(str(begin), recording.start_ns, recording.end_ns)
     last = None if end is None else time_ns(str(end), recording.start_ns, recording.end_ns)
     if first is not None and last is not None and first >= last:
-        raise typer.BadParameter(_("the part ends before it begins"))
+        raise typer.BadParameter(_("--to must be later than --from"))
     return first, last
 
 
 def time_ns(text: str, start_ns: int, end_ns: int) -> int:
-    """A time that a person writes, in ns since 1970, of a recording between two such times.
+    """Parse a time within a recording; return ns since 1970.
 
-    Seconds after its start ("12.5"), a time of day ("15:04:05", "15:04:05.250", "15:04:05Z") or that of a
-    date ("2026-11-17T15:04:05"): of this computer's clock, of UTC with a "Z", of another with "+02:00". A
-    time of day before the start means the next day when the recording goes on until then. Raises
-    `typer.BadParameter`.
+    Accepts seconds after the start ("12.5"), a time of day ("15:04:05", "15:04:05.250", "15:04:05Z") or a
+    date and time ("2026-11-17T15:04:05"); local time unless it ends with "Z" or an offset such as "+02:00". A
+    time of day before the start means the next day if the recording lasts until then.
+
+    Raises:
+        typer.BadParameter: The time is invalid.
     """
     words = text.strip()
     try:
@@ -149,7 +161,9 @@ def time_ns(text: str, start_ns: int, end_ns: int) -> int:
     except ValueError:
         return _clock_ns(words, start_ns, end_ns)
     if not 0.0 <= seconds < 1e9:
-        raise typer.BadParameter(_("{given:g} is no time; give seconds, 0 or more").format(given=seconds))
+        raise typer.BadParameter(
+            _("{given:g} is not a valid duration; use seconds, 0 or more").format(given=seconds)
+        )
     return start_ns + int(seconds * 1e9)
 
 
@@ -160,25 +174,25 @@ def _clock_ns(words: str, start_ns: int, end_ns: int) -> int:
             given = time.fromisoformat(iso)
         except ValueError:
             return _since_1970(datetime.fromisoformat(iso))
-        began = datetime.fromtimestamp(start_ns / 1e9, given.tzinfo)  # without one: of this computer
+        began = datetime.fromtimestamp(start_ns / 1e9, given.tzinfo)  # local time without a time zone
         found = _since_1970(datetime.combine(began.date(), given))
         later = _since_1970(datetime.combine(began.date() + timedelta(days=1), given))
     except (ValueError, OverflowError, OSError) as error:
         raise typer.BadParameter(
-            _("'{given}' is no time; give seconds after the start, or a clock time such as 15:04:05").format(
-                given=quotable(words)
-            )
+            _(
+                "'{given}' is not a valid time; use seconds after the start, or a time such as 15:04:05"
+            ).format(given=quotable(words))
         ) from error
     return later if found < start_ns and later <= end_ns else found
 
 
 def _since_1970(at: datetime) -> int:
-    """In ns; without a time zone by the clock of this computer. Raises as `datetime.timestamp` does."""
+    # In ns; local time without a time zone. Raises as `datetime.timestamp` does.
     return int(at.replace(microsecond=0).timestamp()) * 1_000_000_000 + at.microsecond * 1000
 
 
 def clock_text(seconds: float) -> str:
-    """A time within a recording: "12:41", "1:02:03"."""
+    """Format a duration as "12:41" or "1:02:03"."""
     whole = int(seconds)
     hours, rest = divmod(whole, 3600)
     minutes, secs = divmod(rest, 60)
@@ -187,7 +201,7 @@ def clock_text(seconds: float) -> str:
 
 @contextmanager
 def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
-    """A bar on the error stream of a terminal; nothing in a file. Gives what is told (done, total)."""
+    """Show a progress bar on stderr if it is a terminal; yield a callback (done, total)."""
     out = console(stderr=True)
     if not out.is_terminal:
         yield lambda _done, _total: None
@@ -197,7 +211,7 @@ def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
     with Progress(console=out, transient=True) as progress:
         task = progress.add_task(said, total=None)
 
-        def told(done: int, total: int) -> None:
+        def on_progress(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total)
 
-        yield told
+        yield on_progress

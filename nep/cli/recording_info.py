@@ -1,4 +1,4 @@
-"""`nep recording info`: what is in a recording, and what is missing in it."""
+"""`nep recording info`: show the content of a recording and its damage."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from nep.text import escaped, quotable
 if TYPE_CHECKING:
     from nep.recordings import file_reader, reader
     from nep.recordings.formats import figures
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     file_reader = lazy_module("nep.recordings.file_reader")
     reader = lazy_module("nep.recordings.reader")
 
 _MAX_ROWS = 1_000
 _MAX_VALUES = 20
-_CHECKED_BYTES = 1_000_000_000
-_SHOWN_OTHERWISE = frozenset({"nep.recording", "nep.figures"})
+_MAX_CHECKED_BYTES = 1_000_000_000
+_OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
 _COLUMNS = (
     TextColumn(lazy("topic"), style="bold", is_whole=True),
     TextColumn(lazy("type")),
@@ -37,7 +37,7 @@ _COLUMNS = (
     TextColumn(lazy("lost"), "right"),
     TextColumn(lazy("late"), "right"),
     TextColumn(lazy("unreadable"), "right"),
-    TextColumn(lazy("lost in writing"), "right"),
+    TextColumn(lazy("write errors"), "right"),
 )
 _ATTACHMENT_COLUMNS = (
     TextColumn(lazy("attachment"), is_whole=True),
@@ -49,36 +49,36 @@ _ATTACHMENT_COLUMNS = (
 def info(
     file: FileArgument,
     check_all: Annotated[
-        bool, typer.Option("--check", help=_("Read all of a large file, too, to find what is damaged."))
+        bool, typer.Option("--check", help=_("Check the whole file for damage, however large it is."))
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell what is in a recording, and what is missing in it.
+    """Show the content of a recording: topics, message counts, losses and damage.
 
-    Up to 1 GB of messages is read to find damage. The exit code is 1 when a piece is damaged.
+    The first GB of messages is checked for damage. Exits with 1 if the file is damaged.
     """
     opened = file_reader.FileReader(file)
     with reader.Recording(file, file=opened) as recording:
-        told = recording.figures()
+        topic_figures = recording.figures()
         with progress_bar(_("checking")) as progress:
-            is_checked = opened.check(progress, None if check_all else _CHECKED_BYTES)
+            is_checked = opened.check(progress, None if check_all else _MAX_CHECKED_BYTES)
         if as_json:
-            show_json(_plain(recording, told))
+            show_json(_plain(recording, topic_figures))
         else:
-            _show(recording, told)
+            _show(recording, topic_figures)
             if not is_checked:
                 words = _("only the first gigabyte was checked for damage; --check reads all of it")
                 say(words)
         if not recording.is_complete:
             said = _(
-                "the file was cut off or not closed, and is read as far as it is whole; "
-                "to close it: nep recording repair {file}"
+                "the file is incomplete: it was truncated or not closed. Readable messages are "
+                "shown; to repair it: nep recording repair {file}"
             )
             say(said.format(file=file))
         end_with_damage(recording)
 
 
-def _show(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]) -> None:
+def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.TopicFigures]) -> None:
     head = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
@@ -93,7 +93,7 @@ def _show(recording: reader.Recording, told: Mapping[str, figures.TopicFigures])
         write(_("file {number} of a recording that was split").format(number=part) + "\n")
     write(f"{_written_by(recording.facts)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
-    show_table(_COLUMNS, [_row(recording, each, told.get(each.name)) for each in topics])
+    show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])
     left_out = len(recording.topics) - len(topics)
     if left_out:
         said = ngettext(
@@ -113,7 +113,6 @@ def _show(recording: reader.Recording, told: Mapping[str, figures.TopicFigures])
 
 
 def _written_by(facts: file_reader.FileFacts) -> str:
-    """Program, profile and compression in one line."""
     kinds = []
     for name, count in sorted(facts.compressions.items()):
         if name == "-":
@@ -130,7 +129,7 @@ def _written_by(facts: file_reader.FileFacts) -> str:
 
 
 def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
-    shown = [each for each in facts.metadata if each[0] not in _SHOWN_OTHERWISE]
+    shown = [each for each in facts.metadata if each[0] not in _OWN_METADATA]
     for name, values in shown[:_MAX_VALUES]:
         pairs = [f"{quotable(key)}: {quotable(value)}" for key, value in islice(values.items(), _MAX_VALUES)]
         more = "; …" if len(values) > _MAX_VALUES else ""
@@ -146,16 +145,15 @@ def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
 
 
 def _day_text(at_ns: int) -> str:
-    """A time as the computer's clock shows it; of recordings without messages there is none."""
     try:
         day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
-    except (OSError, OverflowError, ValueError):  # what another program wrote, and no calendar has
+    except (OSError, OverflowError, ValueError):  # out of range: written by another program
         day = None
     return UNKNOWN if day is None else day.strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _row(
-    recording: reader.Recording, topic: reader.RecordedTopic, told: figures.TopicFigures | None
+    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: figures.TopicFigures | None
 ) -> tuple[str, ...]:
     duration = recording.duration_s
     return (
@@ -165,14 +163,16 @@ def _row(
         quotable(topic.schema_encoding) or UNKNOWN,
         str(topic.message_count),
         rate(topic.message_count / duration) if duration > 0 else UNKNOWN,
-        UNKNOWN if told is None or told.lost is None else str(told.lost),
-        UNKNOWN if told is None else str(told.late),
-        UNKNOWN if told is None else str(told.undecodable),
-        UNKNOWN if told is None else str(told.unkept),
+        UNKNOWN if topic_figures is None or topic_figures.lost is None else str(topic_figures.lost),
+        UNKNOWN if topic_figures is None else str(topic_figures.late),
+        UNKNOWN if topic_figures is None else str(topic_figures.undecodable),
+        UNKNOWN if topic_figures is None else str(topic_figures.unkept),
     )
 
 
-def _plain(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]) -> dict[str, object]:
+def _plain(
+    recording: reader.Recording, topic_figures: Mapping[str, figures.TopicFigures]
+) -> dict[str, object]:
     facts = recording.facts
     return {
         "path": str(recording.path),
@@ -191,7 +191,7 @@ def _plain(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]
         "metadata": [
             {"name": name, "values": dict(values)}
             for name, values in facts.metadata
-            if name not in _SHOWN_OTHERWISE
+            if name not in _OWN_METADATA
         ],
         "damage": [
             {
@@ -210,7 +210,7 @@ def _plain(recording: reader.Recording, told: Mapping[str, figures.TopicFigures]
                 "encoding": each.encoding,
                 "schema_encoding": each.schema_encoding,
                 "message_count": each.message_count,
-                "figures": told[each.name].to_plain() if each.name in told else None,
+                "figures": topic_figures[each.name].to_plain() if each.name in topic_figures else None,
             }
             for each in recording.topics.values()
         },

@@ -1,4 +1,4 @@
-"""`nep recording`: what is in a recording, mend it, make other files of it."""
+"""`nep recording`: inspect, repair and export recordings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from nep.recordings import reader
     from nep.recordings import repair as repairs
     from nep.recordings.formats import damage
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     exports = lazy_module("nep.recordings.export")
     damage = lazy_module("nep.recordings.formats.damage")
     reader = lazy_module("nep.recordings.reader")
@@ -39,7 +39,7 @@ else:  # the other commands need not wait for it, nor have what it needs
 app: typer.Typer = typer.Typer(
     cls=TranslatedGroup,
     no_args_is_help=True,
-    help=_("What was recorded: look into it, mend it, make other files of it."),
+    help=_("Inspect, repair and export recordings; keep the last seconds."),
 )
 app.command("info")(recording_info.info)
 app.command("ring")(ring.ring)
@@ -55,18 +55,18 @@ def repair(
             "--output",
             "-o",
             metavar="FILE.mcap",
-            help=_("The new file; else one beside it."),
+            help=_("File to write (default: next to the recording)."),
             show_default=False,
             dir_okay=False,
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write what is whole of a cut or damaged recording into a new file, and read that back.
+    """Copy the readable messages of a truncated or damaged recording to a new file and verify it.
 
-    The damaged file stays as it is.
+    The damaged file is not changed.
     """
-    with progress_bar(_("mending")) as progress:
+    with progress_bar(_("repairing")) as progress:
         report = repairs.repair(file, output, progress)
     if as_json:
         show_json(
@@ -82,8 +82,8 @@ def repair(
         )
         return
     said = ngettext(
-        "{count} message recovered, {time}, and read back: '{path}'",
-        "{count} messages recovered, {time}, and read back: '{path}'",
+        "recovered and verified {count} message, {time}: '{path}'",
+        "recovered and verified {count} messages, {time}: '{path}'",
         report.recovered,
     )
     say(said.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path))
@@ -111,32 +111,38 @@ def export(
             "--format",
             "-f",
             metavar="csv|parquet|pictures|mp4|mcap",
-            help=_("Tables of values, pictures as files or as a film, or a smaller recording."),
+            help=_("Output format: tables of values, image files, a video, or a smaller recording."),
             autocompletion=_complete_format,
         ),
     ] = "csv",
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar=_("FOLDER"), help=_("Where to; else beside it."), show_default=False
+            "--output",
+            "-o",
+            metavar=_("FOLDER"),
+            help=_("Folder to write to (default: next to the recording)."),
+            show_default=False,
         ),
     ] = None,
     from_s: FromOption = None,
     to_s: ToOption = None,
-    fps: Annotated[float, typer.Option("--fps", metavar="HZ", help=_("Pictures a second of a film."))] = 30.0,
+    fps: Annotated[
+        float, typer.Option("--fps", metavar="HZ", help=_("Frames per second of a video."))
+    ] = 30.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Make tables (CSV, Parquet) of a recording's values, films of its pictures, or a part of it."""
+    """Export a recording as tables (CSV, Parquet), images, videos, or a smaller recording."""
     if kind not in exports.FORMATS:
-        raise typer.BadParameter(_("no format '{kind}'").format(kind=kind), param_hint="--format")
+        raise typer.BadParameter(_("unknown format '{kind}'").format(kind=kind), param_hint="--format")
     if not 0.1 <= fps <= 240:
-        raise typer.BadParameter(_("a film has 0.1 to 240 pictures a second"), param_hint="--fps")
+        raise typer.BadParameter(_("the frame rate of a video must be 0.1 to 240"), param_hint="--fps")
     with reader.Recording(file) as recording:
         chosen = chosen_topics(recording, topics) if topics else None
         part = exports.Part(*span_ns(recording, from_s, to_s), chosen)
         folder = output or file.with_name(file.stem)
         with progress_bar(_("exporting")) as progress:
-            made = exports.export(recording, kind, folder, part, fps=fps, progress=progress)
+            exported = exports.export(recording, kind, folder, part, fps=fps, progress=progress)
         words = damage.damage_words(recording.damage, recording.start_ns)
     if as_json:
         show_json(
@@ -147,24 +153,24 @@ def export(
                     "count": each.count,
                     "unreadable": each.unreadable,
                 }
-                for each in made
+                for each in exported
             ]
         )
     else:
-        _say_exported(made)
+        _say_exported(exported)
     if words:
         say(words)
         raise typer.Exit(1)
 
 
-def _say_exported(made: Sequence[exports.Exported]) -> None:
-    for each in made:
+def _say_exported(exported: Sequence[exports.Exported]) -> None:
+    for each in exported:
         said = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
         say(said.format(count=each.count, path=each.path))
         if each.unreadable:
             words = ngettext(
-                "{count} message could not be read and left out",
-                "{count} messages could not be read and left out",
+                "skipped {count} undecodable message",
+                "skipped {count} undecodable messages",
                 each.unreadable,
             )
             say(words.format(count=each.unreadable))

@@ -1,4 +1,4 @@
-"""`nep recording ring` and `keep`: the last seconds of what is published, and a file of them when told."""
+"""`nep recording ring` and `keep`: buffer the last seconds of messages, and save them on request."""
 
 from __future__ import annotations
 
@@ -28,45 +28,44 @@ from nep.system.lazy_import import lazy_module
 if TYPE_CHECKING:
     from nep.recordings import recorder
     from nep.recordings import ring as rings
-else:  # the other commands need not wait for it, nor have what it needs
+else:  # imported on use: other commands stay fast and need no extra packages
     recorder = lazy_module("nep.recordings.recorder")
     rings = lazy_module("nep.recordings.ring")
 
-_LOOK_S = 0.2
-KEEP_S = 120.0
-"""So long may it take to copy what is there: some GB on a slow disk."""
+_STATUS_PERIOD_S = 0.2
+SAVE_TIMEOUT_S = 120.0
+"""Timeout of a save: copying some GB takes long on a slow disk."""
 _FOLDER = ".nep-ring"
-_END, _KEEP = "end", "keep"
+_STOP, _KEEP = "end", "keep"
 _NAME = "flight_recorder"
 KEEP_SERVICE = f"{_NAME}/keep"
-"""Keeps the last seconds, where nobody has given the ring another name."""
+"""Service that saves the last seconds, for a flight recorder with the default name."""
 NameOption = Annotated[
     str,
-    typer.Option("--name", metavar=_("NAME"), help=_("Its name, where several are on.")),
+    typer.Option("--name", metavar=_("NAME"), help=_("Name of the flight recorder, if several are running.")),
 ]
 
 
-class _Keeper:
-    """Makes files of a ring, one at a time, in whichever thread asks."""
+class _Saver:
+    """Saver of a ring's content, one file at a time. Thread-safe."""
 
     def __init__(self, ring: rings.FlightRecorder, folder: Path, seconds: float, *, as_json: bool) -> None:
         self._ring, self._folder, self._seconds, self._as_json = ring, folder, seconds, as_json
         self._lock = threading.Lock()
 
     def answer(self, request: object) -> dict[str, object]:
-        """The service: {"seconds": 30, "note": "it fell"}, both may be missing. Raises `NepError`."""
-        asked = request if isinstance(request, dict) else {}
-        seconds, note = asked.get("seconds", self._seconds), asked.get("note", "")
+        # The request is {"seconds": 30, "note": "it fell"}; both keys are optional. Raises `NepError`.
+        request_body = request if isinstance(request, dict) else {}
+        seconds, note = request_body.get("seconds", self._seconds), request_body.get("note", "")
         is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
         if not is_number or not isinstance(note, str):
-            raise NepError(_('what is asked is a map such as {"seconds": 30, "note": "it fell"}'))
+            raise NepError(_('the request must be a JSON object such as {"seconds": 30, "note": "it fell"}'))
         return self.keep(float(seconds), note)
 
     def keep(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
-        """Make a file of the last seconds that are there, and tell of it. Raises `NepError`."""
         wanted = self._seconds if seconds is None else seconds
         if not 0.0 < wanted < 1e9:
-            raise NepError(_("{given:g} is no time; give seconds, more than 0").format(given=wanted))
+            raise NepError(_("{given:g} is not a valid duration; use seconds above 0").format(given=wanted))
         with self._lock:
             kept = self._ring.keep(self._free_path(), min(wanted, self._seconds), note)
         told: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
@@ -74,8 +73,8 @@ class _Keeper:
             show_json(told)
         else:
             words = ngettext(
-                "kept {count} message of the last {time}: '{path}'",
-                "kept {count} messages of the last {time}: '{path}'",
+                "saved {count} message of the last {time}: '{path}'",
+                "saved {count} messages of the last {time}: '{path}'",
                 kept.message_count,
             )
             time = clock_text(kept.duration_s)
@@ -93,23 +92,21 @@ class _Keeper:
 def ring(
     topics: TopicsToRecord = None,
     seconds: Annotated[
-        float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("How much of the past is there."))
+        float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("Length of the buffer."))
     ] = 60.0,
-    size_gb: Annotated[
-        float, typer.Option("--size", metavar="GB", help=_("How much of the disk it takes at most."))
-    ] = 2.0,
+    size_gb: Annotated[float, typer.Option("--size", metavar="GB", help=_("Maximum size on disk."))] = 2.0,
     folder: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar=_("FOLDER"), help=_("Where what is kept goes."), file_okay=False
+            "--output", "-o", metavar=_("FOLDER"), help=_("Folder for saved recordings."), file_okay=False
         ),
     ] = Path(),
-    left_out: Annotated[
+    excluded: Annotated[
         list[str] | None,
         typer.Option(
             "--not",
             metavar=_("TOPIC|PATTERN"),
-            help=_("What to leave out; it wins."),
+            help=_("Topics to exclude, even if they match a pattern."),
             show_default=False,
             autocompletion=complete_topic,
         ),
@@ -118,65 +115,65 @@ def ring(
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Keep the last seconds of what is published, until Ctrl+C: a flight recorder.
+    """Run a flight recorder: buffer the last seconds of messages until Ctrl+C.
 
-    'nep recording keep', a call of the service flight_recorder/keep, from an alarm say, or the signal USR1
-    makes a recording of them; meanwhile it goes on.
+    'nep recording keep', a call of the service flight_recorder/keep (for example by an alarm) or the signal
+    USR1 saves them as a recording, while buffering continues.
     """
     for given, least, most, hint in ((seconds, 0.1, 1e6, "--seconds"), (size_gb, 0.001, 1e6, "--size")):
         if not least <= given <= most:
-            said = _("{given:g} can't be; give {least:g} to {most:g}")
+            said = _("{given:g} is out of range; use {least:g} to {most:g}")
             raise typer.BadParameter(said.format(given=given, least=least, most=most), param_hint=hint)
-    selection = recorder.TopicSelection(tuple(topics or ()), tuple(left_out or ()))
-    orders: queue.SimpleQueue[str] = queue.SimpleQueue()
+    selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
+    commands: queue.SimpleQueue[str] = queue.SimpleQueue()
     with node_for("ring", master) as node:
-        node.graph()  # so that a master that is not there is said before anything is written
+        node.graph()  # fail before writing anything if there is no master
         place = folder / _FOLDER
         with rings.FlightRecorder(
-            place, seconds=seconds, size_bytes=round(size_gb * 1e9), on_problem=lambda _why: orders.put(_END)
+            place,
+            seconds=seconds,
+            size_bytes=round(size_gb * 1e9),
+            on_problem=lambda _why: commands.put(_STOP),
         ) as kept:
-            keeper = _Keeper(kept, folder, seconds, as_json=as_json)
+            keeper = _Saver(kept, folder, seconds, as_json=as_json)
             with (
                 recorder.Recorder(node, kept, selection),
                 node.new_server(f"{name}/keep", keeper.answer, threads=1),
             ):
-                interrupts.call_first(lambda: orders.put(_END))
-                _keep_on_signal(orders)
+                interrupts.call_first(lambda: commands.put(_STOP))
+                _save_on_signal(commands)
                 if not as_json:
                     said = _(
-                        "keeping the last {seconds:g} s; 'nep recording keep' makes a file, Ctrl+C ends it"
+                        "buffering the last {seconds:g} s; 'nep recording keep' saves them, Ctrl+C stops"
                     )
                     say(said.format(seconds=seconds))
-                _carry_out(orders, keeper, kept)
+                _run_commands(commands, keeper, kept)
             problem = kept.status.problem
-        with suppress(OSError):  # another one is on in the same folder
+        with suppress(OSError):  # another flight recorder uses the same folder
             place.rmdir()
     if problem:
         raise RecordingError(str(folder), problem)
 
 
-def _keep_on_signal(orders: queue.SimpleQueue[str]) -> None:
-    """Where there are such signals."""
-
+def _save_on_signal(commands: queue.SimpleQueue[str]) -> None:
     def handle(_signal: int, _frame: FrameType | None) -> None:
-        orders.put(_KEEP)
+        commands.put(_KEEP)
 
     if hasattr(signal, "SIGUSR1"):
-        with suppress(ValueError):  # only the main thread may
+        with suppress(ValueError):  # signal handlers can be set in the main thread only
             signal.signal(signal.SIGUSR1, handle)
 
 
-def _carry_out(orders: queue.SimpleQueue[str], keeper: _Keeper, kept: rings.FlightRecorder) -> None:
-    """Until it is to end; what is there to be kept stands on a terminal's last line."""
+def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.FlightRecorder) -> None:
     out = console(stderr=True)
 
-    def next_order() -> str:
+    def next_command() -> str:
         with suppress(queue.Empty):
-            return orders.get(timeout=_LOOK_S)
+            return commands.get(timeout=_STATUS_PERIOD_S)
         return ""
 
     with out.status("") if out.is_terminal else nullcontext() as shown:
-        while (order := next_order()) != _END:
+        while (order := next_command()) != _STOP:
             if order == _KEEP:
                 try:
                     keeper.keep()
@@ -184,40 +181,47 @@ def _carry_out(orders: queue.SimpleQueue[str], keeper: _Keeper, kept: rings.Flig
                     say(str(error))
             if shown is not None:
                 status = kept.status
-                words = _("{time} there, {size}")
+                words = _("{time} buffered, {size}")
                 shown.update(words.format(time=clock_text(status.seconds), size=size(status.size_bytes)))
 
 
 def has_ring(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
-    """Whether anybody can keep the last seconds: who asks nobody would wait for long."""
+    """Return whether a flight recorder is running; calling a missing service would wait for its timeout."""
     known = graph.services.get(service)
     return known is not None and bool(known.servers)
 
 
 def keep(
     note: Annotated[
-        str, typer.Option("--note", metavar=_("TEXT"), help=_("Words about it."), show_default=False)
+        str,
+        typer.Option(
+            "--note", metavar=_("TEXT"), help=_("Note to store in the recording."), show_default=False
+        ),
     ] = "",
     seconds: Annotated[
         float | None,
         typer.Option(
-            "--seconds", "-s", metavar=_("SECONDS"), help=_("Only the last of them."), show_default=False
+            "--seconds",
+            "-s",
+            metavar=_("SECONDS"),
+            help=_("Save only the last seconds of the buffer."),
+            show_default=False,
         ),
     ] = None,
     name: NameOption = _NAME,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell 'nep recording ring' to make a recording of the last seconds; it may be on another computer."""
-    asked: dict[str, object] = {"note": note}
+    """Make 'nep recording ring' save the last seconds as a recording, also on another computer."""
+    request_body: dict[str, object] = {"note": note}
     if seconds is not None:
-        asked["seconds"] = seconds
+        request_body["seconds"] = seconds
     with node_for("keep", master) as node:
         if not has_ring(node.graph(), f"{name}/keep"):
-            raise NepError(_("no 'nep recording ring' is on, so there is nothing to keep"))
-        answer = node.new_client(f"{name}/keep", timeout_s=KEEP_S).call(asked)
+            raise NepError(_("nothing to save: 'nep recording ring' is not running"))
+        answer = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
     told = answer if isinstance(answer, dict) else {}
     if as_json:
         show_json(told)
     else:
-        say(_("kept in '{path}'").format(path=told.get("path", "")))
+        say(_("saved to '{path}'").format(path=told.get("path", "")))

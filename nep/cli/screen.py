@@ -1,4 +1,4 @@
-"""How the command line looks: tables for people, lines of JSON for programs, sentences for errors."""
+"""Output of the command line: tables for people, JSON lines for programs, sentences for errors."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from nep.protocol.graph_view import Alert, TopicInfo
     from nep.system.terminal import Terminal
 
-_GAP = 3
-_NARROWEST = 6
-_LONG = 200
-"""A table of more rows is laid out without rich."""
-_ENDLESS = 10_000
+_COLUMN_GAP = 3
+_MIN_COLUMN_WIDTH = 6
+_MAX_RICH_ROWS = 200
+"""Tables with more rows are laid out without rich, which is slow."""
+_UNLIMITED_WIDTH = 10_000
 UNKNOWN = "\N{EN DASH}"
-"""What stands where nothing is known."""
+"""Placeholder for unknown values."""
 
 
 @dataclass(frozen=True)
 class TextColumn:
-    """One column of a table: its head, its side, and how it is coloured."""
+    """Column of a table: heading, alignment and style."""
 
     head: str
     justify: Literal["left", "right"] = "left"
     style: str = ""
     is_whole: bool = False
-    """Never folded, however narrow the terminal: others give way. Numbers never are."""
+    """True if other columns are folded first on a narrow terminal. Numbers are never folded."""
 
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
-    """A console for coloured text, on `out` if it is given; rich is loaded when the first one is made."""
+    """Return a console for coloured text, on `out` if given. Rich is imported on the first call."""
     made = _console_class()
     return made(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
 
@@ -54,16 +54,16 @@ def _console_class() -> type[Console]:
     from rich.console import Console  # noqa: PLC0415 - 40 ms that `--json` and `--help` need not wait for
 
     class OpenConsole(Console):
-        """Tells of a reader that has left as every stream does."""
+        """Console that raises `BrokenPipeError` for a closed pipe, as plain streams do."""
 
         def on_broken_pipe(self) -> None:
-            raise BrokenPipeError(errno.EPIPE, _("nobody reads the output any more"))
+            raise BrokenPipeError(errno.EPIPE, _("the output was closed"))
 
     return OpenConsole
 
 
 def json_painter() -> Callable[[str, str], Text]:
-    """A function that colours a message: its head dim, its body as JSON."""
+    """Return a function that colours a message: a dim head and a JSON body."""
     from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
     from rich.text import Text  # noqa: PLC0415
 
@@ -78,16 +78,16 @@ def json_painter() -> Callable[[str, str], Text]:
 
 
 def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
-    """A table on the standard output."""
+    """Print a table to stdout, folded to the width of a terminal."""
     columns = [replace(column, head=_(column.head)) for column in columns]
-    is_terminal = sys.stdout.isatty()  # else a file or a program: nothing to fold for
-    room = shutil.get_terminal_size().columns if is_terminal else _ENDLESS
+    is_terminal = sys.stdout.isatty()  # files and pipes have no width
+    room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
     widths = _widths(columns, lines, room)
     if _total(widths) > room:
         write("".join(_blocks(columns, lines)))
         return
-    if len(lines) > _LONG and _fit(lines, widths):
+    if len(lines) > _MAX_RICH_ROWS and _fit(lines, widths):
         sys.stdout.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
         return
     from rich import box  # noqa: PLC0415 - see `console`
@@ -108,7 +108,7 @@ def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
 
 
 def cells(text: str) -> int:
-    """How many cells of a terminal a line takes: two for letters of the East and emoji, none for accents."""
+    """Return the display width of a line in terminal cells: wide characters take two, accents none."""
     if text.isascii():
         return len(text)
     from rich.cells import cell_len  # noqa: PLC0415 - see `console`
@@ -117,18 +117,16 @@ def cells(text: str) -> int:
 
 
 def padded(text: str, width: int, justify: Literal["left", "right"] = "left") -> str:
-    """The text with spaces, so that it takes `width` cells."""
+    """Pad a text with spaces to `width` cells."""
     room = " " * (width - cells(text))
     return text + room if justify == "left" else room + text
 
 
 def _total(widths: Sequence[int]) -> int:
-    """How wide a table of these columns is."""
-    return sum(widths) + _GAP * (len(widths) - 1)
+    return sum(widths) + _COLUMN_GAP * (len(widths) - 1)
 
 
 def _blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """The rows one below the other, for a terminal too narrow for a table; what is not known is left out."""
     for row in rows:
         yield f"{row[0]}\n"
         for column, cell in zip(columns[1:], row[1:], strict=True):
@@ -147,8 +145,7 @@ def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
 def _laid_out(
     columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], widths: Sequence[int]
 ) -> Iterator[str]:
-    """The lines of a long table that needs no folding; rich takes a millisecond for each."""
-    gap = " " * _GAP
+    gap = " " * _COLUMN_GAP
 
     def line(texts: Iterable[str]) -> str:
         return gap.join(
@@ -162,15 +159,14 @@ def _laid_out(
 
 
 def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: int) -> list[int]:
-    """How wide each column may be: what it needs, or less where others than whole ones have to give way."""
     widths = [
         max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
         for at, column in enumerate(columns)
     ]
     kept = [column.is_whole or column.justify == "right" for column in columns]
     while _total(widths) > room:
-        giving = [at for at, width in enumerate(widths) if width > _NARROWEST and not kept[at]]
-        giving = giving or [at for at, width in enumerate(widths) if width > _NARROWEST]
+        giving = [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not kept[at]]
+        giving = giving or [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
         if not giving:
             break
         widths[max(giving, key=lambda at: widths[at])] -= 1
@@ -178,36 +174,36 @@ def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: 
 
 
 def show_alerts(alerts: Iterable[Alert], out: Terminal | None = None) -> None:
-    """What is wrong at present, under a table."""
+    """Print alerts with their hints to stderr."""
     from rich.text import Text  # noqa: PLC0415 - see `console`
 
     for alert in alerts:
         text = Text.assemble(("! ", "yellow bold"), (escaped(alert.sentence), "yellow"))
         if alert.hint:
             text.append(f"\n  {escaped(alert.hint)}", style="dim")
-        with suppress(OSError):  # nobody reads it
+        with suppress(OSError):  # a closed stream is not an error
             console(stderr=True, out=out).print(text)
 
 
 def say(sentence: str, out: Terminal | None = None) -> None:
-    """A sentence beside the results, on the standard error stream or `out`."""
-    with suppress(OSError):  # nobody reads it
+    """Print a status sentence to stderr or `out`."""
+    with suppress(OSError):  # a closed stream is not an error
         console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
 
 
 def say_error(sentence: str) -> None:
-    """What went wrong, on the standard error stream."""
-    tell(f"nep: {escaped(sentence, lines=True)}")  # no rich: it is shown at once and programs can read it
+    """Print an error to stderr."""
+    tell(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
 
 
 def write(text: str) -> None:
-    """Text on the standard output, at once."""
+    """Write text to stdout and flush."""
     sys.stdout.write(text)
     sys.stdout.flush()
 
 
 def show_json(value: object) -> None:
-    """One JSON text on one line, at once: UTF-8, whatever the terminal has."""
+    """Write a value as one line of JSON in UTF-8, whatever the terminal's encoding, and flush."""
     data = json_of(value) + b"\n"
     sys.stdout.flush()
     sys.stdout.buffer.write(data)
@@ -215,14 +211,14 @@ def show_json(value: object) -> None:
 
 
 def rate(value_hz: float | None) -> str:
-    """Messages a second."""
+    """Format a message rate."""
     if value_hz is None:
         return UNKNOWN
     return f"{value_hz:.0f} /s" if value_hz >= 100 else f"{value_hz:.1f} /s"
 
 
 def size(value: float | None, per: str = "") -> str:
-    """Bytes with a unit that leaves at most four digits; `per` such as "/s" follows it."""
+    """Format a number of bytes with a unit, followed by `per`, such as "/s"."""
     if value is None:
         return UNKNOWN
     for unit in ("B", "kB", "MB"):
@@ -234,14 +230,14 @@ def size(value: float | None, per: str = "") -> str:
 
 
 def bandwidth(topic: TopicInfo) -> str:
-    """Bytes a second; messages that nobody subscribes are not encoded, so their size is unknown."""
+    """Format a topic's bandwidth; unknown without subscribers, because messages are not encoded then."""
     if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
         return _("not subscribed")
     return size(topic.bandwidth_Bps, "/s")
 
 
 def duration(seconds: float) -> str:
-    """How long, in the unit that a person would say."""
+    """Format a duration in the largest fitting unit."""
     if seconds < 60:
         return f"{max(seconds, 0):.0f} s"
     if seconds < 3600:

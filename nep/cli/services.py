@@ -1,4 +1,4 @@
-"""`nep service`: who serves and who calls, and calling by hand."""
+"""`nep service`: list, inspect and call services."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _COLUMNS = (
 )
 _INFO_COLUMNS = (
     TextColumn(lazy("node"), style="bold", is_whole=True),
-    TextColumn(lazy("what it does")),
+    TextColumn(lazy("role")),
     TextColumn(lazy("answered"), "right"),
     TextColumn(lazy("errors"), "right"),
     TextColumn(lazy("size"), "right"),
@@ -68,7 +68,7 @@ def list_services(
     if services:
         show_table(_COLUMNS, [_row(graph, each) for each in services])
     else:
-        say(_("no services yet; they appear as soon as a program makes a server or a client"))
+        say(_("no services; start a program that has a server or a client"))
     show_alerts(each for each in graph.alerts if each.id.startswith("service:"))
 
 
@@ -149,7 +149,7 @@ def call(
         str,
         typer.Argument(
             metavar="JSON",
-            help=_("Request as JSON (default: an empty map); @FILE reads it from a file."),
+            help=_("Request as JSON (default: an empty object); @FILE reads it from a file."),
             show_default=False,
         ),
     ] = "{}",
@@ -158,7 +158,7 @@ def call(
         typer.Option(
             "--timeout",
             metavar=_("SECONDS"),
-            help=_("How long to wait for a server and its answer (default: {seconds:g}).").format(
+            help=_("How long to wait for a server and its reply (default: {seconds:g}).").format(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,
@@ -169,7 +169,7 @@ def call(
     backend: BackendOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Call a service and print its answer."""
+    """Call a service and print its reply."""
     asked = _request(request)
     with open_node("nep-service-call", master, backend) as node:
         client = node.new_client(service, timeout_s=_TIMEOUT_S if timeout_s is None else timeout_s)
@@ -181,7 +181,6 @@ def call(
 
 
 def _request(text: str) -> object:
-    """The value that is meant. Raises `NepError`."""
     if not text.startswith("@"):
         return parse_json(text)
     file = text[1:]
@@ -189,11 +188,10 @@ def _request(text: str) -> object:
 
 
 def _found(service: str, graph: GraphView) -> ServiceInfo:
-    """What is known of it. Raises `BadTopicError`, and `NepError` when nobody has it."""
     found = graph.services.get(service)
     if found is None:
         check_service(service)
-        said = _("nobody serves or calls '{service}'; {meant}'nep service list' shows all services")
+        said = _("no service '{service}'; {meant}'nep service list' shows all services")
         raise NepError(said.format(service=service, meant=meant(service, list(graph.services))))
     return found
 
@@ -214,7 +212,6 @@ def _names(graph: GraphView, node_ids: list[str]) -> str:
 
 
 def _record(graph: GraphView, service: ServiceInfo) -> dict[str, object]:
-    """As `nep service list --json` has it, with the names of the nodes."""
     record: dict[str, object] = asdict(service)
     for role, members in (("servers", service.servers), ("clients", service.clients)):
         record[role] = [{**asdict(each), "node": _name(graph, each.node_id)} for each in members]
@@ -244,11 +241,10 @@ def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
         )
         for each in service.clients
     ]
-    return [*servers, *sorted(clients)]  # the first server is the one that is called
+    return [*servers, *sorted(clients)]  # calls go to the first server
 
 
 def _name(graph: GraphView, node_id: str) -> str | None:
-    """The node's name; None when it has just left."""
     node = graph.nodes.get(node_id)
     return None if node is None else node.name
 

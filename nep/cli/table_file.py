@@ -1,4 +1,4 @@
-"""`nep topic echo TOPIC FIELD... --csv`: picked fields as a table for other programs (RFC 4180)."""
+"""`nep topic echo TOPIC FIELD... --csv`: selected fields as a table (RFC 4180)."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ STAMP = "stamp_s"
 
 
 class TextSink(Protocol):
-    """A text stream."""
+    """Writable text stream."""
 
     def write(self, text: str, /) -> object:
-        """Write it."""
+        """Write text."""
 
     def flush(self) -> object:
-        """Write it now."""
+        """Flush buffered text."""
 
 
 class Fields:
-    """Some fields of messages; those that a message does not have are counted."""
+    """Extractor of fields from messages; counts messages that lack them."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Raises `NepError` for what is no field."""
+        # Raises `NepError` for an invalid field path.
         self.names = tuple(names)
         self._paths: tuple[Path, ...] = tuple(parse_path(name) for name in names)
         self.missing: Counter[str] = Counter()
@@ -43,7 +43,7 @@ class Fields:
         self.unreadable = 0
 
     def of(self, message: Message) -> list[object] | None:
-        """Their values, `MISSING` among them; None for a message that cannot be read."""
+        """Return the field values, with `MISSING` for absent ones; None for an undecodable message."""
         try:
             payload = dict(message.extension) if message.codec == "image" else message.payload
         except DecodeError:
@@ -55,11 +55,11 @@ class Fields:
         return values
 
     def plain(self, values: Sequence[object]) -> dict[str, object]:
-        """Values that `of` gave, by name; those that were missing are left out."""
+        """Return values from `of` by name, without the missing ones."""
         return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
 
     def say_missing(self) -> None:
-        """What was missing, on the error stream."""
+        """Print counts of missing fields and undecodable messages to stderr."""
         for name in self.names:
             if self.missing[name]:
                 say(
@@ -69,29 +69,28 @@ class Fields:
                 )
         if self.unreadable:
             said = ngettext(
-                "{count} message could not be read and left out",
-                "{count} messages could not be read and left out",
+                "skipped {count} undecodable message",
+                "skipped {count} undecodable messages",
                 self.unreadable,
             )
             say(said.format(count=self.unreadable))
 
 
 class Table:
-    """Rows of comma-separated values: when each message was published (s since 1970), then its fields."""
+    """Writer of comma-separated values: the publishing time (s since 1970), then the fields."""
 
     def __init__(self, fields: Fields, out: TextSink | None = None, *, names_topic: bool = False) -> None:
-        """`names_topic`: several topics come, and a column tells which."""
         self._fields = fields
         self._names_topic = names_topic
-        # a file is for programs, which get what was sent; a terminal obeys some letters
+        # escape control characters only on a terminal; files get the original text
         self._clean = escaped if out is None and sys.stdout.isatty() else str
-        self._out = out or _unchanged_stdout()
+        self._out = out or _binary_safe_stdout()
         self._write = csv.writer(self._out, lineterminator="\r\n").writerow
         self._write([STAMP, *(["topic"] if names_topic else []), *fields.names])
         self._out.flush()
 
     def __call__(self, message: Message) -> None:
-        """Write one message."""
+        """Write one row for a message."""
         values = self._fields.of(message)
         if values is not None:
             topic = [message.topic] if self._names_topic else []
@@ -101,8 +100,8 @@ class Table:
             self._out.flush()
 
 
-def _unchanged_stdout() -> TextSink:
-    """The standard output without translation of line ends, which Windows would double."""
+def _binary_safe_stdout() -> TextSink:
+    # csv ends lines itself; newline translation would double them on Windows.
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:
         reconfigure(newline="", encoding="utf-8", errors="backslashreplace")

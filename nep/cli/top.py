@@ -1,4 +1,4 @@
-"""`nep top`: a table of all topics and nodes in the terminal, which is renewed every second."""
+"""`nep top`: live table of all topics and nodes."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ if TYPE_CHECKING:
 
 __all__ = ["TopicOrder", "node_rows", "top", "topic_rows"]
 
-_SLICE_S = 0.1
-_NAMES_MOST = 40
+_WAIT_SLICE_S = 0.1
+_MAX_NAMES_LENGTH = 40
 _FRAME_LINES = 6
-"""Of the terminal that have no rows: two heads with their lines, the line above, and one to spare."""
-_NODES_PART = 3
-"""Nodes have a third of the room, and what topics leave."""
+"""Terminal lines without rows: two headings with rules, the summary, and one spare."""
+_NODES_SHARE = 3
+"""Nodes get 1/3 of the rows, plus those that topics don't need."""
 
 
 class TopicOrder(str, enum.Enum):
-    """What stands first: the largest of it, or the first by its name."""
+    """Sort key of the topics: largest figure first, or by name."""
 
     RATE = "rate"
     BANDWIDTH = "bandwidth"
@@ -87,32 +87,34 @@ def top(
         str,
         typer.Argument(
             metavar=_("PATTERN"),
-            help=_("Only topics that match, such as '/robot/**', or that have this in their names."),
+            help=_(
+                "Show only topics that match a pattern such as '/robot/**', or whose name contains this text."
+            ),
             show_default=False,
         ),
     ] = "",
     order: Annotated[
-        TopicOrder, typer.Option("--sort", help=_("What stands first."), case_sensitive=False)
+        TopicOrder, typer.Option("--sort", help=_("Sort topics by this column."), case_sensitive=False)
     ] = TopicOrder.RATE,
     every_s: Annotated[
         float,
         typer.Option(
-            "--every", min=0.2, max=3600.0, metavar=_("SECONDS"), help=_("How often it is renewed.")
+            "--every", min=0.2, max=3600.0, metavar=_("SECONDS"), help=_("Interval between updates.")
         ),
     ] = 1.0,
     count: Annotated[
-        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N tables; 0 goes on."))
+        int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N tables (0: never)."))
     ] = 0,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show all topics and nodes in a table that is renewed every second. Ctrl+C ends it.
+    """Show a live table of all topics and nodes, updated every second until Ctrl+C.
 
-    Nothing is subscribed: the figures are those that publishers and subscribers tell the master. Into a file
-    or a program the tables follow each other. A master that goes away is waited for.
+    It subscribes to nothing: the figures are those that publishers and subscribers report to the master. Into
+    a file or pipe the tables are printed one after the other. If the master goes down, it is waited for.
     """
-    graph = view(master)  # without a master there is nothing to wait for: it may be a wrong address
-    shown = _Shown(pattern, order)
+    graph = view(master)  # fail at once: the address may be wrong
+    shown = _GraphPrinter(pattern, order)
     show: Callable[[GraphView, str], None]
     with _screen(as_json=as_json) as live:
         if as_json:
@@ -120,47 +122,44 @@ def top(
         elif live is None:
             show = shown.show_plain
         else:
-            show = _Live(shown, live).show
+            show = _LiveTables(shown, live).show
         _run(graph, show, every_s, count, master)
 
 
 def _run(
     graph: GraphView, show: Callable[[GraphView, str], None], every_s: float, count: int, master: str | None
 ) -> None:
-    """Show the graph, and each later one, until Ctrl+C or `count` times."""
-    never, started, trouble = threading.Event(), time.monotonic(), ""
+    never, started, problem = threading.Event(), time.monotonic(), ""
     for number in itertools.count(1):
-        show(graph, trouble)
+        show(graph, problem)
         if number == count:
             return
         due = started + number * every_s
-        if due < time.monotonic() - every_s:  # the computer slept, or the master kept us waiting
+        if due < time.monotonic() - every_s:  # suspended computer or slow master
             started, due = time.monotonic() - number * every_s, time.monotonic()
         while (left := due - time.monotonic()) > 0:
-            never.wait(min(left, _SLICE_S))  # in slices: Windows does not interrupt a wait for Ctrl+C
+            never.wait(min(left, _WAIT_SLICE_S))  # in slices: Ctrl+C does not interrupt a wait on Windows
         try:
-            graph, trouble = view(master), ""
-        except NepError as error:  # the last figures stay, and why they do stands above them
-            trouble = str(error)
+            graph, problem = view(master), ""
+        except NepError as error:  # keep showing the last figures, below the reason
+            problem = str(error)
 
 
 def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
-    """A terminal of our own while it lasts; none for files and programs."""
     if as_json or not sys.stdout.isatty():
         return nullcontext(None)
     from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
-    interrupts.leave_when_told()  # the terminal gets back what stood there
+    interrupts.leave_when_told()  # exit through cleanup, which restores the terminal
     out: Console = console()
     out.soft_wrap = False
     return Live(console=out, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
 
 
-# ---- what is shown
+# ---- output
 
 
 def _sortable(value: float | None) -> float:
-    """What is not known, and what is no number, comes last."""
     return -1.0 if value is None or math.isnan(value) else value
 
 
@@ -169,7 +168,7 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrder.RATE) -> list[TopicInfo]:
-    """The topics that match, in this order; those with equal figures by their names."""
+    """Return the matching topics in this order; equal figures are ordered by name."""
     found = sorted(
         (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
         key=lambda each: each.name,
@@ -185,7 +184,7 @@ def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrd
 
 
 def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
-    """The nodes with the messages a second that each publishes: who uses its processor most is first."""
+    """Return nodes with their total publishing rate (Hz), by decreasing CPU use."""
     published: dict[str, float] = {}
     for topic in graph.topics.values():
         for publisher in topic.publishers:
@@ -196,32 +195,30 @@ def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
 
 
 @dataclass
-class _Shown:
-    """Which part of a graph is shown, and how."""
+class _GraphPrinter:
+    """Selection and formatting of a graph snapshot."""
 
     pattern: str
     order: TopicOrder
 
-    def show_json(self, graph: GraphView, trouble: str) -> None:
-        """One line of JSON; nothing new is no line, and said beside."""
-        if trouble:
-            say(trouble)
+    def show_json(self, graph: GraphView, problem: str) -> None:
+        if problem:
+            say(problem)
             return
         plain = graph.to_plain()
         names = {topic.name for topic in topic_rows(graph, self.pattern)}
         topics = [each for each in plain["topics"] if each["name"] in names]  # type: ignore[attr-defined]  # a list
-        told = {
+        record = {
             "stamp_ns": time.time_ns(),
             "topics": topics,
             "nodes": plain["nodes"],
             "alerts": plain["alerts"],
         }
-        show_json(ids_as_text(told))
+        show_json(ids_as_text(record))
 
-    def show_plain(self, graph: GraphView, trouble: str) -> None:
-        """Two tables for a file."""
-        if trouble:
-            say(trouble)
+    def show_plain(self, graph: GraphView, problem: str) -> None:
+        if problem:
+            say(problem)
             return
         write(f"{self.head(graph)}\n")
         topics = topic_rows(graph, self.pattern, self.order)
@@ -231,7 +228,6 @@ class _Shown:
         write("\n")
 
     def head(self, graph: GraphView) -> str:
-        """All of it in one line."""
         rates = [each.rate_hz for each in graph.topics.values() if each.rate_hz is not None]
         bytes_s = [each.bandwidth_Bps for each in graph.topics.values() if each.bandwidth_Bps is not None]
         lost = [each.lost for each in graph.topics.values() if each.lost is not None]
@@ -245,12 +241,11 @@ class _Shown:
         return " · ".join(part for part in parts if part)
 
     def topic_cells(self, graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
-        """In the order of the columns."""
         names = [graph.nodes[each.node_id].name for each in topic.publishers if each.node_id in graph.nodes]
         return (
             escaped(topic.name),
             escaped(topic.msg_type),
-            shortened(escaped(", ".join(dict.fromkeys(names))), _NAMES_MOST) or UNKNOWN,
+            shortened(escaped(", ".join(dict.fromkeys(names))), _MAX_NAMES_LENGTH) or UNKNOWN,
             rate(topic.rate_hz),
             bandwidth(topic),
             str(len(topic.subscribers)),
@@ -258,7 +253,6 @@ class _Shown:
         )
 
     def node_cells(self, node: NodeInfo, published_hz: float | None) -> tuple[str, ...]:
-        """In the order of the columns."""
         return (
             escaped(node.name),
             escaped(node.host) or UNKNOWN,
@@ -270,26 +264,25 @@ class _Shown:
         )
 
 
-class _Live:
-    """Tables that take the whole terminal, as far as it reaches; what grew since the last look is yellow."""
+class _LiveTables:
+    """Full-screen tables, cut to the terminal's height; loss counts that have grown are yellow."""
 
-    def __init__(self, shown: _Shown, live: Live) -> None:
+    def __init__(self, shown: _GraphPrinter, live: Live) -> None:
         self._shown, self._live = shown, live
         self._lost: dict[str, int] = {}
 
-    def show(self, graph: GraphView, trouble: str) -> None:
-        """Take the place of what stood there."""
+    def show(self, graph: GraphView, problem: str) -> None:
         from rich.console import Group  # noqa: PLC0415 - only a terminal needs it
         from rich.text import Text  # noqa: PLC0415
 
         topics, nodes = topic_rows(graph, self._shown.pattern, self._shown.order), node_rows(graph)
-        notes = [Text(f"! {trouble}", "yellow")] if trouble else []
+        notes = [Text(f"! {problem}", "yellow")] if problem else []
         notes += [Text(f"! {escaped(alert.sentence)}", "yellow", no_wrap=True) for alert in graph.alerts]
-        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODES_PART]))
-        for_nodes = max(min(len(nodes), room // _NODES_PART), room - len(topics))
+        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODES_SHARE]))
+        for_nodes = max(min(len(nodes), room // _NODES_SHARE), room - len(topics))
         above, below = topics[: room - min(len(nodes), for_nodes)], nodes[:for_nodes]
         parts: list[RenderableType] = [Text(self._shown.head(graph), "dim", no_wrap=True)]
-        parts += notes[:_NODES_PART]
+        parts += notes[:_NODES_SHARE]
         rows = [self._shown.topic_cells(graph, each) for each in above]
         grown = {
             at

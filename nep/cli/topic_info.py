@@ -1,4 +1,4 @@
-"""`nep topic info`, `type` and `find`: all that is known of one topic, its type, and who has a type."""
+"""`nep topic info`, `type` and `find`: details and type of a topic, and topics of a type."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ TypeArgument = Annotated[
 ]
 _COLUMNS = (
     TextColumn(lazy("node"), style="bold", is_whole=True),
-    TextColumn(lazy("what it does")),
+    TextColumn(lazy("role")),
     TextColumn(lazy("messages"), "right"),
     TextColumn(lazy("rate"), "right"),
     TextColumn(lazy("bandwidth"), "right"),
@@ -117,19 +117,17 @@ def find(
 
 
 def _found(topic: str, graph: GraphView) -> TopicInfo:
-    """What is known of it. Raises `BadTopicError`, and `NepError` when nobody has it."""
     found = graph.topics.get(check_topic(topic))
     if found is None and topic in graph.patterns:
-        said = _("'{topic}' has wildcards, so it is no topic; 'nep node list' shows who hears all that match")
+        said = _("'{topic}' is a pattern, not a topic; 'nep node list' shows the nodes that subscribe to it")
         raise NepError(said.format(topic=topic))
     if found is None:
-        said = _("nobody publishes or subscribes '{topic}'; {meant}'nep topic list' shows all topics")
+        said = _("no topic '{topic}'; {meant}'nep topic list' shows all topics")
         raise NepError(said.format(topic=topic, meant=meant(topic, list(graph.topics))))
     return found
 
 
 def _record(graph: GraphView, topic: TopicInfo) -> dict[str, object]:
-    """As `nep topic list --json` has it, with the names of the nodes."""
     record: dict[str, object] = asdict(topic)
     for role, members in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
         record[role] = [{**asdict(each), "node": _name(graph, each.node_id)} for each in members]
@@ -163,7 +161,6 @@ def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
 
 
 def _name(graph: GraphView, node_id: str) -> str | None:
-    """The node's name; None when it has just left."""
     node = graph.nodes.get(node_id)
     return None if node is None else node.name
 

@@ -1,4 +1,4 @@
-"""Patterns of topics, such as `/*/odom`: the topics that match them and are new."""
+"""Topic patterns of a command, such as `/*/odom`."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from nep.protocol.wire import check_topic
 
 __all__ = ["TopicPatterns", "is_pattern", "matches"]
 
-_AGAIN_S = 1.0
-_PATIENCE_S = 0.3
-"""A master that is away must not keep messages waiting, which do not need it."""
+_GRAPH_POLL_S = 1.0
+_GRAPH_TIMEOUT_S = 0.3
+"""Short, because waiting for a master that is down delays messages."""
 
 
 def is_pattern(word: str) -> bool:
-    """Whether a word of the command line is a pattern; one with brackets or quotes is a field."""
+    """Return whether a word is a topic pattern; words with brackets or quotes are fields."""
     return is_glob(word) and not any(letter in word for letter in "[\"'")
 
 
 class TopicPatterns:
-    """Topics that match some patterns and are published. Asks for the graph once a second."""
+    """Published topics that match patterns. Queries the graph once a second."""
 
     def __init__(self, node: Node, patterns: Sequence[str], known: Collection[str]) -> None:
-        """`known`: topics that are heard anyway. Raises `BadTopicError` for what can be no topic's name."""
+        # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
         self.patterns = tuple(map(check_topic, patterns))
         self._node = node
         self._known = set(known)
-        self._said: set[str] = set()
-        self._look_at = 0.0
+        self._reported: set[str] = set()
+        self._poll_at = 0.0
 
     def new_in(self, graph: GraphView) -> list[tuple[str, str]]:
-        """Topics that match and were not told before, with their types; says which pattern has none."""
-        self._look_at = time.monotonic() + _AGAIN_S
+        """Return new matching topics with their types; report patterns without a match once."""
+        self._poll_at = time.monotonic() + _GRAPH_POLL_S
         published = {name: each for name, each in graph.topics.items() if each.publishers}
         for pattern in self.patterns:
-            if pattern not in self._said:
-                self._said.add(pattern)
+            if pattern not in self._reported:
+                self._reported.add(pattern)
                 if not any(matches(pattern, name) for name in published):
-                    said = _("no topic matches '{pattern}' yet; waiting, Ctrl+C ends it")
+                    said = _("no topic matches '{pattern}' yet; waiting (Ctrl+C to stop)")
                     say(said.format(pattern=pattern))
         found = [
             (name, published[name].msg_type)
@@ -56,10 +56,10 @@ class TopicPatterns:
         self._known.update(name for name, _type in found)
         return found
 
-    def look_again(self) -> list[tuple[str, str]]:
-        """`new_in` of the graph now, if it is time. A master that is away is waited for."""
-        if self.patterns and time.monotonic() >= self._look_at:
-            self._look_at = time.monotonic() + _AGAIN_S
+    def poll(self) -> list[tuple[str, str]]:
+        """Return `new_in` of the current graph, at most once a second; nothing while the master is down."""
+        if self.patterns and time.monotonic() >= self._poll_at:
+            self._poll_at = time.monotonic() + _GRAPH_POLL_S
             with suppress(NepError):
-                return self.new_in(self._node.graph(_PATIENCE_S))
+                return self.new_in(self._node.graph(_GRAPH_TIMEOUT_S))
         return []

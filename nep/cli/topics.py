@@ -1,4 +1,4 @@
-"""`nep topic`: what is published, by whom, how fast; look into it, and publish by hand."""
+"""`nep topic`: list, inspect, print, measure and publish topics."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def list_topics(
     if topics:
         show_table(_COLUMNS, [_row(graph, topic) for topic in topics])
     else:
-        say(_("no topics yet; they appear as soon as a program publishes or subscribes one"))
+        say(_("no topics; start a program that publishes or subscribes"))
     show_alerts(graph.alerts)
 
 

@@ -1,7 +1,7 @@
-"""What typer itself says, in the language of now: the usage line, its own options, mistakes of who types.
+"""Translation of typer's own output: usage line, built-in options and usage errors.
 
-Half of its sentences go through gettext, to which `nep.i18n.begin` gives our catalogue. These here do not:
-they are looked up by their English. What a later typer says in other words stays English.
+Half of typer's sentences go through gettext, to which `nep.i18n.begin` adds our catalogue. The ones here
+don't: they are matched by their English text, so sentences of a later typer may stay English.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HELPS = frozenset({
     lazy("Show completion for the current shell, to copy it or customize the installation."),
 })  # fmt: skip
 _PIECES = frozenset({lazy("[OPTIONS]"), lazy("COMMAND [ARGS]...")})
-_MISTAKES = (
+_USAGE_ERRORS = (
     lazy("Missing argument {name}."),
     lazy("Missing option {name}."),
     lazy("No such option: {option} (Possible options: {options})"),
@@ -43,13 +43,13 @@ _MISTAKES = (
     lazy("Input should be greater than or equal to {limit}"),
     lazy("Input should be less than or equal to {limit}"),
 )
-"""The first that fits counts."""
+"""Templates of usage errors; the first match wins."""
 _UsageError: Any = typer.BadParameter.__mro__[1]
-"""What typer raises for every mistake in a command line; it has no public name."""
+"""Base class of typer's usage errors, which has no public name."""
 
 
 def translated(english: str) -> str:
-    """A sentence of typer's about a mistake; as it was when it is none that is known here."""
+    """Translate a usage error of typer; return unknown sentences unchanged."""
     for words, pattern in _patterns():
         found = pattern.fullmatch(english)
         if found is not None:
@@ -61,23 +61,23 @@ def translated(english: str) -> str:
 def _patterns() -> Sequence[tuple[str, re.Pattern[str]]]:
     return [
         (words, re.compile(re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+)", re.escape(words)), re.DOTALL))
-        for words in _MISTAKES
+        for words in _USAGE_ERRORS
     ]
 
 
 @contextmanager
-def _mistakes_translated() -> Iterator[None]:
+def _translate_usage_errors() -> Iterator[None]:
     try:
         yield
     except _UsageError as error:
         english = error.format_message()
-        words = escaped(translated(english), lines=True)  # a name in it may come from a file
+        words = escaped(translated(english), lines=True)  # may contain untrusted names
         if words == english:
             raise
         raise _UsageError(words, ctx=error.ctx) from error
 
 
-def _helps_translated(parameters: Sequence[Any]) -> Sequence[Any]:
+def _translate_helps(parameters: Sequence[Any]) -> Sequence[Any]:
     for each in parameters:
         if getattr(each, "help", None) in _HELPS:
             each.help = _(each.help)
@@ -90,15 +90,14 @@ def _write_usage(command: Any, ctx: Any, formatter: Any) -> None:  # noqa: ANN40
 
 
 def _reflowed(text: str) -> str:
-    """Put each paragraph on one line: rich wraps it to the terminal and would keep our line breaks."""
     return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in text.split("\n\n"))
 
 
 class TranslatedCommand(TyperCommand):
-    """A command whose help is all in one language."""
+    """Command with translated help."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """See `click.Command`."""
+        """Write the help with each paragraph joined to one line, so that rich wraps it."""
         text = self.help
         self.help = _reflowed(text or "")
         try:
@@ -107,31 +106,31 @@ class TranslatedCommand(TyperCommand):
             self.help = text
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """See `click.Command`."""
-        return _helps_translated(super().get_params(ctx))
+        """Return the parameters with translated built-in help."""
+        return _translate_helps(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """See `click.Command`."""
+        """Write the translated usage line."""
         _write_usage(self, ctx, formatter)
 
 
 class TranslatedGroup(TyperGroup):
-    """A group of them, which also says in that language what is wrong with a command line."""
+    """Group with translated help and usage errors."""
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """See `click.Command`."""
-        return _helps_translated(super().get_params(ctx))
+        """Return the parameters with translated built-in help."""
+        return _translate_helps(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """See `click.Command`."""
+        """Write the translated usage line."""
         _write_usage(self, ctx, formatter)
 
     def make_context(self, *given: Any, **named: Any) -> Any:  # noqa: ANN401
-        """See `click.Command`."""
-        with _mistakes_translated():
+        """Parse a command line; translate usage errors."""
+        with _translate_usage_errors():
             return super().make_context(*given, **named)
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
-        """See `click.Command`."""
-        with _mistakes_translated():
+        """Run a command; translate usage errors."""
+        with _translate_usage_errors():
             return super().invoke(ctx)

@@ -1,4 +1,4 @@
-"""Payloads as text: whole JSON for programs, and for people what fits on a screen."""
+"""Payloads as text: complete JSON for programs, and a shortened form for people."""
 
 from __future__ import annotations
 
@@ -16,61 +16,59 @@ from nep.text import escaped, shortened
 
 __all__ = ["ids_as_text", "json_of", "presented"]
 
-MOST_ITEMS = 20
-"""Items of a list that a terminal shows; a longer one says how many more there are."""
-MOST_FIELDS = 100
-MOST_LETTERS = 500
-MOST_DEPTH = 40
-_DEEPEST = 200
-"""How deep JSON is written; deeper values are told by their first letters."""
+MAX_ITEMS = 20
+"""List items shown on a terminal; the rest is counted."""
+MAX_FIELDS = 100
+MAX_CHARACTERS = 500
+MAX_DEPTH = 40
+_MAX_JSON_DEPTH = 200
+"""Nesting depth of JSON output; deeper values are written as text."""
 _IDS = frozenset({"id", "publisher"})
 _CONTROL = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 
 
 def json_of(value: object, *, indent: bool = False) -> bytes:
-    r"""`value` as JSON, whatever it is; NaN and infinity are `null`, bytes their hexadecimal digits.
+    r"""Encode any value as JSON: NaN and infinity become `null`, bytes become hexadecimal digits.
 
-    Letters that a terminal obeys are written as `\u009b`, which says the same.
+    Terminal control characters are escaped like U+009B as ``\u009b``, which is equivalent JSON.
     """
     option = orjson.OPT_NON_STR_KEYS | numpy_option() | (orjson.OPT_INDENT_2 if indent else 0)
     try:
         data = orjson.dumps(value, default=_plain, option=option)
-    except TypeError:  # too deep, keys or numbers that JSON does not have
-        data = orjson.dumps(_tame(value, _DEEPEST), default=str, option=option)
+    except TypeError:  # too deep, or keys and numbers that JSON lacks
+        data = orjson.dumps(_simplified(value, _MAX_JSON_DEPTH), default=str, option=option)
     if data.isascii() and b"\x7f" not in data:
         return data
     return _CONTROL.sub(lambda found: f"\\u{ord(found.group()):04x}", data.decode()).encode()
 
 
 def _plain(value: object) -> object:
-    """What orjson does not know: bytes as their hexadecimal digits, everything else as text."""
     return value.hex() if isinstance(value, (bytes, bytearray, memoryview)) else str(value)
 
 
-def _tame(value: object, depth: int) -> object:
+def _simplified(value: object, depth: int) -> object:
     if isinstance(value, Mapping):
         if depth <= 0:
             return "…"
-        return {_key(key): _tame(each, depth - 1) for key, each in value.items()}
+        return {_key(key): _simplified(each, depth - 1) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_tame(each, depth - 1) for each in value] if depth > 0 else "…"
+        return [_simplified(each, depth - 1) for each in value] if depth > 0 else "…"
     if isinstance(value, int) and not isinstance(value, bool) and value not in _SAFE_INTEGERS:
         return str(value)
-    return _letters(value) if isinstance(value, str) else value
+    return _valid_text(value) if isinstance(value, str) else value
 
 
 def _key(key: object) -> str:
-    return _letters(key) if isinstance(key, str) else str(_plain(key))
+    return _valid_text(key) if isinstance(key, str) else str(_plain(key))
 
 
-def _letters(text: str) -> str:
-    """Text without halves of letters, which JSON has no form for."""
+def _valid_text(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def ids_as_text(value: object) -> object:
-    """Maps and lists with their ids as texts: readers that have floats alone lose digits beyond 2^53."""
+    """Convert ids in maps and lists to strings: readers with only doubles lose digits beyond 2^53."""
     if isinstance(value, Mapping):
         return {
             key: str(each) if key in _IDS and isinstance(each, int) else ids_as_text(each)
@@ -80,11 +78,11 @@ def ids_as_text(value: object) -> object:
 
 
 def presented(value: object, *, whole: bool, indent: bool = False) -> str:
-    """A payload for people: like JSON, but NaN stays NaN. Unless `whole`, what is long is shortened."""
+    """Format a payload for people: JSON with NaN; long values are shortened unless `whole`."""
     most = (
-        (math.inf, math.inf, math.inf, _DEEPEST)
+        (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
         if whole
-        else (MOST_ITEMS, MOST_FIELDS, MOST_LETTERS, MOST_DEPTH)
+        else (MAX_ITEMS, MAX_FIELDS, MAX_CHARACTERS, MAX_DEPTH)
     )
     return json_of(_presented(value, *most), indent=indent).decode()
 
@@ -124,12 +122,12 @@ def _list(value: Sequence[object], items: float, fields: float, letters: float, 
 
 
 def service_type_text(service: ServiceInfo) -> str:
-    """The type of a service; nep's own services have none."""
+    """Return the type of a service; nep's own services are untyped."""
     if service.msg_type == SERVICE_TYPE:
         return _("any (each client chooses json or msgpack)")
     return escaped(service.msg_type)
 
 
 def cleaned(text: str) -> str:
-    """Text of several lines as a terminal may have it; lines after the first are indented, as parts of it."""
+    """Escape control characters in a text of several lines and indent continuation lines."""
     return escaped(text, lines=True).replace("\n", "\n    ")

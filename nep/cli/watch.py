@@ -1,4 +1,4 @@
-"""`nep watch`: alarms of a file, in a terminal, with no window."""
+"""`nep watch`: evaluate alarm rules in a terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
-from nep.cli.ring import KEEP_S, KEEP_SERVICE, has_ring
+from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_ring
 from nep.cli.screen import console, say, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import NepError, nearest
@@ -35,24 +35,22 @@ from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped
 
-_AGAIN_S = 1.0
-_PATIENCE_S = 0.5
-_SLICE_S = 0.05
-_SETTLE_S = 1.0
-_OF_STUDIO = frozenset({"run", "stop"})
-"""What only Studio can do."""
+_GRAPH_POLL_S = 1.0
+_GRAPH_TIMEOUT_S = 0.5
+_EVENT_WAIT_S = 0.05
+_ROBOT_DISCOVERY_S = 1.0
+_STUDIO_ACTIONS = frozenset({"run", "stop"})
+"""Actions that only Studio can carry out."""
 _STYLES = {"on": "bold red", "off": "green", "still": "bold red"}
 
 FileArgument = Annotated[
     str | None,
-    typer.Argument(
-        metavar=_("FILE"), help=_("The alarms: JSON, as Studio keeps them, too."), show_default=False
-    ),
+    typer.Argument(metavar=_("FILE"), help=_("Alarm file in JSON, as Studio saves it."), show_default=False),
 ]
-CheckOption = Annotated[bool, typer.Option("--check", help=_("Say whether the file is right, and end."))]
-ExampleOption = Annotated[bool, typer.Option("--example", help=_("Print a file to begin with, and end."))]
+CheckOption = Annotated[bool, typer.Option("--check", help=_("Validate the file and exit."))]
+ExampleOption = Annotated[bool, typer.Option("--example", help=_("Print an example file and exit."))]
 CountOption = Annotated[
-    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("End after N alarms; 0 goes on."))
+    int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N alarms (0: never)."))
 ]
 
 
@@ -65,31 +63,31 @@ def watch(
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Watch over topics, values and nodes, as a file of alarms says. Ctrl+C ends it.
+    """Evaluate the alarms of a file until Ctrl+C.
 
-    Each alarm is a line when it comes on and when it goes off, with what it saw. It may call a service, send
-    a message, ring the terminal's bell, and keep the last seconds where 'nep recording ring' is on; what only
-    Studio can do is said at the start. A message that moves a robot is sent only with --allow-moving. A
-    master that is away is waited for: messages that still come are watched meanwhile.
+    A line is printed when an alarm turns on and when it turns off, with the value that caused it. Alarms can
+    call a service, publish a message, ring the terminal's bell, and save the last seconds of 'nep recording
+    ring'; actions that need Studio are listed at the start. Messages that move a robot are published only
+    with --allow-moving. If the master is down, messages that still arrive are evaluated.
     """
     if example:
         write(EXAMPLE)
         return
     if file is None:
-        raise NepError(_("give a file of alarms; --example prints one"))
+        raise NepError(_("give an alarm file; --example prints one"))
     rules = read_alarms(Path(file)).rules
     if check:
         for rule in rules:
             write(escaped(rule_words(rule)) + "\n")
-        say(_("the file is right"))
+        say(_("the file is valid"))
         return
     if not any(rule.is_on for rule in rules):
-        raise NepError(_("no alarm of '{file}' is switched on").format(file=file))
+        raise NepError(_("all alarms of '{file}' are switched off").format(file=file))
     interrupts.leave_when_told()
     with ExitStack() as opened:
         node = opened.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
         guard = MotionGuard(node, allow_moving or ())
-        watching = _Watching(node, rules, _JsonLines() if as_json else _Lines(), guard)
+        watching = _AlarmRunner(node, rules, _JsonEvents() if as_json else _EventLines(), guard)
         opened.callback(watching.close)
         watching.check_sends()
         if not as_json:
@@ -97,29 +95,27 @@ def watch(
         watching.run(count)
 
 
-# ---- what is shown
+# ---- output
 
 
-class _Lines:
-    """Alarms for people: a line each, coloured on a terminal."""
+class _EventLines:
+    """Printer of alarm events for people, coloured on a terminal."""
 
     def __init__(self) -> None:
         self._console = console()
 
     def event(self, event: AlarmEvent) -> None:
-        """An alarm came on or went off."""
         what = escaped(what_words(event.rule.condition, event.seen))
         if event.kind == "off":
-            said = _("well again after {seconds:.1f} s: {what}")
+            said = _("resolved after {seconds:.1f} s: {what}")
             what = said.format(seconds=event.lasted_s, what=what)
             if event.count > 1:
-                what += " " + _("(came {count} times)").format(count=event.count)
+                what += " " + _("(occurred {count} times)").format(count=event.count)
         elif event.is_snoozed:
             what = _("{what} (snoozed)").format(what=what)
         self._show(event.kind, event.at_s, what)
 
     def deed(self, _rule: AlarmRule, words: str, at_s: float) -> None:
-        """Something was done."""
         self._show("", at_s, f"  {cleaned(words)}")
 
     def _show(self, kind: str, at_s: float, words: str) -> None:
@@ -132,11 +128,10 @@ class _Lines:
         self._console.print(Text.assemble((stamp, "dim"), "  ", (words, _STYLES.get(kind, ""))))
 
 
-class _JsonLines:
-    """Alarms for programs: a JSON text each."""
+class _JsonEvents:
+    """Printer of alarm events as JSON lines."""
 
     def event(self, event: AlarmEvent) -> None:
-        """An alarm came on or went off."""
         show_json(
             {
                 "alarm": event.rule.id,
@@ -151,40 +146,39 @@ class _JsonLines:
         )
 
     def deed(self, rule: AlarmRule, words: str, at_s: float) -> None:
-        """Something was done."""
         show_json({"alarm": rule.id, "event": "did", "at_s": at_s, "what": words})
 
 
-# ---- the work
+# ---- evaluation
 
 
-class _Watching:
-    """Alarms over one node: its subscriptions, the graph each second, and what is carried out."""
+class _AlarmRunner:
+    """Evaluation of alarms with one node: subscriptions, graph polling and actions."""
 
     def __init__(
-        self, node: Node, rules: tuple[AlarmRule, ...], out: _Lines | _JsonLines, guard: MotionGuard
+        self, node: Node, rules: tuple[AlarmRule, ...], out: _EventLines | _JsonEvents, guard: MotionGuard
     ) -> None:
         self._node, self._out, self._guard = node, out, guard
         self._commands = AlarmCommands(self._refusal)
-        self._keeper: Client | None = None
+        self._save_client: Client | None = None
         carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, Done], None]] = {
-            "banner": _nothing,  # each alarm is a line anyway
-            "console": _nothing,
-            "sound": self._ring,
+            "banner": _do_nothing,  # every alarm is printed anyway
+            "console": _do_nothing,
+            "sound": self._ring_bell,
             "call": self._command,
             "send": self._command,
-            "keep": self._keep,
-            **dict.fromkeys(_OF_STUDIO, self._not_here),
+            "keep": self._save_ring,
+            **dict.fromkeys(_STUDIO_ACTIONS, self._skip_studio_action),
         }
         self.alarms = Alarms(rules, carriers=carriers)
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._view: GraphView | None = None
-        self._look_at = 0.0
+        self._poll_at = 0.0
         self._was_away = False
-        self._told = 0
+        self._has_reported_unknown = 0
 
     def check_sends(self) -> None:
-        """Raises `typer.BadParameter` for an alarm that would move a robot nobody has allowed to move."""
+        # Raises `typer.BadParameter` if an alarm would move a robot without permission.
         sends = [
             action
             for rule in self.alarms.rules
@@ -193,41 +187,41 @@ class _Watching:
             if action.kind == "send"
         ]
         if sends:
-            self._guard.settle(_SETTLE_S)
+            self._guard.settle(_ROBOT_DISCOVERY_S)
         for action in sends:
             refusal = self._guard.refusal(action.name, action.msg_type)
             if refusal:
                 raise typer.BadParameter(refusal)
 
     def say_begin(self) -> None:
-        """Say what is watched, and what can't be done here."""
         rules = [rule for rule in self.alarms.rules if rule.is_on]
         for rule in rules:
             say(rule_words(rule))
         studios = dict.fromkeys(
-            action_words(action) for rule in rules for action in rule.actions if action.kind in _OF_STUDIO
+            action_words(action)
+            for rule in rules
+            for action in rule.actions
+            if action.kind in _STUDIO_ACTIONS
         )
         if studios:
-            said = _("only Studio can do this, so it is not done here: {actions}")
+            said = _("these actions need Studio and are skipped: {actions}")
             say(said.format(actions=", ".join(studios)))
-        say(_("watching; Ctrl+C ends it"))
+        say(_("watching; press Ctrl+C to stop"))
 
     def run(self, count: int) -> None:
-        """Watch until Ctrl+C, or until so many alarms have come on."""
         came = 0
         while True:
-            self._look()
+            self._poll_graph()
             for event in self.alarms.tick():
                 self._out.event(event)
                 came += event.kind == "on"
-            self._tell_deeds()
+            self._show_actions()
             if count and came >= count and not self.alarms.is_busy:
                 return
-            # in slices: Windows does not interrupt a wait for Ctrl+C
-            self.alarms.evaluator.came.wait(_SLICE_S)
+            # in slices: Ctrl+C does not interrupt a wait on Windows
+            self.alarms.evaluator.came.wait(_EVENT_WAIT_S)
 
     def close(self) -> None:
-        """End the subscriptions; the node ends the rest."""
         self._commands.close()
         self._guard.close()
         for _type, subscriber in self._subscribers.values():
@@ -236,13 +230,12 @@ class _Watching:
 
     # ---- the network
 
-    def _look(self) -> None:
-        """Ask who is there, once a second; a master that is away is waited for."""
+    def _poll_graph(self) -> None:
         now = time.monotonic()
-        if now < self._look_at:
+        if now < self._poll_at:
             return
         try:
-            self._view = self._node.graph(_PATIENCE_S)
+            self._view = self._node.graph(_GRAPH_TIMEOUT_S)
             self._subscribe(self._view)
             self._guard.see(self._view)
         except NepError as error:
@@ -251,18 +244,17 @@ class _Watching:
             self._was_away, self._view = True, None
         else:
             if self._was_away:
-                say(_("a master is there"))
+                say(_("connected to the master"))
             self._was_away = False
-            self._say_unknown(self._view)
+            self._report_unknown_once(self._view)
         self.alarms.evaluator.see(self._view)
-        self._look_at = time.monotonic() + _AGAIN_S
+        self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def _subscribe(self, view: GraphView) -> None:
-        """Hear what the rules are about, as the type that it has. Raises `NepError`."""
         for topic in self.alarms.evaluator.topics:
             info = view.topics.get(topic)
             if info is None or not info.publishers:
-                continue  # nobody publishes it yet: its type is not known
+                continue  # its type is unknown until it is published
             held = self._subscribers.get(topic)
             if held is not None and held[0] != info.msg_type:
                 held[1].close()
@@ -274,11 +266,10 @@ class _Watching:
     def _sink(self, topic: str) -> Callable[[Sequence[Message]], None]:
         return lambda messages: self.alarms.evaluator.take(topic, messages)
 
-    def _say_unknown(self, view: GraphView) -> None:
-        """Say once which topics and nodes are not there."""
-        if self._told:
+    def _report_unknown_once(self, view: GraphView) -> None:
+        if self._has_reported_unknown:
             return
-        self._told = 1
+        self._has_reported_unknown = 1
         topics = [name for name, info in view.topics.items() if info.publishers]
         nodes = [info.name for info in view.nodes.values()]
         for condition in (rule.condition for rule in self.alarms.rules if rule.is_on):
@@ -287,47 +278,46 @@ class _Watching:
                 continue
             near = nearest(condition.name, known)
             meant = "" if near is None else " " + _("did you mean '{near}'?").format(near=near)
-            say(_("'{name}' is not there yet; waiting.{meant}").format(name=condition.name, meant=meant))
+            say(_("'{name}' does not exist yet; waiting.{meant}").format(name=condition.name, meant=meant))
 
-    # ---- what is done
+    # ---- actions
 
     def _refusal(self, _node: Node, topic: str, msg_type: str) -> str:
-        self._guard.look()  # an alarm is rare, and a robot may have come just now
+        self._guard.look()  # alarms are rare, and a robot may just have connected
         return self._guard.refusal(topic, msg_type)
 
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         self._commands.carry(self._node, action, done)
 
-    def _keep(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        """By the flight recorder of `nep recording ring`, which may be on another computer."""
+    def _save_ring(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
         if self._view is None or not has_ring(self._view):
-            done(False, _("nothing was kept: no 'nep recording ring' is on"))
+            done(False, _("nothing saved: 'nep recording ring' is not running"))
             return
         asked = {"seconds": action.seconds, "note": what_words(event.rule.condition, event.seen)}
         try:
-            if self._keeper is None:
-                self._keeper = self._node.new_client(KEEP_SERVICE, timeout_s=KEEP_S)
-            self._keeper.call_async(asked).add_done_callback(lambda ended: _tell_kept(ended, done))
+            if self._save_client is None:
+                self._save_client = self._node.new_client(KEEP_SERVICE, timeout_s=SAVE_TIMEOUT_S)
+            self._save_client.call_async(asked).add_done_callback(lambda ended: _report_saved(ended, done))
         except NepError as error:
             done(False, _("nothing saved: {reason}").format(reason=error))
 
-    def _ring(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+    def _ring_bell(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         if sys.stderr.isatty():
             sys.stderr.write("\a")
             sys.stderr.flush()
         done(True, "")
 
-    def _not_here(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        said = _("only Studio can do this: {action}")
+    def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        said = _("this action needs Studio: {action}")
         done(False, said.format(action=action_words(action)))
 
-    def _tell_deeds(self) -> None:
+    def _show_actions(self) -> None:
         for rule, words, at_s in self.alarms.take_deeds():
             if words:
                 self._out.deed(rule, words, at_s)
 
 
-def _tell_kept(ended: Future[object], done: Done) -> None:
+def _report_saved(ended: Future[object], done: Done) -> None:
     error = None if ended.cancelled() else ended.exception()
     if error is not None or ended.cancelled():
         done(False, _("nothing saved: {reason}").format(reason=error or ""))
@@ -337,5 +327,5 @@ def _tell_kept(ended: Future[object], done: Done) -> None:
         done(True, _("saved {file}").format(file=path))
 
 
-def _nothing(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+def _do_nothing(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
     done(True, "")

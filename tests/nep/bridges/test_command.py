@@ -113,7 +113,7 @@ def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
         _out, err = program.end()
         assert program.process.returncode == INTERRUPTED
         assert re.fullmatch(
-            r"lab joins a, zeromq:127\.0\.0\.1:\d+@.*, and b, zenoh:local/bridge-.*; Ctrl\+C ends it\n",
+            r"lab: forwarding between a \(zeromq:127\.0\.0\.1:\d+@.*\) and b \(zenoh:local/bridge-.*\); press Ctrl\+C to stop\n",
             err,
         )
         for node in nodes:
@@ -243,8 +243,8 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "give a file, or two sides such as 'zeromq:/chatter ros:/chatter'; --example prints a file"),
-        (("zeromq:/t",), "'zeromq:/t' is one side, and no file; name the other, too, such as 'ros:/chatter'"),
+        ((), "give a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file"),
+        (("zeromq:/t",), "'zeromq:/t' is only one end; add the other one, such as 'ros:/chatter'"),
         (("zeromq:/t", "zeromk:/t"), "no back end 'zeromk'; did you mean 'zeromq'?"),
         (("zeromq", "zenoh:/t"), "'zeromq' is no BACKEND:TOPIC; write it as 'zeromq:/topic' or"),
         (("zeromq:", "zenoh:"), "no topic is named; write it as 'zeromq:/topic ros:/topic'"),
@@ -252,10 +252,10 @@ def test_on_a_terminal_a_table_stands_in_its_place_and_warnings_above_it(file, n
         (("zeromq:/t", "zmq:/u"), "both sides are the network 'zeromq:"),
         (("zeromq:/t", "zenoh:/t", "--direction", "a-b"), "'a-b' is no direction; did you mean 'a->b'?"),
         (("zenoh@nowhere:/t", "zeromq:/t"), "'nowhere' is no place where nodes of 'zenoh' meet"),
-        (("zeromq:/t", "memory:/t"), "nodes of 'memory' meet within one program only; join them there by"),
+        (("zeromq:/t", "memory:/t"), "the back end 'memory' connects nodes of one program only"),
         (("zeromq:/a b", "zenoh:/t"), "'/a b' cannot be a topic"),
         (("missing.toml",), "'missing.toml' cannot be read: no such file or directory; 'nep bridge --ex"),
-        (("missing.toml", "--rate", "3"), "with a file its own lines decide"),
+        (("missing.toml", "--rate", "3"), "--direction and --rate can't be used with a file"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_joined_is_one_sentence(words, said):
@@ -272,7 +272,7 @@ def test_a_rate_that_is_none_is_refused(rate):
     with running(COMMAND, "bridge", "zeromq:/t", "zenoh:/t", "--rate", rate) as program:
         _out, err = program.end()
         assert program.process.returncode == 2
-        assert "give messages a second" in re.sub(r"[\s│]+", " ", err)
+        assert "use messages per second" in re.sub(r"[\s│]+", " ", err)
 
 
 def test_a_file_is_checked_without_joining_anything(file):
@@ -282,7 +282,7 @@ def test_a_file_is_checked_without_joining_anything(file):
     with running(COMMAND, "bridge", "--check", path) as program:
         out, err = program.end()
         assert (program.process.returncode, out) == (0, "/t ↔ /t  ≤ 5 /s\n/r/* ← /s/*\n")
-        assert err.startswith("the file is right: lab joins zeromq:127.0.0.1:")
+        assert err.startswith("the file is valid: lab connects zeromq:127.0.0.1:")
     with running(COMMAND, "bridge", "--check", file('[[topics]]\na = "/t"\nmax_rate = 5\n')) as program:
         _out, err = program.end()
         assert program.process.returncode == 1

@@ -71,7 +71,7 @@ def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
         NEP node list; echo "list $?" >&2
         said=$(mktemp)
         NEP master 2>$said & master=$!
-        until grep -q "cannot reach it" $said; do kill -0 $master || break; done
+        until grep -q "can't reach it" $said; do kill -0 $master || break; done
         kill $master
         cat $said >&2; rm $said
         """,
@@ -82,7 +82,7 @@ def test_with_the_loopback_down_the_doctor_says_so_and_nobody_falls_over():
     assert found["loopback"]["command"] == "ip link set lo up"
     assert "no master answers at '127.0.0.1:7780'" in done.stderr
     assert "list 1" in done.stderr
-    assert "programs of this computer cannot reach it: network is unreachable; 'nep doctor'" in done.stderr
+    assert "programs on this computer can't reach it: network is unreachable; run 'nep doctor'" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -30,7 +30,7 @@ def run(type_in: TypeIn, monkeypatch: pytest.MonkeyPatch) -> TypeIn:
 
 @contextmanager
 def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A blackboard that keeps what comes."""
+    """A blackboard that running blackboard."""
     process = subprocess.Popen(
         [sys.executable, "-m", "nep", "blackboard", *arguments],
         stdout=subprocess.PIPE,
@@ -40,7 +40,7 @@ def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     )
     try:
         assert process.stderr is not None
-        assert "keeps what comes" in process.stderr.readline()
+        assert "running blackboard" in process.stderr.readline()
         yield process
     finally:
         if process.poll() is None:
@@ -69,7 +69,7 @@ def test_it_keeps_topics_and_shows_them(master: Master, run: TypeIn) -> None:
         assert (entry["key"], entry["value"], entry["age_by"]) == ("touched.head", 1, "stamp")
         none = run("show", "nothing.*")
         assert (none.returncode, none.stdout) == (0, "")
-        assert "nothing that matches" in none.stderr
+        assert "no matching values" in none.stderr
         refused = run("show", "")
         assert refused.returncode == 1
         assert "'' cannot be a key" in refused.stderr
@@ -96,7 +96,7 @@ def test_names_and_lives(master: Master, run: TypeIn) -> None:
 def test_what_is_wrong_is_a_sentence(master: Master, run: TypeIn) -> None:
     nobody = run("show", "--name", "nobody", "--timeout", "0.2")
     assert (nobody.returncode, nobody.stdout) == (1, "")
-    assert "no blackboard is called 'nobody' here; start one with 'nep blackboard'" in nobody.stderr
+    assert "no blackboard 'nobody' is running; start one with 'nep blackboard'" in nobody.stderr
     for words in (("a b",), ("run", ""), ("=/x",), ("--name", "")):
         done = run(*words)
         assert done.returncode == 1, words
@@ -114,7 +114,7 @@ def test_what_is_wrong_is_a_sentence(master: Master, run: TypeIn) -> None:
         node.new_server("odd/get", lambda _request: {"entries": [5]}, threads=1)
         odd = run("show", "--name", "odd")
         assert odd.returncode == 1
-        assert "what answered is no blackboard" in odd.stderr
+        assert "the service that replied is not a blackboard" in odd.stderr
 
 
 def test_without_a_master(run: TypeIn) -> None:

@@ -143,7 +143,7 @@ def test_a_master_whose_output_was_stopped_serves_on() -> None:
         address = free.address
     with shown("master", "--no-gateway", master=address) as command:
         eventually(lambda: is_running(address, 0.5), LONG_S)
-        eventually(lambda: "Ctrl+C ends it" in command.look(), LONG_S)
+        eventually(lambda: "press Ctrl+C to stop" in command.look(), LONG_S)
         command.press(STOP)
         with nep.node("loud", master=address) as node:
             pairs = [(node.new_pub(f"/{n}", "json"), node.new_pub(f"/{n}", "string")) for n in range(20)]

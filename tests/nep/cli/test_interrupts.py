@@ -197,7 +197,7 @@ def test_an_interrupt_in_the_middle_of_a_finalizer_comes_again(monkeypatch: pyte
         del made
         threading.Event().wait(60.0)
 
-    monkeypatch.setattr(interrupts, "_end_later", lambda: None)
+    monkeypatch.setattr(interrupts, "_exit_after_grace", lambda: None)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         interrupts.ask_first()

@@ -101,7 +101,7 @@ def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node, run: Ty
     assert (
         run("watch", "robot", "mode", "--json", "--count", "1").stdout == '{"name":"mode","value":"walk"}\n'
     )
-    assert "no parameter 'mod'; did you mean 'mode'?" in run("watch", "robot", "mod").stderr
+    assert "unknown parameter 'mod'; did you mean 'mode'?" in run("watch", "robot", "mod").stderr
     late = run("watch", "robot", "mode", "--timeout", "1")
     assert (late.returncode, late.stdout) == (1, 'mode: "walk"\n')
     assert "1 s" in late.stderr
@@ -109,7 +109,7 @@ def test_watching_one_ends_when_its_node_does_or_in_time(node: nep.Node, run: Ty
     try:
         assert watching.process.stdout.readline() == "speed: 0.5\n"
         node.close()
-        assert "the node has gone; watch it anew" in watching.wait_says("gone")
+        assert "the node has left; watch it again" in watching.wait_says("left")
         assert watching.process.wait(LONG_S) == 1
     finally:
         watching.close()

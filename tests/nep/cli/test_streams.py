@@ -126,7 +126,7 @@ def test_a_full_disk_is_a_sentence(talkers, words, unbuffered):
     with FULL.open("w") as full, command(*words, stdout=full, env=env) as running:
         said = running.stderr.read().decode()
     assert running.returncode == 1
-    assert said == f"nep: the output cannot be written: no space left on device{os.linesep}"
+    assert said == f"nep: can't write the output: no space left on device{os.linesep}"
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="/dev/full is a device of Linux")
@@ -143,18 +143,18 @@ def test_an_error_stream_that_is_full_changes_nothing(talkers):
     assert done.returncode == 0
 
 
-OUT = "nep: the output cannot be written: it is closed\n"
+OUT = "nep: can't write the output: it is closed\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell of Unix closes streams")
 @pytest.mark.parametrize(
     ("closed", "words", "code", "said"),
     [
-        ("0<&-", "topic pub new -", 1, "nep: the standard input cannot be read: it is closed\n"),
+        ("0<&-", "topic pub new -", 1, "nep: can't read the standard input: it is closed\n"),
         ("0<&-", "topic list", 0, ""), ("0<&- 1>&-", "topic list", 1, OUT), ("1>&-", "--version", 1, OUT),
         ("1>&-", "topic list --json", 1, OUT), ("1>&-", "topic echo big --json", 1, OUT),
         ("1>&-", "topic echo text", 1, OUT), ("0<&- 1>&- 2>&-", "topic list", 1, ""),
-        ("1>&-", "topic pub new 1", 0, "published 1 on 'new' (json) to nobody\n"),
+        ("1>&-", "topic pub new 1", 0, "published 1 on 'new' (json) to no subscribers\n"),
         ("2>&-", "topic echo nobody --timeout 0.1", 1, ""), ("2>&-", "topic pub new 1", 0, ""),
     ],
 )  # fmt: skip
@@ -196,7 +196,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(talkers, words):
     running.stderr.close()
     assert code == 1
     assert "Traceback" not in said
-    assert "cannot be written" not in said
+    assert "can't write" not in said
     assert "Exception" not in said
 
 
@@ -219,4 +219,4 @@ def test_a_full_disk_is_a_sentence_also_when_more_came_than_a_buffer_holds(talke
     with FULL.open("w") as full, command("topic", "echo", "big", "--json", stdout=full) as running:
         said = running.stderr.read().decode()
     assert running.returncode == 1
-    assert said == f"nep: the output cannot be written: no space left on device{os.linesep}"
+    assert said == f"nep: can't write the output: no space left on device{os.linesep}"

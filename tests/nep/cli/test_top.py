@@ -120,7 +120,7 @@ def test_in_a_terminal_it_fits_says_what_is_left_out_and_marks_new_losses(
     out = io.StringIO()
     screen = Console(file=out, force_terminal=True, width=100, height=20, color_system="standard")
     live = Live(console=screen, auto_refresh=False)
-    shown = top._Live(top._Shown("", TopicOrder.NAME), live)
+    shown = top._LiveTables(top._GraphPrinter("", TopicOrder.NAME), live)
     many = [topic(f"/t{number:02}", 1.0, 0) for number in range(50)]
     with live:
         shown.show(graph(*many), "")

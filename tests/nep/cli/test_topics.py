@@ -57,7 +57,7 @@ def test_what_cannot_be_decoded_is_told_as_bytes_with_the_reason(capfdbinary):
             message(b"x" * 9000, "image", extension={"shape": [240, 320, 3], "encoding": "jpeg"}),
             "jpeg 320 x 240, 9.0 kB",
         ),
-        (message(b"{oops"), "5 B, no json: 7b 6f 6f 70 73"),
+        (message(b"{oops"), "5 B, not valid json: 7b 6f 6f 70 73"),
     ],
 )
 def test_people_see_one_line_a_message(given, shown, capsys):
@@ -99,7 +99,7 @@ def test_a_file_can_be_published(tmp_path):
     file.write_bytes(b'{"a": 1}')
     assert value_of(f"@{file}", "json") == {"a": 1}
     assert value_of(f"@{file}", "bytes") == b'{"a": 1}'
-    with pytest.raises(EncodeError, match="cannot be read"):
+    with pytest.raises(EncodeError, match="can't read"):
         value_of("@/nowhere/at/all", "bytes")
     with pytest.raises(EncodeError, match=r"@picture\.jpg"):
         value_of("hello", "image")
@@ -107,8 +107,8 @@ def test_a_file_can_be_published(tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="/dev/zero is a device of Unix")
 def test_a_device_without_end_is_no_file(monkeypatch):
-    monkeypatch.setattr("nep.cli.publish._MOST_BYTES", 1000)
-    with pytest.raises(EncodeError, match=r"more than the 1\.0 kB"):
+    monkeypatch.setattr("nep.cli.publish._MAX_FILE_BYTES", 1000)
+    with pytest.raises(EncodeError, match=r"larger than 1\.0 kB"):
         value_of("@/dev/zero", "bytes")
 
 

@@ -78,8 +78,8 @@ def test_alarms_are_json_for_programs_and_what_only_studio_can_do_is_said(master
     records = [json.loads(line) for line in done.stdout.splitlines()]
     assert [(each["event"], each["alarm"]) for each in records] == [("on", "near"), ("did", "near")]
     assert records[0]["seen"] == 0.3
-    assert records[1]["what"] == "only Studio can do this: stop all robots"
-    assert "so it is not done here: stop all robots" in plain.stderr
+    assert records[1]["what"] == "this action needs Studio: stop all robots"
+    assert "need Studio and are skipped: stop all robots" in plain.stderr
 
 
 def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, file) -> None:
@@ -95,11 +95,11 @@ def test_an_alarm_keeps_the_last_seconds_by_whoever_has_them(master, type_in, fi
             done = type_in("watch", name, "-n", "1", "--master", master.address)
         eventually(lambda: not has_ring(node.graph()))
         refused = type_in("watch", name, "-n", "1", "--master", master.address, "--json")
-    assert done.stdout.splitlines()[1].split("  ", 1)[1].strip() == "kept there/kept-1.mcap"
+    assert done.stdout.splitlines()[1].split("  ", 1)[1].strip() == "saved there/kept-1.mcap"
     assert asked == [{"seconds": 30, "note": "range of /distance is 0.3, below 0.4"}]
-    assert "only Studio" not in done.stderr
+    assert "need Studio" not in done.stderr
     told = [json.loads(line)["what"] for line in refused.stdout.splitlines()]
-    assert told[1] == "nothing was kept: no 'nep recording ring' is on"
+    assert told[1] == "nothing was saved: 'nep recording ring' is not running"
 
 
 def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
@@ -110,7 +110,7 @@ def test_a_message_is_sent_and_a_typo_is_told(master, type_in, file) -> None:
     with Talker(master.address, "/distance", {"range": 0.3}) as node, node.new_sub("/say", "json") as heard:
         done = type_in("watch", name, "-n", "1", "--master", master.address)
         assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
-    assert "'/distanse' is not there yet; waiting. did you mean '/distance'?" in done.stderr
+    assert "'/distanse' does not exist yet; waiting. did you mean '/distance'?" in done.stderr
     assert "sent to /say" in done.stdout
 
 
@@ -182,17 +182,17 @@ def test_a_master_that_is_away_is_waited_for(type_in, file, monkeypatch) -> None
         ended.set()
         thread.join()
     assert "; waiting" in done.stderr
-    assert "a master is there" in done.stderr
+    assert "connected to the master" in done.stderr
     assert "range of /distance is 0.3" in done.stdout
 
 
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ((), 1, "give a file of alarms"),
+        ((), 1, "give an alarm file"),
         (("none.json",), 1, "'none.json' cannot be read"),
-        (("FILE", "--check"), 0, "the file is right"),
-        (("OFF",), 1, "is switched on"),
+        (("FILE", "--check"), 0, "the file is valid"),
+        (("OFF",), 1, "are switched off"),
         (("BAD",), 1, "line 1 of"),
     ],
 )

@@ -105,7 +105,7 @@ def test_what_is_missing_or_cannot_be_read_is_counted(capsys):
     said = capsys.readouterr().err
     assert "'x' was missing in 1 of 3 messages" in said
     assert "'y' was missing in 2 of 3 messages" in said
-    assert "1 message could not be read and left out" in said
+    assert "skipped 1 undecodable message" in said
 
 
 def test_a_pictures_fields_are_its_shape():
