@@ -1,1 +1,1 @@
-"""Programs made of nodes that also run as commands: bridges, blackboards, alarms; and what they share."""
+"""Programs built from nodes that also run as commands, such as bridges, blackboards and alarms."""

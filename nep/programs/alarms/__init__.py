@@ -1,8 +1,8 @@
-"""Alarms in plain words: "when /robot/camera is silent for 2 s, show a banner".
+"""Alarms such as "when /robot/camera is silent for 2 s, show a banner".
 
-`rule` has what an alarm is told, `rule_file` reads and writes it, `sentences` say it. `evaluator` looks at
-messages and at the graph and tells what came on and went off; `alarms` does what is to be done then and keeps
-the `history`; `commands` calls services and sends. `nep watch` and Studio are made of these.
+`rule` defines rules, `rule_file` reads and writes them, `sentences` formats them. `evaluator` evaluates rules
+against messages, the graph and time; `alarms` runs the actions and keeps the `history`; `commands` calls
+services and publishes. `nep watch` and Studio use these.
 """
 
 from nep.programs.alarms.alarms import Alarms

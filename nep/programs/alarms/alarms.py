@@ -1,4 +1,4 @@
-"""Alarms: what is done when one comes on, what came of it, and the history. `nep watch` and Studio use it."""
+"""Alarms: rules, the actions that run when one turns on, and the history. Used by `nep watch` and Studio."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ MOST_TRIES = 20
 _MOST_DEEDS = 1_000
 
 Done = Callable[[bool, str], None]
-"""Whether an action was carried out, and what came of it in words; called once, in any thread."""
+"""Completion callback of an action: success, and the result in words. Called once, from any thread."""
 Carrier = Callable[[AlarmEvent, AlarmAction, Done], None]
-"""Carries out one kind of action without waiting."""
+"""Function that starts one kind of action without blocking."""
 
 
 @dataclass(slots=True)
@@ -36,7 +36,10 @@ class _Retry:
 
 
 class Alarms:
-    """Rules with their history. One thread uses it, but for `evaluator.take` and what carries out actions."""
+    """Alarm rules with their history and running actions.
+
+    Not thread-safe, except for `evaluator.take` and the completion callbacks of actions.
+    """
 
     def __init__(
         self,
@@ -47,9 +50,14 @@ class Alarms:
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
     ) -> None:
-        """`carriers` carry out actions by their kind; one that has none is written down as not done.
+        """Initialize the alarms.
 
-        `clock` is monotonic, `clock_s` tells seconds since 1970.
+        Args:
+            rules: Rules to evaluate.
+            history: Earlier records (default: none).
+            carriers: Functions that run actions, by kind of action; other kinds are recorded as failed.
+            clock: Monotonic clock in seconds.
+            clock_s: Clock in seconds since 1970.
         """
         self.evaluator = AlarmEvaluator(rules, clock=clock, clock_s=clock_s)
         self.history = history if history is not None else AlarmHistory()
@@ -60,57 +68,57 @@ class Alarms:
         self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MOST_DEEDS)
         self._under_way = 0
         self.revision = 0
-        """Grows with the rules."""
+        """Number of rule changes."""
 
     @property
     def rules(self) -> tuple[AlarmRule, ...]:
-        """All rules, in the order in which they are shown."""
+        """All rules, in display order."""
         return self.evaluator.rules
 
     def set_rules(self, rules: Sequence[AlarmRule]) -> None:
-        """Watch these from now on."""
+        """Replace all rules."""
         self.evaluator.set_rules(rules)
         self.revision += 1
 
     def rule(self, rule_id: str) -> AlarmRule | None:
-        """The rule of this id."""
+        """Return the rule with this id, or None."""
         return next((rule for rule in self.rules if rule.id == rule_id), None)
 
     def put(self, rule: AlarmRule) -> None:
-        """Change the rule of this id, or add it as the first."""
+        """Replace the rule with the same id, or insert a new one at the front."""
         if self.rule(rule.id) is None:
             self.set_rules([rule, *self.rules])
         else:
             self.set_rules([rule if each.id == rule.id else each for each in self.rules])
 
     def remove(self, rule_id: str) -> None:
-        """Watch this one no more."""
+        """Remove the rule with this id."""
         self.set_rules([each for each in self.rules if each.id != rule_id])
 
     def snooze(self, rule_id: str, until_s: float) -> None:
-        """Let nothing be done until then (seconds since 1970; 0 ends a snooze)."""
+        """Run no actions of this alarm until `until_s` (seconds since 1970; 0 ends a snooze)."""
         rule = self.rule(rule_id)
         if rule is not None:
             self.put(replace(rule, snoozed_until_s=until_s))
 
     def retry_in_s(self, rule_id: str) -> float | None:
-        """In how many seconds something that failed is tried again; None when nothing is."""
+        """Return the seconds until a failed action is retried, or None if none is pending."""
         dues = [retry.due for (id, _kind), retry in self._retries.items() if id == rule_id]
         return max(0.0, min(dues) - self._clock()) if dues else None
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is being carried out."""
+        """True while an action is running."""
         return self._under_way > 0
 
     def take_deeds(self) -> list[tuple[AlarmRule, str, float]]:
-        """What was done since the last time: of which rule, in words, when (seconds since 1970)."""
+        """Return the actions completed since the last call: (rule, result in words, seconds since 1970)."""
         deeds = list(self._deeds)
         self._deeds.clear()
         return deeds
 
     def tick(self) -> list[AlarmEvent]:
-        """Let time go by: what happened, which is in the history and whose actions have begun."""
+        """Evaluate time-based rules, start actions and retries, and return the new events."""
         self._take_answers()
         events = self.evaluator.tick()
         for event in events:
@@ -143,7 +151,7 @@ class Alarms:
         done = partial(self._answer, event, action, tries)
         try:
             carrier(event, action, done)
-        except Exception as error:  # noqa: BLE001  one action that fails must not keep the next from its turn
+        except Exception as error:  # noqa: BLE001  a failing action must not block the next
             done(False, str(error) or type(error).__name__)
 
     def _answer(self, event: AlarmEvent, action: AlarmAction, tries: int, well: bool, words: str) -> None:

@@ -1,4 +1,4 @@
-"""Calling services and sending messages for alarms: clients and publishers are made once, and kept."""
+"""Service calls and messages of alarms, with cached clients and publishers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nep.programs.alarms.rule import AlarmAction
 __all__ = ["CALL_S", "AlarmCommands"]
 
 CALL_S = 5.0
-"""How long a call waits for a server and its answer."""
+"""Timeout of a service call."""
 _MOST_KEPT = 50
 
 
@@ -26,10 +26,9 @@ def _never(_node: Node, _topic: str, _msg_type: str) -> str:
 
 
 class AlarmCommands:
-    """Carries out "call" and "send" with a node. `carry` may be called in any one thread at a time."""
+    """Runner of the actions "call" and "send" with a node. Thread-safe."""
 
     def __init__(self, refusal: Callable[[Node, str, str], str] = _never) -> None:
-        """`refusal` says of a topic and a type why a node may not send there now; "" when it may."""
         self._refusal = refusal
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
@@ -37,7 +36,7 @@ class AlarmCommands:
         self._node: Node | None = None
 
     def carry(self, node: Node, action: AlarmAction, done: Done) -> None:
-        """Call or send. Waits for a publisher's first handshake, not for answers. Never raises."""
+        """Start an action. Blocks for a publisher's first handshake, not for replies. Never raises."""
         try:
             with self._lock:
                 self._use(node)
@@ -47,7 +46,7 @@ class AlarmCommands:
                 publisher = self._publisher(node, action)
                 refusal = self._refusal(
                     node, action.name, action.msg_type
-                )  # asked last: making it takes time
+                )  # checked last: creating the publisher takes time
                 if refusal:
                     done(False, _("not sent: {reason}").format(reason=refusal))
                     return
@@ -60,7 +59,7 @@ class AlarmCommands:
         done(heard, said.format(topic=action.name))
 
     def close(self) -> None:
-        """Forget clients and publishers; their node closes them."""
+        """Drop cached clients and publishers; their node closes them."""
         with self._lock:
             self._clients.clear()
             self._publishers.clear()

@@ -1,7 +1,7 @@
-"""AlarmEvaluator: looks at messages, at the graph and at the clock, and tells what came on and went off.
+"""Evaluation of alarm rules against messages, the graph and the clock.
 
-Messages are given in the thread in which they arrive, the graph and the time in another: a lock is held for
-what is compared, never while a message is decoded.
+Messages arrive in the node's thread, the graph and time in another: a lock is held during comparisons, never
+while a message is decoded.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from nep.protocol.topic_pattern import matches
 __all__ = ["AlarmEvaluator", "AlarmEvent", "AlarmPhase", "AlarmState"]
 
 LARGE_BYTES = 256 * 1024
-"""Of larger messages the newest of each batch is read; the others are counted."""
+"""Of larger messages only the newest of each batch is decoded."""
 MOST_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
-"""A master that was started anew does not know all nodes at once."""
+"""Time in which nodes register at a restarted master; until then none counts as gone."""
 RATE_WINDOW_S, LONGEST_RATE_WINDOW_S = 2.0, 60.0
 _SAMPLE_S = 0.25
 _SAMPLES = 256
@@ -37,10 +37,10 @@ AlarmPhase = Literal["off", "faulty", "waits", "well", "pending", "on"]
 
 @dataclass(frozen=True, slots=True)
 class AlarmEvent:
-    """What happened to an alarm: it came "on", went "off", or is "still" on when its snooze ended.
+    """Transition of an alarm: "on", "off", or "still" on when its snooze ended.
 
-    `seen` is the value that did it, `at_s` when in seconds since 1970, `lasted_s` how long it was on, `count`
-    how often it came in this time. `is_snoozed`: nothing is to be done.
+    `seen` is the value that caused it, `at_s` its time (s since 1970), `lasted_s` how long the alarm was on,
+    `count` how often it occurred meanwhile. With `is_snoozed` no action is run.
     """
 
     kind: Literal["on", "off", "still"]
@@ -54,12 +54,16 @@ class AlarmEvent:
 
 @dataclass(frozen=True, slots=True)
 class AlarmState:
-    """How an alarm is now.
+    """Current state of an alarm.
 
-    `phase`: "off" (nobody wants it), "faulty" (the rule has a problem), "waits" (what it is about was never
-    there), "well", "pending" (it is so, not yet for long enough) or "on". `seen` is the newest value,
-    `on_for_s` for how long it is on. `trouble`: "missing" when the newest message has no such value,
-    "no_number" when it is none, "unreadable" when the message can't be decoded.
+    Attributes:
+        phase: "off" (disabled), "faulty" (invalid rule), "waits" (its subject was never seen), "well"
+            (condition false), "pending" (true, but not yet long enough) or "on".
+        seen: Newest value.
+        on_for_s: How long the alarm has been on.
+        count: How often it occurred since it is on.
+        trouble: "missing" if the newest message lacks the field, "no_number" if it isn't a number,
+            "unreadable" if the message can't be decoded.
     """
 
     phase: AlarmPhase
@@ -71,7 +75,7 @@ class AlarmState:
 
 @dataclass(slots=True, eq=False)
 class _Heard:
-    """A topic whose messages are heard."""
+    """Subscribed topic: its message count, last arrival, and the rules that read its values."""
 
     readers: list[AlarmTrack] = field(default_factory=list)
     there_since: float | None = None
@@ -81,7 +85,6 @@ class _Heard:
     samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
 
     def rate_hz(self, window_s: float, now: float) -> float | None:
-        """Messages a second within the last `window_s`; None while it is not known for so long."""
         begin = None
         for at, count in self.samples:
             if now - at < window_s:
@@ -91,7 +94,7 @@ class _Heard:
 
 
 class AlarmEvaluator:
-    """Evaluates rules. `take` may be called in any thread, the rest in one."""
+    """Evaluator of alarm rules. `take` is thread-safe; call the rest from one thread."""
 
     def __init__(
         self,
@@ -100,7 +103,6 @@ class AlarmEvaluator:
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
     ) -> None:
-        """`clock` is monotonic, `clock_s` tells seconds since 1970."""
         self._clock, self._clock_s = clock, clock_s
         self._lock = threading.Lock()
         self._rules: tuple[AlarmRule, ...] = ()
@@ -109,7 +111,7 @@ class AlarmEvaluator:
         self._losses: dict[str, TopicLosses] = {}
         self._events: deque[AlarmEvent] = deque(maxlen=MOST_EVENTS)
         self._quiet: set[str] = set()
-        """Those that came on while they were snoozed."""
+        """Ids of alarms that turned on while snoozed."""
         self._view: GraphView | None = None
         self._nodes: frozenset[str] = frozenset()
         self._topics: frozenset[str] = frozenset()
@@ -117,9 +119,9 @@ class AlarmEvaluator:
         self._epoch_at = 0.0
         self._sampled_at = 0.0
         self.skipped = 0
-        """Large messages that were not read."""
+        """Number of large messages that were not decoded."""
         self.came = threading.Event()
-        """Set when a message brought an alarm on, for who waits for nothing else."""
+        """Set when a message turned an alarm on, so that a waiting thread wakes up."""
         self.set_rules(rules)
 
     @property
@@ -129,11 +131,11 @@ class AlarmEvaluator:
 
     @property
     def topics(self) -> frozenset[str]:
-        """The topics whose messages it wants."""
+        """Topics that must be subscribed for the rules."""
         return topics_of([track.rule for track in self._tracks.values()])
 
     def set_rules(self, rules: Sequence[AlarmRule]) -> None:
-        """Watch these from now on; what is known of those that stay the same is kept."""
+        """Replace the rules; unchanged rules keep their state."""
         now = self._clock()
         with self._lock:
             before, self._tracks = self._tracks, {}
@@ -171,10 +173,10 @@ class AlarmEvaluator:
                 kept = losses.get(condition.name) or TopicLosses()
                 self._losses[condition.name] = kept
 
-    # ---- what is looked at
+    # ---- inputs
 
     def take(self, topic: str, messages: Sequence[Message]) -> None:
-        """Messages of a topic arrived, oldest first. Costs nothing for topics that no rule is about."""
+        """Process messages of a topic, oldest first. Does nothing for topics without a rule."""
         heard = self._heard.get(topic)
         if heard is None or not messages:
             return
@@ -197,7 +199,7 @@ class AlarmEvaluator:
             self.came.set()
 
     def see(self, view: GraphView | None) -> None:
-        """A new graph; None while no master answers: then nobody is taken to have left."""
+        """Process a new graph; None while no master replies, so that no node counts as gone."""
         now = self._clock()
         with self._lock:
             before, self._view = self._view, view
@@ -227,7 +229,6 @@ class AlarmEvaluator:
         *,
         is_settled: bool,
     ) -> None:
-        """Who came or left."""
         kind, name = track.rule.condition.kind, track.rule.condition.name
         turn: Turn | None = None
         if kind == "leaves":
@@ -248,7 +249,10 @@ class AlarmEvaluator:
             self._tell(track, turn)
 
     def tick(self) -> list[AlarmEvent]:
-        """Let time go by; what happened since the last time. Call it ten times a second or more often."""
+        """Evaluate time-based conditions and return the events since the last call.
+
+        Call it at least 10 times a second.
+        """
         now, now_s = self._clock(), self._clock_s()
         with self._lock:
             self.came.clear()
@@ -286,7 +290,7 @@ class AlarmEvaluator:
             if percent is not None:
                 return track.compare(percent, now, is_below=False)
         elif condition.kind == "leaves" and self._view is None:
-            return None  # without a master nobody knows who is there
+            return None  # without a master it is unknown which nodes exist
         return track.settle(now)
 
     def _tell(self, track: AlarmTrack, turn: Turn) -> None:
@@ -302,14 +306,14 @@ class AlarmEvaluator:
             )
         )
 
-    # ---- how it is
+    # ---- state
 
     def state(self, rule: AlarmRule) -> AlarmState:
-        """How an alarm is now."""
+        """Return the current state of a rule's alarm."""
         now = self._clock()
         with self._lock:
             track = self._tracks.get(rule.id)
-            if track is None:  # only then is it worth to look for a problem again
+            if track is None:  # validate again only if the rule is not evaluated
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
             heard = self._heard.get(condition.name) if condition.hears else None
@@ -324,7 +328,7 @@ class AlarmEvaluator:
 
     @property
     def states(self) -> Mapping[str, AlarmState]:
-        """How all alarms are now, by their ids."""
+        """Current states of all alarms by rule id."""
         return {rule.id: self.state(rule) for rule in self._rules}
 
 
@@ -333,12 +337,10 @@ def _watches_the_same(one: AlarmRule, other: AlarmRule) -> bool:
 
 
 def _window_s(limit_hz: float) -> float:
-    """How far back a rate is counted: rare messages need a longer time until they are known to be rarer."""
     return min(LONGEST_RATE_WINDOW_S, max(RATE_WINDOW_S, 3.0 / limit_hz))
 
 
 def _payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:
-    """What they say; whether the newest could not be read; how many large ones were passed over."""
     payloads: list[object] = []
     unreadable, skipped, newest = False, 0, messages[-1]
     for message in messages:

@@ -1,4 +1,4 @@
-"""What alarms saw: when each came on, for how long, and what was done. Bounded."""
+"""Bounded history of alarms: when each was on, for how long, and which actions ran."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MOST_RECORDS = 500
 _MOST_DEEDS = 20
 _MOST_LETTERS = 300
 _LATEST_S = 3e10
-"""Later times (the year 2920) are none: not every system has a date for them."""
+"""Later times (after the year 2920) are invalid: some systems have no date for them."""
 
 
 class AlarmDeed(NamedTuple):
-    """Something that was done: which kind of action, and what came of it in words."""
+    """Completed action: its kind, and the result in words."""
 
     kind: str
     words: str
@@ -27,12 +27,17 @@ class AlarmDeed(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class AlarmRecord:
-    """One time that an alarm was on.
+    """Period in which an alarm was on.
 
-    `rule_id`: which alarm. `words`: what was seen, "range of /distance is 0.36, below 0.4". `at_s`: when, in
-    seconds since 1970. `lasted_s`: for how long, None while it is on or when nobody saw its end. `is_on`:
-    whether it is on now. `count`: how often it came within this time. `was_snoozed`: nothing was done.
-    `deeds`: what was done.
+    Attributes:
+        rule_id: Id of the rule.
+        words: What was seen, such as "range of /distance is 0.36, below 0.4".
+        at_s: Start (s since 1970).
+        lasted_s: Duration, None while the alarm is on or if its end was not seen.
+        is_on: True while the alarm is on.
+        count: How often the condition became true in this period.
+        was_snoozed: True if no action ran.
+        deeds: Completed actions.
     """
 
     rule_id: str
@@ -45,51 +50,49 @@ class AlarmRecord:
     deeds: list[AlarmDeed] = field(default_factory=list)
 
     def add(self, deed: AlarmDeed) -> None:
-        """Something was done; the same kind said anew takes the place of what was said before."""
+        """Add a completed action; it replaces an earlier one of the same kind."""
         kept = [each for each in self.deeds if each.kind != deed.kind]
         self.deeds = [*kept, deed][-_MOST_DEEDS:]
 
 
 class AlarmHistory:
-    """The last `MOST_RECORDS` times, oldest first. One thread uses it."""
+    """The last `MAX_RECORDS` records, oldest first; iteration is newest first. Not thread-safe."""
 
     def __init__(self, records: Iterable[AlarmRecord] = ()) -> None:
         self.records: deque[AlarmRecord] = deque(records, maxlen=MOST_RECORDS)
         self.revision = 0
 
     def __iter__(self) -> Iterator[AlarmRecord]:
-        """Newest first."""
         return reversed(self.records)
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self.records)
 
     def add(self, record: AlarmRecord) -> None:
-        """One more; the oldest goes when there are too many."""
+        """Append a record; evict the oldest beyond the limit."""
         self.records.append(record)
         self.revision += 1
 
     def current(self, rule_id: str) -> AlarmRecord | None:
-        """The record of an alarm that is on."""
+        """Return the record of an alarm that is on, or None."""
         return next((each for each in self if each.rule_id == rule_id and each.is_on), None)
 
     def last(self, rule_id: str) -> AlarmRecord | None:
-        """The newest record of an alarm."""
+        """Return the newest record of an alarm, or None."""
         return next((each for each in self if each.rule_id == rule_id), None)
 
     def since(self, rule_id: str, at_s: float) -> int:
-        """How often an alarm came on since then."""
+        """Return how often an alarm turned on since `at_s`."""
         return sum(each.rule_id == rule_id and each.at_s >= at_s for each in self.records)
 
     def clear(self) -> None:
-        """Forget all but those that are on."""
+        """Remove all records except of alarms that are on."""
         self.records = deque((each for each in self.records if each.is_on), maxlen=MOST_RECORDS)
         self.revision += 1
 
 
 def record_plain(record: AlarmRecord) -> dict[str, object]:
-    """The record as it is kept in a file."""
+    """Convert a record to its JSON form."""
     plain: dict[str, object] = {"alarm": record.rule_id, "words": record.words, "at_s": round(record.at_s, 3)}
     if record.lasted_s is not None:
         plain["lasted_s"] = round(record.lasted_s, 3)
@@ -103,7 +106,7 @@ def record_plain(record: AlarmRecord) -> dict[str, object]:
 
 
 def record_from(told: object) -> AlarmRecord | None:
-    """The record that a file holds; None for what is none. None of them is on: nobody saw its end."""
+    """Convert JSON to a record; None if it is invalid. Records are never on: their end was not seen."""
     if not isinstance(told, Mapping):
         return None
     rule_id, words, at_s = told.get("alarm"), told.get("words"), told.get("at_s")

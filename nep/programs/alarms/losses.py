@@ -1,4 +1,4 @@
-"""What a topic's subscribers lost within the last seconds, as the graph tells their counts."""
+"""Recent losses of a topic's subscribers, computed from the counts in the graph."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ __all__ = ["TopicLosses"]
 
 _EVERY_S = 0.9
 _MOST = 700
-"""Samples: ten minutes."""
+"""Number of samples: ten minutes."""
 
 
 class TopicLosses:
-    """Counts by subscriber, so that one who comes, or begins anew, does not look like a loss."""
+    """Loss counts per subscriber, so that new and restarted subscribers don't count as losses."""
 
     def __init__(self) -> None:
         self._before: dict[int, tuple[int, int]] = {}
@@ -22,7 +22,7 @@ class TopicLosses:
         self._known = False
 
     def add(self, info: TopicInfo | None, now: float) -> None:
-        """Take over the counts of a graph; None when the topic is not there."""
+        """Add the counts of a graph snapshot; None if the topic doesn't exist."""
         counts = {
             each.id: (each.lost, each.received)
             for each in (info.subscribers if info is not None else ())
@@ -43,7 +43,7 @@ class TopicLosses:
             self._grew.append((now, lost, received))
 
     def percent(self, window_s: float, now: float) -> float | None:
-        """Lost ones of all that should have arrived within the last `window_s`, 0 to 100; None if unknown."""
+        """Return the percentage of messages lost in the last `window_s`, or None if unknown."""
         if not self._known:
             return None
         lost = received = 0

@@ -1,4 +1,4 @@
-"""What an alarm is: when it comes on, and what is done then. Values only; nothing is looked at here."""
+"""Alarm rules: condition, actions, and their validation. Pure data."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 Scalar = float | int | str | bool | None
-"""What a message's value is compared with."""
+"""Value that a field is compared with."""
 
 TOPIC_KINDS = ("silent", "rate_below", "rate_above", "loses", "appears")
 VALUE_KINDS = ("below", "above", "equals", "is_not", "changes")
@@ -43,7 +43,7 @@ KINDS = (*TOPIC_KINDS, *VALUE_KINDS, *NODE_KINDS)
 NEEDS_LIMIT = frozenset({"rate_below", "rate_above", "loses", "below", "above", "equals", "is_not"})
 NUMBER_KINDS = NEEDS_LIMIT - {"equals", "is_not"}
 EVENT_KINDS = frozenset({"changes", "appears", "comes"})
-"""What happens at a moment, and does not last."""
+"""Conditions that are momentary, not lasting."""
 ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
 NAMED_ACTIONS = frozenset({"run", "call", "send"})
 
@@ -59,14 +59,16 @@ _GREATEST = 1e300
 
 @dataclass(frozen=True, slots=True)
 class AlarmCondition:
-    """When an alarm comes on.
+    """Condition of an alarm.
 
-    `kind` is one of `KINDS`. `name` is a topic (for "appears" perhaps with wildcards) or a node, "" while
-    nobody has said it. `path` is the value in the topic's messages, as in `nep topic echo`. `limit` is what
-    the value is compared with: a number for `NUMBER_KINDS` (messages a second for rates, per cent for
-    "loses"). `for_s`: how long it must be so without a break, in seconds; of "silent" how long nothing came,
-    of "loses" how far back is counted. `margin`: how far back beyond the limit a number must go until the
-    alarm may go off.
+    Attributes:
+        kind: One of `KINDS`.
+        name: Topic (with "appears" also a pattern) or node; "" while not chosen.
+        path: Field path of the compared value, as in `nep topic echo`.
+        limit: Value to compare with: a number for `NUMBER_KINDS` (Hz for rates, percent for "loses").
+        for_s: How long the condition must hold without a break; for "silent" the silence, for "loses" the
+            length of the window.
+        margin: Hysteresis: distance beyond the limit that a number must go back before the alarm turns off.
     """
 
     kind: str
@@ -78,32 +80,36 @@ class AlarmCondition:
 
     @property
     def is_about_node(self) -> bool:
-        """Whether `name` is a node's."""
+        """True if `name` is a node."""
         return self.kind in NODE_KINDS
 
     @property
     def is_about_value(self) -> bool:
-        """Whether messages must be read to know it."""
+        """True if messages must be decoded."""
         return self.kind in VALUE_KINDS
 
     @property
     def number(self) -> float:
-        """The limit of `NUMBER_KINDS`; no number (NaN) for what is compared otherwise."""
+        """Limit as a float; NaN if the kind has no numeric limit."""
         is_number = isinstance(self.limit, int | float) and not isinstance(self.limit, bool)
         return float_of(self.limit) if is_number else math.nan  # type: ignore[arg-type]
 
     @property
     def hears(self) -> bool:
-        """Whether the messages of its topic must be heard."""
+        """True if the topic must be subscribed."""
         return self.is_about_value or self.kind in {"silent", "rate_below", "rate_above"}
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmAction:
-    """What is done when an alarm comes on.
+    """Action that runs when an alarm turns on.
 
-    `kind` is one of `ACTION_KINDS`. `name`: of the behaviour to run, the service to call, the topic to send
-    on. `payload`: what is asked or sent. `msg_type`: the type of the topic. `seconds`: how much is kept.
+    Attributes:
+        kind: One of `ACTION_KINDS`.
+        name: Behaviour to run, service to call, or topic to publish on.
+        payload: Request or payload.
+        msg_type: Type of the topic.
+        seconds: Length of the saved recording.
     """
 
     kind: str
@@ -115,11 +121,16 @@ class AlarmAction:
 
 @dataclass(frozen=True, slots=True)
 class AlarmRule:
-    """One alarm.
+    """Alarm rule.
 
-    `is_on`: whether a person wants it. `calm_s`: so long it must be well again until the alarm goes off; what
-    happens again before is the same alarm, counted. `snoozed_until_s`: in seconds since 1970; until then
-    nothing is done, and the history goes on.
+    Attributes:
+        id: Unique id.
+        condition: When the alarm turns on.
+        actions: What runs then.
+        is_on: False if a person disabled the alarm.
+        calm_s: How long the condition must be false before the alarm turns off; repetitions before that are
+            counted, not reported.
+        snoozed_until_s: End of the snooze (s since 1970), in which no actions run; the history continues.
     """
 
     id: str
@@ -130,12 +141,12 @@ class AlarmRule:
     snoozed_until_s: float = 0.0
 
     def is_snoozed(self, now_s: float) -> bool:
-        """Whether nothing is done now; `now_s` in seconds since 1970."""
+        """Return whether the alarm is snoozed at `now_s` (s since 1970)."""
         return now_s < self.snoozed_until_s
 
 
 class RuleProblem(NamedTuple):
-    """What is wrong with a rule: which of its parts (a key of its file), and a sentence without full stop."""
+    """Problem of a rule: the key in its file, and a sentence without full stop."""
 
     key: str
     sentence: str
@@ -146,13 +157,11 @@ class _Check:
     found: list[RuleProblem] = field(default_factory=list)
 
     def number(self, key: str, value: object, least: float, most: float) -> None:
-        """A number between these."""
         if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
             said = _("it must be a number from {least:g} to {most:g}")
             self.found.append(RuleProblem(key, said.format(least=least, most=most)))
 
     def named(self, key: str, check: object, name: str) -> None:
-        """What `check` does not raise for."""
         try:
             check(name)  # type: ignore[operator]
         except (BadTopicError, BadNameError) as error:
@@ -162,7 +171,7 @@ class _Check:
 
 
 def float_of(number: float) -> float:
-    """A number as a float; an integer beyond every float is infinite."""
+    """Convert a number to a float; an integer that is too large becomes infinite."""
     try:
         return float(number)
     except OverflowError:
@@ -170,12 +179,12 @@ def float_of(number: float) -> float:
 
 
 def new_id() -> str:
-    """An id that no other rule has."""
+    """Return a new random rule id."""
     return secrets.token_hex(4)
 
 
 def problem_of(rule: AlarmRule) -> RuleProblem | None:
-    """What is wrong or still missing; None when it can be watched."""
+    """Return the first problem of a rule, or None if it is valid."""
     check = _Check()
     _check_condition(rule.condition, check)
     check.number("calm_s", rule.calm_s, LEAST_CALM_S, LONGEST_CALM_S)
@@ -249,5 +258,5 @@ def _is_scalar(value: object) -> bool:
 
 
 def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
-    """The topics whose messages must be heard for these rules."""
+    """Return the topics that must be subscribed for these rules."""
     return frozenset(rule.condition.name for rule in rules if rule.condition.hears and rule.condition.name)

@@ -1,4 +1,4 @@
-"""The file of alarms: JSON ↔ rules and history. What is wrong is a sentence with its line.
+"""Alarm file: JSON ↔ rules and history. Errors name the line.
 
 ::
 
@@ -51,7 +51,7 @@ __all__ = [
 FORMAT = 1
 MOST_ALARMS = 200
 _MOST_BYTES = 4_000_000
-_LATEST_S = 3e10  # the year 2920: not every system has a date for what is later
+_LATEST_S = 3e10  # the year 2920: some systems have no later dates
 
 EXAMPLE = """\
 {
@@ -80,7 +80,7 @@ EXAMPLE = """\
  ]
 }
 """
-"""What `nep watch --example` prints."""
+"""Output of `nep watch --example`."""
 
 _ROOT_KEYS = ("format", "alarms", "history")
 _RULE_KEYS = ("id", "on", "when", "do", "calm_s", "snoozed_until_s")
@@ -97,7 +97,7 @@ _DEFAULT_FOR: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
 
 @dataclass(frozen=True, slots=True)
 class AlarmFile:
-    """What a file holds: the rules, what happened before, and what was wrong with rules that are left out."""
+    """Content of an alarm file: rules, history, and the problems of rules that were skipped."""
 
     rules: tuple[AlarmRule, ...] = ()
     history: AlarmHistory | None = None
@@ -105,11 +105,11 @@ class AlarmFile:
 
 
 def read_alarms(path: Path) -> AlarmFile:
-    """The alarms in a file. Raises `NepError` for the first thing that is wrong."""
+    """Read the alarms of a file. Raises `NepError` for the first problem."""
     try:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+    except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         said = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
         raise NepError(
@@ -119,10 +119,15 @@ def read_alarms(path: Path) -> AlarmFile:
 
 
 def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
-    """The alarms in the bytes of a file at `path`. Raises `NepError`.
+    """Parse the bytes of an alarm file.
 
-    `lenient`: alarms that are wrong are left out, and `AlarmFile.problems` says why; what is no file of
-    alarms at all is raised for anyway.
+    Args:
+        data: Content of the file.
+        path: Its path, for error messages.
+        lenient: Skip invalid alarms and report them in `AlarmFile.problems`.
+
+    Raises:
+        NepError: The data is not an alarm file, or (unless `lenient`) an alarm is invalid.
     """
     path = escaped(path)
     if len(data) > _MOST_BYTES:
@@ -144,7 +149,7 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
 
 
 def alarms_text(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
-    """The bytes of a file with these."""
+    """Encode rules and history as the bytes of an alarm file."""
     records = [record_plain(record) for record in history.records] if history is not None else []
     value: dict[str, object] = {"format": FORMAT, "alarms": [_rule_plain(rule) for rule in rules]}
     if records:
@@ -189,15 +194,15 @@ def _action_plain(action: AlarmAction) -> object:
 
 
 class NewerAlarmsError(NepError):
-    """A file of alarms is of a newer version, and well, as far as anybody knows here."""
+    """Alarm file of a newer version; it may be valid."""
 
 
 class _Wrong(Exception):  # noqa: N818 - never leaves this module
-    """An alarm that is wrong; the sentence is whole."""
+    """Invalid alarm; the message is complete."""
 
 
 class _Reader:
-    """Turns maps into rules, and knows on which line each alarm and its keys are."""
+    """Parser of alarm files that knows the line of each alarm and key."""
 
     def __init__(self, path: str, text: str, *, lenient: bool) -> None:
         self._path, self._text, self._lenient = path, text, lenient
@@ -355,7 +360,6 @@ class _Reader:
         )
 
     def _line(self, key: str, place: int | None) -> int:
-        """The line of a key: in the alarm at this place, or of the whole file."""
         if self._places is None:
             self._places = list(_places_of(self._text))
         begin, end = 0, len(self._text)
@@ -367,7 +371,6 @@ class _Reader:
 
 
 def _places_of(text: str) -> list[tuple[int, int]]:
-    """Where in a JSON text each alarm begins and ends; as far as it is one."""
     places: list[tuple[int, int]] = []
     decode: Callable[[str, int], tuple[object, int]] = json.JSONDecoder().raw_decode
     at = _after(text, 1 if text[:1] == "{" else text.find("{") + 1)
@@ -389,7 +392,6 @@ def _places_of(text: str) -> list[tuple[int, int]]:
 
 
 def _after(text: str, at: int) -> int:
-    """The next place that is not white space."""
     while at < len(text) and text[at] in " \t\r\n":
         at += 1
     return at

@@ -1,4 +1,4 @@
-"""Alarms as people read them: the rule, what came on, what is seen now."""
+"""Alarm rules, events and values as text for people."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ _ACTIONS: Mapping[str, str] = {
 
 
 def time_words(seconds: float) -> str:
-    """A time as a person would say it: 0.5 s, 60 s, 10 min, 3 h."""
+    """Format a duration: 0.5 s, 60 s, 10 min, 3 h."""
     for unit, size in ((_("{count} h"), 3600.0), (_("{count} min"), 60.0)):
         if seconds > size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
             return unit.format(count=number(seconds / size))
@@ -82,7 +82,7 @@ def time_words(seconds: float) -> str:
 
 
 def value_words(value: object) -> str:
-    """A value of a message; a long text is shortened, and what is no single value told by its kind."""
+    """Format a field's value; long texts are shortened, lists and maps shown by kind."""
     if isinstance(value, bool) or value is None:
         return {True: _("true"), False: _("false"), None: _("null")}[value]
     if isinstance(value, int):
@@ -95,7 +95,7 @@ def value_words(value: object) -> str:
 
 
 def limit_words(condition: AlarmCondition, value: Scalar) -> str:
-    """A limit or a value that was seen, with the unit of the condition."""
+    """Format a limit or value with the unit of the condition."""
     if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
         return _("{count} messages a second").format(count=number(value, ".4g"))
     if condition.kind == "loses" and isinstance(value, int | float):
@@ -104,7 +104,7 @@ def limit_words(condition: AlarmCondition, value: Scalar) -> str:
 
 
 def subject_words(condition: AlarmCondition) -> str:
-    """What it is about: a topic, a node, or "range of /distance"."""
+    """Format the subject of a condition: a topic, a node, or "range of /distance"."""
     if not condition.name:
         return _("a node") if condition.is_about_node else _("a topic")
     name = quotable(condition.name)
@@ -114,7 +114,7 @@ def subject_words(condition: AlarmCondition) -> str:
 
 
 def condition_words(condition: AlarmCondition) -> str:
-    """The condition: "/robot/camera is silent for 2 s"."""
+    """Format a condition: "/robot/camera is silent for 2 s"."""
     words = _CONDITIONS[condition.kind]
     if condition.for_s > 0:
         words = _FOR.get(condition.kind, words)
@@ -126,14 +126,14 @@ def condition_words(condition: AlarmCondition) -> str:
 
 
 def action_words(action: AlarmAction) -> str:
-    """What is done: "show a banner", "call restart_lidar"."""
+    """Format an action: "show a banner", "call restart_lidar"."""
     return _(_ACTIONS[action.kind]).format(
         name=quotable(action.name), time=time_words(action.seconds or KEEP_S)
     )
 
 
 def rule_words(rule: AlarmRule) -> str:
-    """The whole rule in one sentence, without full stop."""
+    """Format a rule as one sentence without full stop."""
     actions = [action_words(action) for action in rule.actions]
     return _("When {condition}: {actions}").format(
         condition=condition_words(rule.condition), actions=listed(actions) if actions else _(_DO_NOTHING)
@@ -141,7 +141,7 @@ def rule_words(rule: AlarmRule) -> str:
 
 
 def what_words(condition: AlarmCondition, seen: Scalar) -> str:
-    """What came on, for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
+    """Format an event for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
     return _(_CAME[condition.kind]).format(
         subject=subject_words(condition),
         limit=limit_words(condition, condition.limit),
@@ -152,7 +152,7 @@ def what_words(condition: AlarmCondition, seen: Scalar) -> str:
 
 
 def seen_words(condition: AlarmCondition, seen: Scalar) -> str:
-    """What is seen now, in a few words: "0.82 now", "silent for 4 s"; "" when nothing was."""
+    """Format the current value: "0.82 now", "silent for 4 s"; "" if there is none."""
     if condition.kind == "silent":
         if not isinstance(seen, int | float) or seen < 1:
             return ""

@@ -1,7 +1,7 @@
-"""One alarm while it is watched: since when it is so, and whether that is for long enough.
+"""State machine of one alarm: pending, on, off. Pure; the time is passed in.
 
-Pure: it is told the time. An alarm that is on stays on until it was well for `calm_s`; what comes again
-before is counted, not told anew.
+An alarm stays on until its condition was false for `calm_s`; repetitions before that are counted, not
+reported.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from nep.programs.alarms.rule import EVENT_KINDS, MOST_LETTERS, AlarmRule, Scala
 __all__ = ["AlarmTrack", "Turn", "scalar_of"]
 
 EVENT_SHOWN_S = 5.0
-"""So long is an alarm on, at least, that tells of a moment."""
+"""Minimum time that an alarm of a momentary event stays on."""
 
 Trouble = Literal["", "missing", "no_number"]
 
 
 class Turn(NamedTuple):
-    """An alarm came on or went off; `lasted_s` is how long it was on, 0 when it came."""
+    """Transition of an alarm; `lasted_s` is how long it was on, 0 when it turns on."""
 
     is_on: bool
     seen: Scalar
@@ -33,17 +33,16 @@ class Turn(NamedTuple):
 
 @dataclass(slots=True)
 class _Value:
-    """What was read last."""
+    """Field path and last value read."""
 
     path: Path = ()
     last: object = MISSING
 
 
 class AlarmTrack:
-    """What is known of one alarm. `observe` what is so, `settle` as time goes by; each may give a `Turn`."""
+    """State of one alarm. `observe` inputs, `settle` when time passes; both may return a `Turn`."""
 
     def __init__(self, rule: AlarmRule) -> None:
-        """`rule` has no problem (`problem_of`)."""
         self.rule = rule
         condition = rule.condition
         self._for_s = 0.0 if condition.kind in {"silent", "loses"} else condition.for_s
@@ -57,22 +56,22 @@ class AlarmTrack:
         self.count = 0
         self.seen: Scalar = None
         self.was_seen = False
-        """Whether what it is about was ever there."""
+        """True if the alarm's subject ever existed."""
         self.trouble: Trouble = ""
-        """Why the value can't be compared, as it was last."""
+        """Why the last value can't be compared."""
 
     @property
     def is_on(self) -> bool:
-        """Whether it is on."""
+        """True if the alarm is on."""
         return self.on_since is not None
 
     @property
     def is_pending(self) -> bool:
-        """Whether it is so, but not yet for long enough."""
+        """True if the condition holds, but not yet for long enough."""
         return self._true_since is not None and not self.is_on
 
     def read(self, payload: object, now: float) -> Turn | None:
-        """Take over a message of its topic; `now` is a monotonic clock in s."""
+        """Process a payload of the alarm's topic; `now` is monotonic (s)."""
         value = pick(payload, self._value.path)
         if self._is_well(value):
             self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
@@ -99,7 +98,6 @@ class AlarmTrack:
         return self.compare(number, now, is_below=kind == "below", seen=seen)
 
     def _is_well(self, value: object) -> bool:
-        """Whether it is a number on the well side of the limit, and nothing was otherwise: nearly always."""
         if self._bound is None or self.on_since is not None or self._true_since is not None:
             return False
         if type(value) is not float and type(value) is not int:
@@ -107,9 +105,9 @@ class AlarmTrack:
         return value >= self._bound if self._is_below else value <= self._bound
 
     def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Turn | None:
-        """Take over a number that is compared with the limit; back beyond the margin it is well.
+        """Process a number compared with the limit, with hysteresis.
 
-        `seen` is what it was before it became a float, if it was another number.
+        `seen` is the original value if it was converted to a float.
         """
         limit, margin = self.rule.condition.number, self.rule.condition.margin
         if self.is_on:
@@ -119,19 +117,19 @@ class AlarmTrack:
         return self.observe(is_so, number if seen is None else seen, now)
 
     def happened(self, now: float) -> Turn | None:
-        """What it waits for happened at this moment."""
+        """Process a momentary event."""
         turn = self.observe(True, self.seen, now)
         self.observe(False, self.seen, now)
         return turn
 
     def observe(self, is_so: bool, seen: Scalar, now: float) -> Turn | None:
-        """It is so, or it is not, and what was seen."""
+        """Process whether the condition holds now, and the value seen."""
         turn = self.settle(now)
         self.was_seen = True
         self.seen = seen
         if is_so:
             if self.is_on and self._false_since is not None:
-                self.count += 1  # well for a moment only
+                self.count += 1  # false for less than calm_s
             self._false_since = None
             if self._true_since is None:
                 self._true_since = now
@@ -142,7 +140,7 @@ class AlarmTrack:
         return turn or self.settle(now)
 
     def settle(self, now: float) -> Turn | None:
-        """Time went by."""
+        """Update the state for the time that has passed."""
         since, well = self._true_since, self._false_since
         if self.on_since is None:
             if since is None or now - since < self._for_s:
@@ -156,7 +154,7 @@ class AlarmTrack:
         return turn
 
     def end(self, now: float) -> Turn | None:
-        """It is watched no more."""
+        """Turn the alarm off because it is no longer evaluated."""
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
@@ -166,9 +164,9 @@ class AlarmTrack:
 
 
 def scalar_of(value: object) -> Scalar:
-    """A value as an alarm tells it: of lists and maps their size, of long texts the beginning.
+    """Convert a value for display in an event: lists and maps become their size, long texts are cut.
 
-    An integer of more than 64 bits is told as a float: few programs that read what happened take it.
+    Integers beyond 64 bits become floats, because few JSON readers accept them.
     """
     if isinstance(value, str):
         return value[:MOST_LETTERS]
@@ -190,7 +188,6 @@ def _number(value: object) -> float | None:
 
 
 def _same(one: object, other: object) -> bool:
-    """Whether two values are equal; yes is not 1, and what is no number (NaN) stays so."""
     if isinstance(one, bool) is not isinstance(other, bool):
         return False
     return one == other or (one != one and other != other)  # noqa: PLR0124

@@ -1,1 +1,1 @@
-"""The blackboard: what is known of the world, key by key, and how old it is. `nep.Blackboard`."""
+"""Blackboard: newest values of topics by key, with their ages. `nep.Blackboard`."""

@@ -1,8 +1,8 @@
-"""From when a message's age counts. Pure.
+"""Start of a message's age. Pure.
 
-By its stamp where the publisher's clock and ours agree, so that time on the way, and in a publisher that
-keeps it for late subscribers, counts; else by its arrival. The wall clock is read once, when it arrives:
-whatever becomes of it later changes no age.
+The time stamp is used if the publisher's clock agrees with ours, so that transmission time and time kept as
+latched count; else the arrival. The wall clock is read once, at arrival: later clock changes don't affect
+ages.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from nep.programs.blackboard.entries import AgeBy
 __all__ = ["AHEAD_S", "BEHIND_S", "beginning_of"]
 
 AHEAD_S = 0.1
-"""A message of the future, by more than this, has the stamp of a clock that is wrong."""
+"""A stamp further in the future comes from a wrong clock."""
 BEHIND_S = 10.0
-"""So has one that is older when it comes, unless its publisher keeps messages."""
+"""An older stamp comes from a wrong clock, unless the message is latched."""
 _NS = 1e9
 
 
 def beginning_of(message: Message, now: float, wall_ns: int) -> tuple[float, AgeBy]:
-    """When its age began, by the clock that says it is `now`, and what says so."""
+    """Return when the message's age began (on the clock of `now`), and which source was used."""
     if message.stamp_ns is None:
         return now, "arrival"
     on_the_way_s = (wall_ns - message.stamp_ns) / _NS

@@ -1,4 +1,4 @@
-"""Blackboard: what is known of the world, from messages of perception, and how old it is."""
+"""Blackboard: newest values of topics by key, with their ages."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MAX_KEYS = 100_000
 MAX_BYTES = 256 * 2**20
 _MOST_CHANGES = 10_000
 _SLICE_S = 0.1
-"""Waits are cut into slices of this length: to see that a node is closed, and for Ctrl+C on Windows."""
+"""Waits are split into slices, to notice a closed node, and for Ctrl+C on Windows."""
 _AT_ONCE_S = 1e-6
 _SOON_S = 0.001
 _NEAR_KEYS = 1_000
@@ -46,12 +46,18 @@ _MISSING = object()
 
 @dataclass(frozen=True)
 class BlackboardEntry:
-    """A value as it was when it was asked for.
+    """Value of a key at the time of the query.
 
-    `age_by`: "stamp" when the age counts from when the publisher sent it, "arrival" when from when it came,
-    because it has no stamp or its publisher's clock and ours do not agree. `source` is the topic that it
-    came from, empty for what was `put`; `robot` who perceived it, when the message says so. `left_s`: so
-    long until it is forgotten, infinite when it is not.
+    Attributes:
+        key: Key, such as ``human.1.position``.
+        value: Copy of the value.
+        age_s: Age in seconds.
+        age_by: "stamp" if the age counts from the publisher's time stamp, "arrival" if from the arrival,
+            because there is no stamp or the clocks don't agree.
+        source: Topic of the value, "" if it was set with `Blackboard.put`.
+        robot: Robot that perceived it, if the message names one.
+        stamp_ns: Publisher's time stamp (ns since 1970), if any.
+        left_s: Seconds until the value expires; infinite if it doesn't.
     """
 
     key: str
@@ -66,10 +72,12 @@ class BlackboardEntry:
 
 @dataclass(frozen=True)
 class BlackboardChange:
-    """What happened to a key: `cause` is "new" or "changed"; or it is gone.
+    """Change of a key's value.
 
-    Then it is "expired", "removed", "dropped" because there was no room, or "replaced" by a value above or
-    below it; `entry` is the last there was. `is_gone` says that it is gone.
+    Attributes:
+        entry: New entry, or the last one if the key is gone.
+        cause: "new" or "changed"; or, if the key is gone, "expired", "removed", "dropped" (memory limit) or
+            "replaced" (by a value above or below the key).
     """
 
     entry: BlackboardEntry
@@ -77,17 +85,17 @@ class BlackboardChange:
 
     @property
     def key(self) -> str:
-        """Whose value changed."""
+        """Key that changed."""
         return self.entry.key
 
     @property
     def value(self) -> object:
-        """The new value; None when it is gone."""
+        """New value; None if the key is gone."""
         return None if self.is_gone else self.entry.value
 
     @property
     def is_gone(self) -> bool:
-        """Whether the key has no value any more."""
+        """True if the key has no value any more."""
         return self.cause not in {"new", "changed"}
 
 
@@ -100,12 +108,24 @@ class _Observer(NamedTuple):
 
 
 class Blackboard:
-    """The newest value of each key, from the topics that it watches and from `put`. From any thread.
+    """Store of the newest value of each key, from watched topics and from `put`. Thread-safe.
 
-    What it watches is kept at once, in a thread of the node's; nobody needs to spin, but for `on_change`.
-    `max_keys` and `max_bytes` (about so much memory): beyond them the values that were told longest ago are
-    dropped, and counted. Values are copies: changing one changes nothing here. `clock` tells seconds that
-    never go back, `wall_clock_ns` nanoseconds since 1970. Without a node nothing can be watched.
+    Watched messages are stored by a thread of the node; only `on_change` needs `Node.spin`. Values are copied
+    in and out.
+
+    Args:
+        node: Node that subscribes; None for a board without topics.
+        max_keys: Maximum number of keys; the values updated longest ago are dropped and counted in `dropped`.
+        max_bytes: Approximate memory limit, enforced in the same way.
+        clock: Monotonic clock in seconds.
+        wall_clock_ns: Clock in nanoseconds since 1970.
+
+    Example:
+        ::
+
+            with nep.node("watcher") as node, nep.Blackboard(node) as board:
+                board.watch("/perception/humans", key="human")
+                print(board.wait_for("human.1.position"), board.age_s("human.1.position"))
     """
 
     def __init__(
@@ -133,10 +153,10 @@ class Blackboard:
         self._pending_bytes = 0
         self._timer_at = math.inf
         self.changes_dropped = 0
-        """Changes that no callback was given, because they came faster than somebody span."""
+        """Number of changes not delivered to callbacks because they came faster than the node spins."""
         forks.watch(self)
 
-    # ---- where values come from
+    # ---- writing
 
     def watch(
         self,
@@ -149,13 +169,24 @@ class Blackboard:
         each: str = "",
         lives_s: float | None = None,
     ) -> BlackboardWatch:
-        """Keep what comes on a topic, or on all that match: a map's values each by its key.
+        """Store the messages of a topic or pattern; the fields of a map are stored by their own keys.
 
-        `key`: where they go; a name in braces is a field of the message, `human.{id}`. When it is None
-        perceptions of RIZE's go to the root (`touched.head`), and others where the topic's name says.
-        `fields`: keep these only, or these under other names. `each`: the field that has a list of such
-        messages. `lives_s`: a value that was not told again for so long is forgotten; None keeps it. Raises
-        as `Node.new_sub` does, and `BadKeyError`.
+        Args:
+            topic: Topic or pattern.
+            msg_type: Message type.
+            configuration: As for `Node.new_sub`.
+            key: Key to store under; a name in braces is replaced by that field of the message, as in
+                ``human.{id}``. None stores RIZE perceptions at the root (``touched.head``) and others under
+                the topic's name.
+            fields: Fields to store, or a mapping to other names (default: all).
+            each: Field with a list of messages to store one by one.
+            lives_s: Seconds after which a value that is not updated expires; None keeps it.
+
+        Returns:
+            The watch, which counts messages; close it to stop.
+
+        Raises:
+            BadKeyError: The key is invalid. Other errors are those of `Node.new_sub`.
         """
         node = self._node
         if node is None:
@@ -179,14 +210,21 @@ class Blackboard:
         return watch
 
     def ignore(self, publisher: int) -> None:
-        """Keep no messages of the publisher with this id."""
+        """Ignore messages of the publisher with this id."""
         with self._news:
             self._ignored |= {publisher}
 
     def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
-        """Keep a value; a map's values each by its own key, beside those that are there already.
+        """Store a value; the fields of a map are stored by their own keys, keeping other keys.
 
-        Raises `BadKeyError`, `BadValueError`.
+        Args:
+            key: Key, or a tuple of its names.
+            value: Any value; it is copied.
+            lives_s: Seconds after which the value expires; None keeps it.
+
+        Raises:
+            BadKeyError: The key is invalid.
+            BadValueError: The value is too deep or too large.
         """
         names, lives = parse_key(key), _life(lives_s)
         with self._news:
@@ -197,7 +235,7 @@ class Blackboard:
         self._put(entries)
 
     def remove(self, key: str | tuple[str, ...]) -> int:
-        """Forget a key and those below it; how many there were."""
+        """Remove a key and all keys below it; return how many."""
         names = parse_key(key)
         with self._news:
             self._expire()
@@ -207,7 +245,6 @@ class Blackboard:
         return len(gone)
 
     def _keep(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
-        """Raises `NepError` for the last one that could not be kept; the others are."""
         if message.publisher in self._ignored:
             return
         since, age_by = beginning_of(message, self._clock(), self._wall_clock_ns())
@@ -239,14 +276,13 @@ class Blackboard:
         return StoredEntry(parse_key(key), value, now, expires=now + lives)
 
     def _put(self, entries: Sequence[StoredEntry]) -> None:
-        """Raises `BadValueError` for the last one that takes too much room; the others are kept."""
         problem: BadValueError | None = None
         with self._news:
             now = self._expire()
             for entry in entries:
                 is_empty = isinstance(entry.value, dict) and not entry.value
                 if is_empty and self._entries.has_below(entry.key):
-                    continue  # nothing is new
+                    continue  # an empty map doesn't replace keys below it
                 try:
                     self._note(self._entries.put(entry, now))
                 except BadValueError as error:
@@ -262,12 +298,17 @@ class Blackboard:
     def get(
         self, key: str | tuple[str, ...], default: object = None, *, max_age_s: float | None = None
     ) -> object:
-        """The value of a key, or a map of those below it; `default` when there is none so young."""
+        """Return the value of a key, or a dict of the values below it.
+
+        Args:
+            key: Key, or a tuple of its names.
+            default: Returned if there is no value, or none young enough.
+            max_age_s: Maximum age in seconds; None accepts any.
+        """
         found = self._found(parse_key(key), seconds("max_age_s", max_age_s))
         return default if found is _MISSING else found
 
     def __getitem__(self, key: str | tuple[str, ...]) -> object:
-        """As `get`. Raises `NoValueError`."""
         names = parse_key(key)
         found = self._found(names, None)
         if found is _MISSING:
@@ -288,14 +329,14 @@ class Blackboard:
             return len(self._entries)
 
     def age_s(self, key: str | tuple[str, ...]) -> float:
-        """How old the value of a key is, or the youngest below it; infinite when there is none."""
+        """Return the age of a key's value, or of the youngest below it; infinite if there is none."""
         names = parse_key(key)
         with self._news:
             now = self._expire()
             return min((each.age_s(now) for each in self._entries.below(names)), default=math.inf)
 
     def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
-        """The value of just this key, with all that is known of it; None when there is none."""
+        """Return the entry of exactly this key, or None."""
         names = parse_key(key)
         with self._news:
             now = self._expire()
@@ -303,7 +344,10 @@ class Blackboard:
         return None if found is None else _public(found, now)
 
     def keys(self, pattern: str = "**") -> list[str]:
-        """The keys that match, sorted: `*` is any one name, `**` any number of them: `human.*.position`."""
+        """Return the sorted keys that match a pattern.
+
+        ``*`` stands for one name, ``**`` for any number of names: ``human.*.position``.
+        """
         names = parse_key(pattern)
         with self._news:
             self._expire()
@@ -311,7 +355,7 @@ class Blackboard:
         return sorted(key_text(each.key) for each in found)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
-        """All whose keys match, by key, as they were at one moment."""
+        """Return the matching entries by key, all at one moment."""
         names = parse_key(pattern)
         with self._news:
             now = self._expire()
@@ -331,20 +375,20 @@ class Blackboard:
 
     @property
     def bytes(self) -> int:
-        """About so much memory do its values take."""
+        """Approximate memory used by the values."""
         return self._entries.bytes
 
     @property
     def dropped(self) -> int:
-        """Values that were dropped because there was no room."""
+        """Number of values dropped because of the limits."""
         return self._entries.dropped
 
     @property
     def outdated(self) -> int:
-        """Values that were older than what was there already, or had lived already when they came."""
+        """Number of values rejected because they were older than the stored one or had already expired."""
         return self._entries.outdated
 
-    # ---- waiting and being told
+    # ---- waiting and callbacks
 
     def wait_for(
         self,
@@ -352,10 +396,17 @@ class Blackboard:
         condition: Callable[[object], object] | None = None,
         timeout_s: float | None = None,
     ) -> object:
-        """The value of a key as soon as there is one for which `condition(value)` is true.
+        """Wait until a key has a value for which `condition(value)` is true, and return it.
 
-        `condition` is asked in this thread, whenever something is told; a value that lasts for less than
-        that may be missed. Raises `WaitTimeoutError`, and `ClosedError` when the board or its node is closed.
+        Args:
+            key: Key, or a tuple of its names.
+            condition: Called in this thread after each update; shorter-lived values may be missed. None
+                accepts any value.
+            timeout_s: Maximum wait in seconds; None waits forever.
+
+        Raises:
+            WaitTimeoutError: The timeout has passed.
+            ClosedError: The board or its node was closed.
         """
         names, limit_s = parse_key(key), seconds("timeout_s", timeout_s)
         if condition is not None:
@@ -375,11 +426,18 @@ class Blackboard:
                     self._news.wait(left)
 
     def on_change(self, pattern: str, callback: OnChange) -> Callable[[], None]:
-        """Call `callback` with each `BlackboardChange` of a key that matches, in the thread that spins.
+        """Call `callback` with each `BlackboardChange` of a matching key, in the thread that spins the node.
 
-        It is called when a value becomes another one, or is gone, not when it is told again. What it raises
-        comes out of `spin`; the other changes come with the next one. Returns a function that ends it.
-        Without a node, `deliver` calls the callbacks.
+        It is called when a value becomes different or is gone, not for equal updates. Exceptions propagate
+        out of `Node.spin`; the remaining changes are delivered by the next one. Without a node, call
+        `deliver`.
+
+        Args:
+            pattern: Keys, with wildcards as for `keys`.
+            callback: Function of one `BlackboardChange`.
+
+        Returns:
+            A function that ends the subscription.
         """
         observer = _Observer(parse_key(pattern), plain_function("callback", callback))
         with self._news:
@@ -393,7 +451,11 @@ class Blackboard:
         return end
 
     def deliver(self) -> int:
-        """Call the callbacks of what changed, in this thread, as `Node.spin` does; how many calls."""
+        """Call the callbacks for pending changes in this thread, as `Node.spin` does.
+
+        Returns:
+            The number of calls.
+        """
         with self._news:
             self._expire()
             waiting = len(self._pending)
@@ -415,7 +477,7 @@ class Blackboard:
         return calls
 
     def _expire(self) -> float:
-        """What time it is, with what is over by then forgotten. The lock is held."""
+        # Call with the lock held. Returns the current time.
         now = self._clock()
         if self._entries.next_end <= now:
             gone = self._entries.expire(now)
@@ -424,7 +486,7 @@ class Blackboard:
         return now
 
     def _note(self, changes: Sequence[EntryChange]) -> None:
-        """Keep changes for callbacks. The lock is held."""
+        # Call with the lock held. Queues changes for callbacks, up to a limit.
         for change in changes:
             for observer in self._observers:
                 if key_matches(observer.pattern, change.entry.key):
@@ -436,7 +498,6 @@ class Blackboard:
                 self.changes_dropped += 1
 
     def _schedule(self) -> None:
-        """Have whoever spins the node call the callbacks: now, or when something ends."""
         node = self._node
         with self._news:
             if node is None or not self._observers or self._is_closed:
@@ -450,7 +511,7 @@ class Blackboard:
         made: list[Timer] = []
 
         def call() -> None:
-            for timer in made:  # empty, if another thread was fast: then it is due again at once
+            for timer in made:  # empty if the timer fires before it is appended; then it fires again at once
                 timer.cancel()
                 with self._news:
                     self._timer_at = math.inf
@@ -459,7 +520,7 @@ class Blackboard:
         with suppress(ClosedError):
             made.append(node.new_timer(wait_s, call))
 
-    # ---- the end
+    # ---- closing
 
     def _check_open(self) -> None:
         is_open = not self._is_closed and (self._node is None or not self._node.is_closed)
@@ -467,7 +528,7 @@ class Blackboard:
             raise ClosedError(_("the blackboard"), is_forked=self._is_forked)
 
     def close(self) -> None:
-        """Watch no more, and end what waits; values stay, and can be read and put. May be called twice."""
+        """Stop watching and wake waiting threads; values can still be read and put. Idempotent."""
         with self._news:
             self._is_closed = True
             watches, self._watches, self._observers = self._watches, (), ()
@@ -479,9 +540,9 @@ class Blackboard:
             watch.close()
 
     def forked(self) -> None:
-        """In a child that was forked: values stay as they were. See `nep.system.forks`."""
+        """Reset locks and watches in a forked child; values stay. See `nep.system.forks`."""
         self._is_closed = self._is_forked = True
-        if self._lock.locked():  # by a thread that is not here: it may have changed a half
+        if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
             self._entries = self._entries.rebuilt()
         self._lock = threading.Lock()
         self._news = threading.Condition(self._lock)
@@ -501,7 +562,6 @@ class Blackboard:
 
 
 def _life(lives_s: object) -> float:
-    """Infinite for None. Raises `ValueError` for what is no time above 0."""
     found = seconds("lives_s", lives_s)
     return math.inf if found is None else period("lives_s", found)
 
@@ -527,7 +587,6 @@ def _public(entry: StoredEntry, now: float) -> BlackboardEntry:
 
 
 def _composed(found: Sequence[StoredEntry], key: Key) -> object:
-    """The value of the key itself, or a map of what is below it."""
     if found[0].key == key:
         return copied(found[0].value)
     whole: dict[str, object] = {}
@@ -536,7 +595,7 @@ def _composed(found: Sequence[StoredEntry], key: Key) -> object:
         at = whole
         for name in names:
             after = at.setdefault(name, {})
-            if isinstance(after, dict):  # as it always is: no value stands above another
+            if isinstance(after, dict):  # always true: no value is stored above another
                 at = after
         at[last] = copied(entry.value)
     return whole

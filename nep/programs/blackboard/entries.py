@@ -1,7 +1,6 @@
-"""Entries: the values of a blackboard by their keys, bounded, each as long as it lives. Pure.
+"""Bounded store of blackboard entries by key, with expiry. Pure. Not thread-safe.
 
-For one thread at a time.
-They are a tree of names: whether a key stands above or below others must not take longer the more there are.
+Entries form a tree of names, so that finding keys above and below another takes constant time.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from nep.programs.blackboard.values import is_same, size_of
 __all__ = ["AgeBy", "Cause", "Entries", "EntryChange", "StoredEntry"]
 
 AgeBy = Literal["stamp", "arrival"]
-"""What an age counts from: when the publisher sent it, or when it came."""
+"""What an age counts from: the publisher's time stamp or the arrival."""
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]
 _ENTRY_BYTES = 600
 _NAME_BYTES = 100
@@ -30,7 +29,7 @@ _SPARE_ENDS = 1_000
 
 @dataclass(frozen=True)
 class StoredEntry:
-    """A value. `since` is when its age began, by the blackboard's clock; `expires` when it is forgotten."""
+    """Stored value. `since` is when its age began, `expires` when it expires (blackboard clock)."""
 
     key: Key
     value: object
@@ -42,30 +41,30 @@ class StoredEntry:
     source: str = ""
     robot: str = ""
     bytes: int = field(init=False)
-    """About so much memory does it take."""
+    """Approximate memory use."""
 
     def __post_init__(self) -> None:
         names = _NAME_BYTES * len(self.key) + sum(map(len, self.key))
         object.__setattr__(self, "bytes", _ENTRY_BYTES + names + size_of(self.value))
 
     def age_s(self, now: float) -> float:
-        """0 when the clock has gone back meanwhile."""
+        """Return the age at `now`; 0 if the clock was set back."""
         return max(0.0, now - self.since)
 
 
 class EntryChange(NamedTuple):
-    """What became of an entry; it is there no more unless the cause is "new" or "changed"."""
+    """Change of an entry; it is gone unless the cause is "new" or "changed"."""
 
     entry: StoredEntry
     cause: Cause
 
 
 class _Tree(dict[str, "StoredEntry | _Tree"]):
-    """Names that stand behind one."""
+    """Subtree of names below a name."""
 
 
 class Entries:
-    """The newest entry of each key. The oldest are dropped when there are too many, and counted."""
+    """Newest entry of each key. Beyond the limits the oldest are dropped and counted."""
 
     def __init__(self, max_keys: int, max_bytes: int) -> None:
         self._max_keys = max_keys
@@ -83,11 +82,11 @@ class Entries:
 
     @property
     def next_end(self) -> float:
-        """When it may be time for `expire`; infinite when nothing ends."""
+        """Time of the next `expire`; infinite if nothing expires."""
         return self._ends[0][0] if self._ends else math.inf
 
     def rebuilt(self) -> Entries:
-        """A new one, of what this one has by now; another thread was changing it, and will not go on."""
+        """Return a copy built from the entries; for a fork that interrupted a change."""
         made = Entries(self._max_keys, self._max_bytes)
         for entry in list(self._by_age.values()):
             made.put(entry, -math.inf)
@@ -97,11 +96,11 @@ class Entries:
     # ---- reading
 
     def get(self, key: Key) -> StoredEntry | None:
-        """The entry of just this key."""
+        """Return the entry of exactly this key, or None."""
         return self._by_age.get(key)
 
     def below(self, key: Key) -> Iterator[StoredEntry]:
-        """The entry of this key, or those of longer ones that begin so."""
+        """Yield the entry of this key, or those of all keys below it."""
         found = self._at(key)
         if isinstance(found, StoredEntry):
             yield found
@@ -109,7 +108,7 @@ class Entries:
             yield from _all_of(found)
 
     def matching(self, pattern: Key) -> Iterator[StoredEntry]:
-        """Those whose key matches; in the order of the tree."""
+        """Yield the entries whose key matches, in tree order."""
         beginning = literal_levels(pattern)
         found = self.below(beginning)
         if pattern == (*beginning, "**"):
@@ -127,10 +126,9 @@ class Entries:
     # ---- changing
 
     def put(self, entry: StoredEntry, now: float) -> list[EntryChange]:
-        """Keep it, unless a newer one of another publisher is there; what changed by that.
+        """Store an entry unless a newer one of another publisher exists; return the changes.
 
-        What stands in its way goes: the values above and below its key. Raises `BadValueError` for one that
-        takes more room than there is.
+        Entries above and below its key are replaced. Raises `BadValueError` if it exceeds the memory limit.
         """
         if entry.bytes > self._max_bytes:
             said = _("it takes {size} bytes, and there is room for {most}")
@@ -156,25 +154,25 @@ class Entries:
         return changes
 
     def has_below(self, key: Key) -> bool:
-        """Whether longer keys begin with this one."""
+        """Return whether longer keys begin with this one."""
         return isinstance(self._at(key), _Tree)
 
     def remove(self, key: Key) -> list[EntryChange]:
-        """Forget this one and those below it."""
+        """Remove a key and all below it."""
         return [EntryChange(self._take(each.key), "removed") for each in list(self.below(key))]
 
     def expire(self, now: float) -> list[EntryChange]:
-        """Forget those whose time is over."""
+        """Remove expired entries."""
         changes = []
         while self._ends and self._ends[0][0] <= now:
             end, key = heapq.heappop(self._ends)
-            if self._end_of.get(key) != end:  # an earlier one was noted since
+            if self._end_of.get(key) != end:  # superseded by an earlier expiry
                 continue
             del self._end_of[key]
             entry = self.get(key)
             if entry is None or math.isinf(entry.expires):
                 continue
-            if entry.expires > now:  # it was told anew
+            if entry.expires > now:  # it was updated since
                 self._note_end(entry)
             else:
                 changes.append(EntryChange(self._take(key), "expired"))
@@ -195,7 +193,7 @@ class Entries:
         at = self._tree
         for name in entry.key[:-1]:
             after = at.setdefault(name, _Tree())
-            if isinstance(after, StoredEntry):  # cannot be: those in the way are gone
+            if isinstance(after, StoredEntry):  # unreachable: conflicting entries were removed
                 raise TypeError(entry.key)
             at = after
         at[entry.key[-1]] = entry
@@ -206,10 +204,9 @@ class Entries:
             self._note_end(entry)
 
     def _note_end(self, entry: StoredEntry) -> None:
-        """One end for each key, which is looked at again when it comes."""
         if entry.expires >= self._end_of.get(entry.key, math.inf):
             return
-        if len(self._ends) > 2 * len(self._by_age) + _SPARE_ENDS:  # of keys that are gone
+        if len(self._ends) > 2 * len(self._by_age) + _SPARE_ENDS:  # drop stale heap entries of deleted keys
             self._end_of = {
                 each.key: each.expires for each in self._by_age.values() if each.expires < math.inf
             }
@@ -221,13 +218,12 @@ class Entries:
         heapq.heappush(self._ends, (entry.expires, entry.key))
 
     def _take(self, key: Key) -> StoredEntry:
-        """Remove it, and names that nothing stands behind any more."""
         entry = self._by_age.pop(key)
         self.bytes -= entry.bytes
         path = [self._tree]
         for name in key[:-1]:
             after = path[-1][name]
-            if isinstance(after, StoredEntry):  # cannot be: it would have been replaced
+            if isinstance(after, StoredEntry):  # unreachable: it would have been replaced
                 raise TypeError(key)
             path.append(after)
         for at, name in zip(reversed(path), reversed(key), strict=True):
@@ -238,11 +234,9 @@ class Entries:
 
 
 def _is_newer(before: StoredEntry, entry: StoredEntry, now: float) -> bool:
-    """Whether `entry` is older than what is there: it was kept for us, or came by a slower way.
-
-    A publisher's own messages come in order, whatever became of its clock; and what is there may be of the
-    future, when our own clock went back.
-    """
+    # True if the stored `before` is newer: `entry` was latched or took a slower path. Messages of one
+    # publisher arrive in order, whatever its clock does; `before` may be in the future if our clock was set
+    # back.
     return entry.age_by == before.age_by == "stamp" and (
         entry.publisher != before.publisher and entry.since < before.since <= now
     )

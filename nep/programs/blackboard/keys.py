@@ -1,6 +1,6 @@
-r"""Keys of a blackboard: names between dots, as in `human.1.position`. Pure.
+r"""Blackboard keys: names separated by dots, as in `human.1.position`. Pure.
 
-A dot or a backslash that belongs to a name has a backslash before it: `file.a\.txt` has two names.
+A dot or backslash within a name is escaped with a backslash: `file.a\.txt` has two names.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Key = tuple[str, ...]
 MOST_LEVELS = 32
 _MOST_LETTERS = 1_000
 _LONGEST = 2 * _MOST_LETTERS + MOST_LEVELS
-"""A key as it is written: a backslash before each letter, and the dots."""
+"""Length of the longest written key: each character escaped, plus dots."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -26,9 +26,9 @@ _WILD = frozenset({"*", "**"})
 
 
 def parse_key(key: str | Sequence[str]) -> Key:
-    """The names of a key; a tuple of names is taken as it is. Raises `BadKeyError`."""
+    """Split a key into its names; a tuple is returned as is. Raises `BadKeyError`."""
     if isinstance(key, str):
-        if len(key) > _LONGEST:  # it takes time to find out how many names that are
+        if len(key) > _LONGEST:  # splitting it would take long
             raise _too_long(key)
         names = tuple(key.split(".")) if "\\" not in key else _names(key)
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
@@ -56,7 +56,7 @@ def _names(text: str) -> Key:
     found, at = [], 0
     while True:
         match = _NAME.match(text, at)
-        if match is None:  # cannot be: the pattern matches the empty text, too
+        if match is None:  # unreachable: the pattern matches the empty text
             raise BadKeyError(text, _("give a text such as 'human.1.position'"))
         found.append(_ESCAPE.sub(r"\1", match[1]))
         if not text[match.end(1) :]:
@@ -65,22 +65,22 @@ def _names(text: str) -> Key:
 
 
 def key_text(names: Key) -> str:
-    """A key as it is written; `parse_key` gives the same names again."""
+    """Join names to a written key; the inverse of `parse_key`."""
     return ".".join(_SPECIAL.sub(r"\\\1", name) if "." in name or "\\" in name else name for name in names)
 
 
 def key_of_topic(topic: str) -> Key:
-    """`/perception/humans` as a key: `perception.humans`."""
+    """Convert a topic to a key: `/perception/humans` becomes `perception.humans`."""
     return tuple(level for level in topic.split("/") if level) or ("topic",)
 
 
 def key_matches(pattern: Key, key: Key) -> bool:
-    """Whether a key matches: `*` is any one name that is not empty, `**` any number of names or none."""
+    """Return whether a key matches: `*` is one non-empty name, `**` any number of names."""
     return levels_match(pattern, key)
 
 
 def literal_levels(pattern: Key) -> Key:
-    """The names before the first wildcard."""
+    """Return the names before the first wildcard."""
     for number, name in enumerate(pattern):
         if name in _WILD:
             return pattern[:number]

@@ -1,8 +1,8 @@
-"""Messages of perception as RIZE's programs send them, mostly on `/blackboard`. Pure.
+"""Perception messages of RIZE programs, mostly on `/blackboard`. Pure.
 
-`{"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}`: values are a probability, or whether it
-is so. Older programs send `"input": "add"` alone; some put quotes into names and values, `{"'happy'": "1"}`;
-by rosbridge all of it is a text in the field `data`.
+`{"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}`: values are probabilities or booleans.
+Older programs send only `"input": "add"`; some quote names and values, `{"'happy'": "1"}`; through rosbridge
+everything is a JSON text in the field `data`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _QUOTES = "'\""
 
 
 class Perception(NamedTuple):
-    """`primitive` is what was perceived, `values` what of it; `robot` by whom, empty when nobody says."""
+    """Perceived `primitive` with its `values`, and the `robot` that perceived it ("" if unknown)."""
 
     primitive: str
     values: Mapping[str, object]
@@ -29,7 +29,7 @@ class Perception(NamedTuple):
 
 
 def perception_in(payload: object) -> Perception | None:
-    """The perception that a message is; None for any other message."""
+    """Parse a payload as a perception; None for other messages."""
     if isinstance(payload, Mapping) and len(payload) == 1 and isinstance(payload.get("data"), str):
         try:
             payload = JSON.decode(payload["data"].encode("utf-8", "surrogatepass"), NOTHING)
@@ -49,7 +49,6 @@ def perception_in(payload: object) -> Perception | None:
 
 
 def _meant(value: object) -> object:
-    """A number that was sent as a text is one."""
     if not isinstance(value, str):
         return value
     try:

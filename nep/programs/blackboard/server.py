@@ -1,11 +1,10 @@
-"""BlackboardServer: one blackboard that other programs ask, in any language. `nep blackboard` runs one.
+"""Blackboard server for other programs in any language, used by `nep blackboard`.
 
-`/NAME/changes` is a topic: a map with "blackboard", "key", "value", "cause" and what is known of the value.
-`NAME/get` is asked with a "key", and answers "found", "value" and "age_s"; or with a "pattern", and answers
-"entries", and how many "more" there are; "max_age_s" leaves out what is older. `NAME/set` takes a "key" and
-its "value", or a map "values", and "lives_s". `NAME/keys` takes a "pattern", and answers "keys" and "more".
-
-What cannot be done is refused: the caller gets the sentence as `ServiceError`. NaN is `null`, as in all JSON.
+The topic `/NAME/changes` has a map with "blackboard", "key", "value", "cause" and details of the value. The
+service `NAME/get` takes "key" and replies "found", "value" and "age_s"; or takes "pattern" and replies
+"entries" and how many "more" there are; "max_age_s" excludes older values. `NAME/set` takes "key" and
+"value", or a map "values", and "lives_s". `NAME/keys` takes "pattern" and replies "keys" and "more". Invalid
+requests raise `ServiceError` at the caller. NaN is `null`, as in JSON.
 """
 
 from __future__ import annotations
@@ -31,19 +30,20 @@ __all__ = ["DEFAULT_NAME", "MOST_ENTRIES", "BlackboardServer", "service_of"]
 
 DEFAULT_NAME = "blackboard"
 MOST_ENTRIES = 10_000
-"""An answer has so many at most, and tells how many more there are."""
+"""Maximum number of entries in a reply, which includes the number of omitted ones."""
 _MOST_ANSWER_BYTES = 32 * 2**20
 
 
 def service_of(name: str, what: str) -> str:
-    """The service of a blackboard of this name: `what` is "get", "set" or "keys"."""
+    """Return the name of a blackboard's service; `what` is "get", "set" or "keys"."""
     return f"{name}/{what}"
 
 
 class BlackboardServer:
-    """Tells the changes of `board`, and answers for it, in the thread that spins `node`. A context manager.
+    """Server that publishes the changes of `board` and replies to requests.
 
-    Raises as `Node.new_pub` and `Node.new_server` do.
+    Runs in the thread that spins `node`. Usable as a context manager. Raises as `Node.new_pub` and
+    `Node.new_server` do.
     """
 
     def __init__(self, node: Node, board: Blackboard, name: str = DEFAULT_NAME) -> None:
@@ -106,7 +106,7 @@ class BlackboardServer:
         return {"keys": found[:MOST_ENTRIES], "more": max(0, len(found) - MOST_ENTRIES)}
 
     def close(self) -> None:
-        """Tell and answer no more; the board stays. May be called twice."""
+        """Stop publishing and serving; the board stays open. Idempotent."""
         self._end()
         for server in self._servers:
             server.close()
@@ -135,7 +135,6 @@ def _text(asked: Mapping[object, object], field: str, default: str | None = None
 
 
 def _as_map(entry: BlackboardEntry) -> dict[str, object]:
-    """For others, as JSON has it."""
     return {
         "key": entry.key,
         "value": _sendable(entry.value),
@@ -148,7 +147,7 @@ def _as_map(entry: BlackboardEntry) -> dict[str, object]:
 
 
 def _sendable(value: object) -> object:
-    """`value` itself when JSON has it, else how Python writes it: one value must not hide all others."""
+    # Falls back to Python's notation for values that JSON lacks, so that one value doesn't hide the others.
     try:
         orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS | numpy_option())
     except (TypeError, ValueError, RecursionError):

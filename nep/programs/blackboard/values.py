@@ -1,4 +1,4 @@
-"""Values of a blackboard: copies, so that nobody changes them in place, and the bytes they take. Pure."""
+"""Blackboard values: copies, approximate sizes, comparison. Pure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ITEM_BYTES = 8
 
 
 def copied(value: object, depth: int = _DEEPEST) -> object:
-    """`value` with lists and maps of its own. Raises `ValueError` when it is too deep, or holds itself."""
+    """Copy lists and maps deeply. Raises `ValueError` if the value is too deep or contains itself."""
     if isinstance(value, list | tuple):
         if _has_only_numbers(value):
             return list(value)
@@ -38,7 +38,7 @@ def _has_only_numbers(value: list[object] | tuple[object, ...]) -> bool:
 
 
 def size_of(value: object) -> int:
-    """About so many bytes of memory."""
+    """Return the approximate memory use in bytes."""
     size, waiting = 0, [value]
     while waiting:
         each = waiting.pop()
@@ -53,13 +53,13 @@ def size_of(value: object) -> int:
             waiting += each
             waiting += each.values()
         else:
-            found = getattr(each, "nbytes", None)  # an array may be a view, which is small by itself
+            found = getattr(each, "nbytes", None)  # nbytes: an array may be a view, which is small by itself
             size += found if isinstance(found, int) else sys.getsizeof(each, _ITEM_BYTES)
     return size
 
 
 def is_same(one: object, other: object) -> bool:
-    """Whether nothing changed: also NaN for NaN; 1, 1.0 and True are three values."""
+    """Return whether two values are equal; NaN equals NaN, but 1, 1.0 and True differ."""
     if one is other:
         return True
     if type(one) is not type(other):
@@ -68,14 +68,14 @@ def is_same(one: object, other: object) -> bool:
         return True
     try:
         return bool(one == other)
-    except Exception:  # noqa: BLE001 - arrays have no one answer, and values may be of any class
+    except Exception:  # noqa: BLE001 - arrays compare element-wise, and values may be of any class
         return False
 
 
 def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
-    """What a map holds, each with its key; anything else, and an empty map, is one value.
+    """Yield the values of a nested map with their keys; any other value, and an empty map, as one value.
 
-    A map whose keys are no texts or whole numbers, or that goes down too far for keys, is one value, too.
+    A map with keys other than text and whole numbers, or nested too deeply for keys, is one value, too.
     """
     if not isinstance(value, Mapping) or not value or len(key) >= MOST_LEVELS or not _has_names(value):
         yield key, value

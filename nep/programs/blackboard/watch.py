@@ -1,4 +1,4 @@
-"""BlackboardWatch: a topic whose messages are kept on a blackboard. Made by `Blackboard.watch`."""
+"""Watch of a topic whose messages are stored on a blackboard; created by `Blackboard.watch`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _MISSING = object()
 
 
 class PerceivedValue(NamedTuple):
-    """A value that a message has, its key, and which robot perceived it, when it says so."""
+    """Value of a message, its key, and the robot that perceived it, if named."""
 
     key: Key
     value: object
@@ -36,11 +36,12 @@ class PerceivedValue(NamedTuple):
 
 
 class MessageReading:
-    """How the messages of a topic become values. Pure.
+    """Mapping of a topic's messages to keys and values. Pure.
 
-    `key`: where they go; None: perceptions of RIZE's to the root, others to the topic's name. Names in
-    braces are fields of the message, `human.{id}`. `fields`: those of its fields that are kept, and their
-    names on the board. `each`: the field that has a list of such messages.
+    Args:
+        key: As for `Blackboard.watch`.
+        fields: As for `Blackboard.watch`.
+        each: As for `Blackboard.watch`.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class MessageReading:
         self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
 
     def items(self, payload: object) -> Sequence[object]:
-        """What there is to be read one by one. Raises `NepError` when the field that has them is none."""
+        """Return the items of a payload. Raises `NepError` if the field `each` isn't a list."""
         if self._each:
             found = _field(payload, self._each)
             if not isinstance(found, list | tuple):
@@ -67,7 +68,7 @@ class MessageReading:
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
     def findings(self, topic: str, item: object) -> Iterator[PerceivedValue]:
-        """All that an item has. Raises `NepError` when it has no place on the board."""
+        """Yield the values of an item with their keys. Raises `NepError` if no key can be formed."""
         seen = None if self._fields is not None else perception_in(item)
         if seen is not None:
             beginning = () if self._key is None else self._filled(item)
@@ -105,7 +106,6 @@ def _field(item: object, path: Key) -> object:
 
 
 def _name_in(item: object, field: str) -> str:
-    """The field's value as a name. Raises `NepError`."""
     value = item.get(field) if isinstance(item, Mapping) else None
     if isinstance(value, bool) or not isinstance(value, str | int) or value == "":
         raise NepError(_("it has no name or number in the field '{field}'").format(field=field))
@@ -113,12 +113,12 @@ def _name_in(item: object, field: str) -> str:
 
 
 def is_change_message(payload: object) -> bool:
-    """Whether a blackboard told it of itself: by a wildcard it would be heard, and told of, for ever."""
+    """Return whether a payload is a blackboard's own change, which a pattern would feed back forever."""
     return isinstance(payload, Mapping) and "blackboard" in payload and "cause" in payload
 
 
 class BlackboardWatch:
-    """Counts what came. May be used from any thread; a context manager."""
+    """Watched topic, with message counts. Thread-safe; usable as a context manager."""
 
     def __init__(
         self,
@@ -130,11 +130,11 @@ class BlackboardWatch:
     ) -> None:
         self.topic = topic
         self.received = 0
-        """Messages that came and could be read."""
+        """Number of messages received and decoded."""
         self.refused = 0
-        """Messages that could not be read, or were not kept, as a whole or in part; why is logged."""
+        """Number of messages that could not be decoded or stored completely; the reason is logged."""
         self.problem = ""
-        """Why the last one was refused; empty when it was not."""
+        """Reason why the last message was rejected, "" if it was not."""
         self._reading = reading
         self._keep = keep
         self._is_pattern = is_pattern
@@ -143,7 +143,7 @@ class BlackboardWatch:
         self._lock = threading.Lock()
 
     def attach(self, subscriber: Subscriber) -> None:
-        """Its messages are these."""
+        """Set the subscriber whose messages are stored."""
         with self._lock:
             self._subscriber = subscriber
             is_closed = self._is_closed
@@ -151,18 +151,18 @@ class BlackboardWatch:
             subscriber.close()
 
     def take(self, messages: Sequence[Message]) -> None:
-        """Keep them. In the thread of the node's sinks."""
+        """Store messages. Runs in the node's sink thread."""
         for message in messages:
             if self._is_closed:
                 return
             try:
                 self._take(message)
-            except Exception as error:  # noqa: BLE001 - one message must not cost the others
+            except Exception as error:  # noqa: BLE001 - a bad message must not affect the others
                 self._refuse(message, error)
 
     def _take(self, message: Message) -> None:
         subscriber = self._subscriber
-        # The first messages may come before the subscriber is known.
+        # The first messages may arrive before `attach` is called.
         payload = message.payload if subscriber is None else subscriber.decoded(message)
         if self._is_pattern and is_change_message(payload):
             return
@@ -172,7 +172,7 @@ class BlackboardWatch:
             try:
                 self._keep(message, tuple(self._reading.findings(message.topic, item)))
             except NepError as error:
-                problem = error  # the other items are kept
+                problem = error  # the other items are stored
         if problem is not None:
             raise problem
         self.problem = ""
@@ -182,11 +182,14 @@ class BlackboardWatch:
         self.problem = str(error)
         if not isinstance(error, DecodeError) and is_logged(self.refused):
             _logger.warning(
-                "a message on '%s' is not kept as a whole (%d so far): %s", message.topic, self.refused, error
+                "a message on '%s' is not kept as a whole (%d so far): %s",
+                message.topic,
+                self.refused,
+                error,
             )
 
     def close(self) -> None:
-        """Keep no more messages; what came stays. May be called twice."""
+        """Stop storing messages; stored values stay. Idempotent."""
         with self._lock:
             self._is_closed = True
             subscriber = self._subscriber
@@ -194,7 +197,7 @@ class BlackboardWatch:
             subscriber.close()
 
     def forked(self) -> None:
-        """In a child that was forked. See `nep.system.forks`."""
+        """Reset the lock in a forked child. See `nep.system.forks`."""
         self._is_closed = True
         self._lock = threading.Lock()
 

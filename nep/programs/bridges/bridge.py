@@ -157,7 +157,6 @@ class Bridge:
     # ---- routes
 
     def _add(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
-        """A route from that side, if there is none yet."""
         with self._lock:
             way = (origin, a, b)
             if way in self._known:
@@ -204,7 +203,6 @@ class Bridge:
                     )
 
     def _forget_idle(self, side: BridgeSide, view: GraphView, now: float) -> None:
-        """Make room: what a pattern found and nobody publishes any more is let go, with its counts."""
         for route in self._routes:
             if not route.is_found or route.origin.side != side.name:
                 continue
@@ -257,7 +255,6 @@ class Bridge:
                     )
 
     def _matches(self, side: SideName, name: str) -> Iterator[tuple[BridgeTopic, str, str]]:
-        """The first pattern that matches a topic of that side, with its names on both."""
         for topic in self.configuration.topics:
             if topic.is_pattern and side in topic.origins:
                 part = topic.end(side).part_in(name)

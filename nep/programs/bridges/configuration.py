@@ -159,7 +159,6 @@ def side_of(backend: str, master: str = "", network: str = "") -> SideConfigurat
 
 
 def _network(backend: Backend, master: str) -> str:
-    """The name of a network that was given none, with the computer or process where it may end there."""
     name = f"{backend.name}:{master}"
     if backend.is_in_process:
         return f"{name}@{platform.node()}/{os.getpid()}"

@@ -84,7 +84,6 @@ class OtherBridges:
 
 
 def _ways(routes: object) -> Iterator[tuple[str, str, str]]:
-    """From which of its sides and topic to which topic a bridge carries messages."""
     for route in routes[:_ROUTES_MOST] if isinstance(routes, list) else ():
         if not isinstance(route, Mapping):
             continue

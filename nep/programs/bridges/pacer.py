@@ -70,5 +70,4 @@ class Pacer:
             call()
 
     def _left_s(self) -> float | None:
-        """Until the next is due: 0 when it is, None when there is none."""
         return max(0.0, self._due[0][0] - time.monotonic()) if self._due else None

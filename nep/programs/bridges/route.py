@@ -84,7 +84,6 @@ class _Ear:
         self._lock = threading.Lock()
 
     def hear(self, messages: Sequence[Message]) -> None:
-        """See `nep.backends.base.Sink`."""
         with self._lock:
             if self.is_muted:
                 return
@@ -94,14 +93,12 @@ class _Ear:
         self._take(messages)
 
     def open(self) -> None:
-        """Hand over what came, and from now on everything."""
         with self._lock:
             self._take(self._kept)
             self._kept = []
             self.is_open = True
 
     def mute(self) -> None:
-        """Take nothing any more."""
         self.is_muted = True
 
 
@@ -287,7 +284,6 @@ class Route:
                     self._offer(message, now)
 
     def _is_back(self, message: Message, now: float) -> bool:
-        """Whether a bridge brought it here from where it would go, or may have."""
         if self.rival:
             return True
         if message.publisher is not None:
@@ -299,7 +295,6 @@ class Route:
         return is_nameless and self.origin.echoes.is_echo(message.raw, now)
 
     def _offer(self, message: Message, now: float) -> None:
-        """Carry it now, or when its turn comes and no newer one has taken its place."""
         if self._limit is None:
             self._carry(message)
         elif self._newest is not None:
@@ -312,7 +307,6 @@ class Route:
             self._pacer.call_at(self._limit.next_at, self._take_newest)
 
     def _take_newest(self) -> None:
-        """The turn of the message that waits."""
         with self._lock:
             message, self._newest = self._newest, None
             if message is not None:
@@ -331,7 +325,6 @@ class Route:
             self._send(publisher, message)
 
     def _send_held(self) -> Message | None:
-        """Send what waited, as far as there are publishers; the first message that has none yet."""
         while self._held.messages:
             message = self._held.messages[0]
             publisher = self._publishers.get(self._key(message))
@@ -342,7 +335,6 @@ class Route:
         return None
 
     def _key(self, message: Message) -> tuple[bool, int | None]:
-        """Which publisher: what is latched is so for each of its publishers alone."""
         if not message.is_latched:
             return False, None
         key = (True, message.publisher)
@@ -370,7 +362,6 @@ class Route:
                 return
 
     def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> Form:
-        """As what it is published: decided by the first message, and kept."""
         if self._form is None:
             msg_type = self.end.msg_type or type_for(
                 message, self.end.backend, view.topics.get(self.end.topic), own_nodes
@@ -423,7 +414,6 @@ class Route:
             self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
 
     def _converted(self, publisher: Publisher, message: Message, form: Form) -> Encoded:
-        """Its payload in the other side's form. What cannot be read or written is an alert in the graph."""
         subscriber = self._subscriber
         payload = message.payload if subscriber is None else subscriber.decoded(message)
         try:

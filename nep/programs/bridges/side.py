@@ -65,7 +65,6 @@ class BridgeSide:
         node_name: str,
         allow_moving: Collection[str] | None = None,
     ) -> None:
-        """Make its node. `allow_moving` names the robots that may be moved, None allows all."""
         self.name = name
         self.configuration = configuration
         self.view: GraphView | None = None
@@ -139,7 +138,6 @@ class BridgeSide:
         return [each for each in routes if each.needs_type and self.name not in each.troubles]
 
     def _look(self, owner: BridgeOfSide) -> None:
-        """Ask who is there; say when nobody answers, and when somebody does again."""
         try:
             view = self.node.graph(_ANSWER_S)
         except ClosedError:
@@ -191,7 +189,6 @@ class BridgeSide:
         return route in deciding or self.name in route.troubles
 
     def _try(self, route: Route, make: Callable[[], None]) -> None:
-        """One route that cannot be served does not stop the others; it is tried again."""
         try:
             make()
         except ClosedError:
@@ -211,8 +208,6 @@ class BridgeSide:
         route.troubles.pop(self.name, None)
 
     def _meet(self, owner: BridgeOfSide) -> None:
-        """Hear what other bridges tell."""
-
         def hear(messages: Sequence[Message]) -> None:
             for message in messages:
                 owner.heard(self.name, message)
@@ -222,7 +217,6 @@ class BridgeSide:
                 self._others = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
 
     def _tell(self, status: dict[str, object]) -> None:
-        """Publish how the bridge stands, when that has changed, and now and then."""
         now = time.monotonic()
         if self._is_closing or (status == self._told and now - self._told_at < HEARTBEAT_S):
             return

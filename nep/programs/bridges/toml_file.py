@@ -280,7 +280,6 @@ class _Reader:
         return value
 
     def _checked(self, check: Callable[[], _CHECKED], key: str, where: str, number: int = 0) -> _CHECKED:
-        """What `check` gives; its error says where."""
         try:
             return check()
         except (NepError, ValueError) as error:
@@ -295,7 +294,6 @@ class _Reader:
         raise NepError(escaped(said.format(line=line, path=self._path, key=shown, reason=reason)))
 
     def _line_of(self, key: str, where: str, number: int) -> int:
-        """The line of a key in its table, else that of the table, else 0."""
         table, seen, table_line = "", -1, 0
         name = re.escape(key)
         assigned = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
@@ -318,7 +316,6 @@ class _Reader:
 
 
 def _plain(stem: str) -> str:
-    """A file's name as a bridge's."""
     return escaped(stem)[:40] or "bridge"
 
 

@@ -79,7 +79,6 @@ def _kept_type(message: Message, backend: Backend) -> str:
 
 
 def _codec_name(backend: Backend, msg_type: str) -> str:
-    """The name of the codec that carries a type there; "" when there is none."""
     try:
         return backend.codec_for(msg_type).name
     except NepError:

@@ -53,7 +53,6 @@ def read_trail(extension: Mapping[str, object]) -> Trail:
 
 
 def _words(found: object) -> tuple[str, ...]:
-    """A longer list than a bridge writes is cut where it still is too long to be carried on."""
     if not isinstance(found, list | tuple):
         return ()
     return tuple(each for each in found[: HOPS_MOST + 2] if isinstance(each, str) and len(each) <= _WORD_MOST)

@@ -1,7 +1,8 @@
-"""The connection doctor: why programs do not find each other, and what to do about it.
+"""Connection doctor: diagnoses why programs can't find each other and suggests fixes.
 
-`collect_facts` looks at processes, ports, the master's graph and this Python; `findings` judges these facts,
-and is a function of them alone. `look` does both, also about a topic that somebody misses (`topic_findings`).
+`collect_facts` inspects processes, ports, the master's graph and this Python; `findings` derives findings
+from these facts alone. `look` does both, optionally for a topic whose messages don't arrive
+(`topic_findings`).
 """
 
 from nep.programs.doctor.collect import collect_facts, start_obstacle

@@ -1,4 +1,4 @@
-"""Gathering the facts that the doctor judges: processes, ports, files, the master's graph, this Python."""
+"""Collection of the doctor's facts: processes, ports, files, the master's graph, this Python."""
 
 from __future__ import annotations
 
@@ -63,10 +63,12 @@ _GATEWAY_OFF = {"0", "false", "no", "off"}
 def collect_facts(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Facts:
-    """Look at everything; takes up to two seconds when no master answers.
+    """Collect all facts; takes up to two seconds when no master replies.
 
-    `folders`: more folders that must take files, each with what is kept there. `here`: where programs are
-    started (default: the current folder).
+    Args:
+        address: Address of the master (default: NEP_MASTER or the default address).
+        folders: Further folders that must be writable, each with its purpose.
+        here: Folder in which programs are started (default: the current folder).
     """
     *_parts, (_known, facts) = collect_in_steps(address, folders=folders, here=here)
     return facts
@@ -75,10 +77,10 @@ def collect_facts(
 def collect_in_steps(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Iterator[tuple[tuple[str, ...], Facts]]:
-    """As `collect_facts`, but what is known so far after each step, the quick ones first.
+    """Yield the facts after each step of `collect_facts`, quick steps first.
 
-    With it come the names of the parts of the diagnosis (`nep.programs.doctor.diagnosis.PARTS`) for which all
-    is known since this step.
+    Each item starts with the names of the parts of the diagnosis (`nep.programs.doctor.diagnosis.PARTS`)
+    whose facts are complete since this step.
     """
     chosen, package = master_address(address), Path(nep.errors.__file__).parent
     facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))
@@ -112,7 +114,6 @@ def collect_in_steps(
 
 
 def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
-    """What is known of the master, too; its process where it answers, and who listens at which port."""
     chosen = facts.address
     number = int(chosen.rpartition(":")[2])
     view, answered_s, is_known = _ask(chosen)
@@ -138,15 +139,14 @@ def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | No
 
 
 def _answers_at(address: str) -> str:
-    """Where at loopback a master answers that does not at this address of the network; "" when none does."""
     own = f"127.0.0.1:{address.rpartition(':')[2]}"
     return own if not is_loopback(address) and _ask(own)[0] is not None else ""
 
 
 def start_obstacle(address: str | None = None) -> Finding | None:
-    """Why no master can be started at the address; None when nothing is known to be in its way.
+    """Return why no master can be started at the address, or None if nothing prevents it.
 
-    In the way is also that it is an address of the network: a master starts at loopback alone.
+    An address that is not loopback is an obstacle, because a master starts at loopback only.
     """
     chosen = master_address(address)
     facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback=loopback_problem())
@@ -162,7 +162,6 @@ def start_obstacle(address: str | None = None) -> Finding | None:
 
 
 def _ask(address: str) -> tuple[GraphView | None, float | None, bool]:
-    """The graph, how long it took, and whether the name of the master's computer is known."""
     began = time.monotonic()
     try:
         with Node(f"nep-doctor-{os.getpid()}", master=address) as node:
@@ -174,7 +173,6 @@ def _ask(address: str) -> tuple[GraphView | None, float | None, bool]:
 
 
 def _is_here(address: str) -> bool:
-    """Whether the master's address is one of this computer."""
     host = host_of(address)
     if host in {"localhost", "*", "0.0.0.0", "[::1]"} or host.startswith("127."):  # noqa: S104 - no binding
         return True
@@ -191,7 +189,7 @@ def _port(
 
 
 def loopback_problem() -> str:
-    """Why a connection from this program to itself over 127.0.0.1 does not work; "" when it does."""
+    """Return why this program can't connect to itself over 127.0.0.1, or "" if it can."""
     try:
         with socket.socket() as server:
             server.bind(("127.0.0.1", 0))
@@ -243,7 +241,6 @@ def _files(master_pid: int | None) -> FileFact:
 
 
 def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
-    """The native programs of this computer, each with the name of one of its nodes."""
     here = {
         node.pid: node.name
         for node in (view.nodes.values() if view is not None else ())
@@ -253,13 +250,12 @@ def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
         if pid is None:
             continue
         opened, limit = processes.open_files(pid)
-        limit = limit or descriptors.limit()  # macOS tells a program's own only
+        limit = limit or descriptors.limit()  # macOS reports only the limit of this process
         if opened is not None and limit is not None:
             yield ProgramFact(pid, name, opened, limit)
 
 
 def _folder(purpose: str, path: Path) -> FolderFact:
-    """Whether a file can be made in the folder, or the folder itself; nothing is left behind."""
     existing = path
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent

@@ -1,4 +1,4 @@
-"""The doctor's diagnosis: facts in, findings out. No sockets, no files, no clock."""
+"""Diagnosis of the doctor: a pure function from facts to findings, without sockets, files or clock."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ __all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
 FEWEST_FILES = 1024
 NEARLY = 0.8
 _FILES_A_TOPIC = 20
-"""A topic of the original NEP takes about so many handles of the master; a native one fewer."""
+"""File descriptors of the master per topic of the original NEP; a native topic needs fewer."""
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
 _SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
 EARLIEST_S = 1_704_067_200.0
-"""2024 began; a clock that says less was never set."""
+"""Start of 2024; an earlier clock was never set."""
 
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
-    """Everything that the facts say, the worst first."""
+    """Return all findings of the facts, worst first."""
     return in_order(finding for part in PARTS.values() for finding in part(facts))
 
 
 def in_order(found: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The worst first; what is as bad stays in its order."""
+    """Sort findings by severity, worst first; the order is stable."""
     return tuple(sorted(found, key=lambda finding: _ORDER[finding.severity]))
 
 
 def worst(found: Sequence[Finding]) -> Literal[0, 1, 2]:
-    """The exit code: 2 with an error, 1 with a warning, else 0."""
+    """Return the exit code: 2 with an error, 1 with a warning, else 0."""
     severities = {finding.severity for finding in found}
     return 2 if "error" in severities else 1 if "warning" in severities else 0
 
 
 def report(found: Sequence[Finding]) -> str:
-    """The findings as plain text, to be sent to somebody."""
+    """Format the findings as plain text, for a bug report."""
     lines = []
     for finding in found:
         lines.append(f"{_SIGNS[finding.severity]} {finding.sentence}")
@@ -51,7 +51,7 @@ def report(found: Sequence[Finding]) -> str:
 
 
 def to_plain(found: Sequence[Finding]) -> list[dict[str, object]]:
-    """The findings as maps, for `--json`."""
+    """Return the findings as dicts, for `--json`."""
     return [asdict(finding) for finding in found]
 
 
@@ -114,7 +114,6 @@ def _python_namesake(facts: Facts) -> Iterator[Finding]:
 
 
 def _node_package(packages: Sequence[PackageFact]) -> Finding:
-    """Report the imported nep-js, and whether it hides NEP Studio's."""
     imported, *hidden = packages
     ours = next((each for each in hidden if each.is_ours), None)
     if imported.is_ours:
@@ -244,4 +243,4 @@ PARTS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
     "clock": _clock,
     "versions": _versions,
 }
-"""What is looked at, by name; what is as bad is told in this order."""
+"""Checks by name; findings of equal severity appear in this order."""

@@ -1,4 +1,4 @@
-"""What the doctor judges: facts about this computer, as frozen values. None stands for what is not known."""
+"""Facts about this computer that the doctor judges, as frozen dataclasses. None means unknown."""
 
 from __future__ import annotations
 
@@ -24,13 +24,16 @@ __all__ = [
 ]
 
 Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
-"""Why an address is not reached from here: only its own computer reaches it, nobody listens there, nothing
-answers, or another reason that the system gives; "" when it is reached, or was not tried."""
+"""Why an address can't be reached; "" if it can, or was not tried.
+
+"elsewhere": reachable only on its own computer. "refused": the port is closed. "timeout": no reply.
+"unknown": another error of the system.
+"""
 
 
 @dataclass(frozen=True)
 class ProcessFact:
-    """A process: its id, its program's name, and when it began (s since 1970)."""
+    """Process: its id, its program's name, and its start time (s since 1970)."""
 
     pid: int | None
     name: str
@@ -40,9 +43,9 @@ class ProcessFact:
 
 @dataclass(frozen=True)
 class PortFact:
-    """A port of this computer, what it is for, whether it is taken, and by whom.
+    """Port of this computer, its purpose, whether it is taken, and its holder.
 
-    `holder` is None when nobody holds it, or when the system does not say who does.
+    `holder` is None if the port is free or the system doesn't report the process.
     """
 
     port: int
@@ -63,7 +66,7 @@ class PackageFact:
 
 @dataclass(frozen=True)
 class FileFact:
-    """How many files a program may open (None: no limit), and how many the master has open."""
+    """Open-file limits of this process (None: unlimited), and the master's number of open files and limit."""
 
     soft: int | None
     hard: int | None
@@ -73,7 +76,7 @@ class FileFact:
 
 @dataclass(frozen=True)
 class ProgramFact:
-    """A program of this computer with a node `name`: how many files it has open, and how many it may have."""
+    """Process of this computer with a node `name`: its number of open files and its limit."""
 
     pid: int
     name: str
@@ -83,7 +86,7 @@ class ProgramFact:
 
 @dataclass(frozen=True)
 class FolderFact:
-    """A folder that must take files: what for, and why it does not ("" when it does)."""
+    """Folder that must be writable, its purpose, and why it is not ("" if it is)."""
 
     path: str
     purpose: str
@@ -92,7 +95,7 @@ class FolderFact:
 
 @dataclass(frozen=True)
 class ClockFact:
-    """A computer whose messages are stamped so many seconds in the future."""
+    """Computer whose messages are stamped `ahead_s` seconds in the future."""
 
     host: str
     ahead_s: float
@@ -100,21 +103,36 @@ class ClockFact:
 
 @dataclass(frozen=True)
 class Facts:
-    """Everything that the doctor looks at. `now_s` is the time in s since 1970.
+    """Everything that the doctor inspects.
 
-    `address` is the master's. `view` is its graph, None when no master answers; `answered_s` is how long that
-    took. `masters` are all processes here that run a master, each with its port. `nep_file` is where the
-    package `nep` is imported from; `strange_files` in it are the original NEP's. `shadow` is a file that
-    hides it from programs that are started here. `loopback` says why programs of this computer cannot reach
-    each other, "" when they can. `master_install` is where the master that answers was started from, None
-    when that is not known. `programs` are those of this computer that have nodes, as far as the system tells
-    of their files. Not `is_known`: no computer has the name that the master's address begins with.
-    `answers_at` is the loopback address at which a master answers when none does at `address`, which is of
-    this computer, too; "" when none answers there, either. `reach` is why the address of a master that is
-    on another computer and does not answer is not reached, "" when somebody is there, None when it was not
-    tried. `packages` are those of this Python; `path_package` is the original `nep` imported by another
-    Python that is `python3`; `node_packages` are the `nep-js` packages found by Node.js in this folder,
-    starting with the imported one.
+    Attributes:
+        now_s: Current time (s since 1970).
+        address: Address of the master.
+        platform: Value of `sys.platform`.
+        versions: Versions of NEP Studio, Python and libraries.
+        nep_file: Folder from which the package `nep` is imported.
+        view: Graph of the master, None if no master replies.
+        answered_s: Time the master took to reply.
+        master_port: Port of the master's address, None if the address is not of this computer.
+        ports: Fixed ports of the original NEP.
+        masters: All processes here that run a master, each with its port.
+        joins_originals: True if the gateway is enabled.
+        packages: Installed packages named nep or nep-studio of this Python.
+        strange_files: Files of the original NEP found in `nep_file`.
+        shadow: File that hides the package from programs started here.
+        files: Open-file limits.
+        folders: Folders that must be writable.
+        clocks: Computers whose clocks are ahead.
+        loopback: Why programs of this computer can't reach each other, "" if they can.
+        master_install: Installation of the running master, None if unknown.
+        programs: Programs of this computer that have nodes, if their files are known.
+        is_known: False if the host name of the master's address can't be resolved.
+        answers_at: Loopback address at which a master replies although `address`, of this computer too, does
+            not; else "".
+        reach: Why the address of a remote master that doesn't reply can't be reached; "" if it can, None if
+            not tried.
+        path_package: Original `nep` imported by `python3` of the PATH, if that is another Python.
+        node_packages: `nep-js` packages found by Node.js in this folder, the imported one first.
     """
 
     now_s: float
@@ -146,13 +164,17 @@ class Facts:
 
 @dataclass(frozen=True)
 class PublisherFact:
-    """Who publishes the topic that somebody misses.
+    """Publisher of the topic under diagnosis.
 
-    `node` and `host` are its node's and its computer's names. `sent` is how many messages it has sent, None
-    where nobody counts them (the original NEP); `last_s` when the newest was sent, in s since 1970 by the
-    clock of this computer, None before the first. `endpoint` is where programs here connect to it ("" where
-    nobody needs to), and `reach` why that fails. `remedies` are services of its node that are there to mend
-    it.
+    Attributes:
+        node: Name of its node.
+        host: Name of its computer.
+        generation: "native" or the version of the original NEP.
+        sent: Number of messages sent, None if not counted (original NEP).
+        last_s: Time of the last message (s since 1970, this computer's clock), None before the first.
+        endpoint: Address to which programs here connect, "" if none is needed.
+        reach: Why the endpoint can't be reached.
+        remedies: Services of its node that can restart it.
     """
 
     node: str
@@ -167,14 +189,22 @@ class PublisherFact:
 
 @dataclass(frozen=True)
 class TopicFacts:
-    """What is known of a topic that somebody misses; `now_s` is the time in s since 1970.
+    """Facts about the topic under diagnosis.
 
-    `address` is the master's, `is_shared` whether it serves other computers. `others` are the topics that
-    are published, each with its messages a second (None: unknown); `services` the names of services.
-    `alerts` are the master's about this topic. `listened_s` is how long somebody listened to it here,
-    `received` what came meanwhile, `refused` how much of what came was no message of this version, and
-    `unreadable` why the newest message can't be decoded ("" when it can). `bad_name` says why no topic can
-    be called so.
+    Attributes:
+        topic: Name of the topic.
+        now_s: Current time (s since 1970).
+        address: Address of the master.
+        is_shared: True if the master accepts other computers.
+        publishers: Publishers of the topic.
+        others: Published topics with their rates in Hz (None: unknown).
+        services: Names of all services.
+        alerts: Alerts of the master about this topic.
+        listened_s: How long the doctor subscribed to the topic.
+        received: Number of messages received meanwhile.
+        refused: Number of received messages with an unknown wire version.
+        unreadable: Why the newest message can't be decoded, "" if it can.
+        bad_name: Why the topic's name is invalid, "" if it is valid.
     """
 
     topic: str

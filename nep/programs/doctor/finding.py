@@ -1,4 +1,4 @@
-"""One finding of the doctor."""
+"""Finding of the doctor."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Severity = Literal["error", "warning", "info", "ok"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: how bad it is, a sentence, and what to do next ("" when nothing).
+    """Result of one check: severity, sentence, and the next step ("" if none).
 
-    `id` begins with what it is about ("master:none", "ports:taken"). `command` can be typed in a terminal.
-    `instead` is the name that would do: of the topic that is meant, of the service to be called.
+    `id` starts with its subject ("master:none", "ports:taken"). `command` can be run in a terminal. `instead`
+    is a suggested name: of a similar topic, or of a service to call.
     """
 
     id: str
@@ -29,7 +29,7 @@ class Finding:
 
     @property
     def as_error(self) -> str:
-        """The finding as an error's sentence: lower case, no full stop, the next step after a semicolon."""
+        """Finding formatted as an error: lower case, no full stop, the next step after a semicolon."""
         first = self.sentence.rstrip(".")
         step = self.mend.rstrip(".")
         words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
@@ -37,7 +37,7 @@ class Finding:
 
 
 def ago(seconds: float) -> str:
-    """How long something has been running."""
+    """Format how long something has been running."""
     if seconds < 90:
         return f"{max(0, round(seconds))} s"
     if seconds < 5400:
@@ -49,5 +49,5 @@ def ago(seconds: float) -> str:
 
 
 def with_process(words: str, pid: int | None) -> str:
-    """Return what a program is called or where it is, with its process where that is known."""
+    """Append the process id to a description of a program, if known."""
     return words if pid is None else _("{program} (process {pid})").format(program=words, pid=pid)

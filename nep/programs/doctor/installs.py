@@ -1,6 +1,6 @@
-"""From which installation of NEP Studio a process of this computer was started.
+"""Detection of the installation of NEP Studio from which a process was started.
 
-The master does not tell its version on the wire; where it runs on this computer, its Python does.
+The wire doesn't carry the master's version; for a local master its Python environment does.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _PLACES = ("lib/python*/site-packages", "Lib/site-packages")
 
 @dataclass(frozen=True)
 class Install:
-    """A version of NEP Studio in a Python environment, and when it was put there (s since 1970)."""
+    """Version of NEP Studio in a Python environment, with the installation time (s since 1970)."""
 
     version: str
     since_s: float
@@ -34,7 +34,7 @@ class Install:
 
 
 def install_of(pid: int) -> Install | None:
-    """The installation that a process was started from; None when that is not known."""
+    """Return the installation from which a process was started, or None if unknown."""
     try:
         process = psutil.Process(pid)
         active = process.environ().get("VIRTUAL_ENV", "")
@@ -45,28 +45,28 @@ def install_of(pid: int) -> Install | None:
 
 
 def environment_of(command: Sequence[str], executable: str, folder: str, active: str = "") -> Path | None:
-    """The Python environment of a program that was started in ``folder``, where ``active`` was activated.
+    """Return the Python environment of a program started in ``folder`` with ``active`` activated.
 
-    An environment's own interpreter is a link to the one that the system tells as the executable.
+    The interpreter of an environment is a link to the one that the system reports as the executable.
     """
     called = command[0] if command else ""
     if not Path(called).stem.lower().startswith("python"):
         called = executable
     if not Path(called).stem.lower().startswith("python"):
-        return None  # of an installer: its Python is inside it
+        return None  # frozen by an installer: it contains its Python
     if Path(called).name == called:
         return Path(active) if active else Path(executable).parent.parent
     return Path(folder, called).parent.parent
 
 
 def install_in(environment: Path) -> Install | None:
-    """NEP Studio in a Python environment; None when it is not there, or there twice."""
+    """Return the installation of NEP Studio in an environment; None if there is none, or two."""
     found = [info for place in _PLACES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
     if len(found) != 1:
         return None
     try:
         since_s = (found[0] / "METADATA").stat().st_mtime
         version = metadata.Distribution.at(found[0]).version
-    except (OSError, KeyError, TypeError):  # half an installation
+    except (OSError, KeyError, TypeError):  # incomplete installation
         return None
     return Install(version, since_s, str(environment))

@@ -1,4 +1,4 @@
-"""Gathering what the doctor judges of one topic: who publishes it, whether they are reached, what comes."""
+"""Collection of facts about one topic: its publishers, their addresses, and received messages."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _ASK_S = 1.0
 _LISTEN_S = 1.5
 _CONNECT_S = 0.7
 _MOST_TRIED = 4
-"""So many publishers' addresses are tried; each that does not answer takes `_CONNECT_S`."""
+"""Publisher addresses tried; each that doesn't reply takes `_CONNECT_TIMEOUT_S`."""
 _REMEDIES = ("restart", "reset", "start")
-"""How the names of services begin that are there to set a program going again."""
+"""Prefixes of service names that can restart a program."""
 
 
 def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
-    """Look at a topic, and listen to it for a second and a half at most; None when no master answers."""
+    """Collect the facts about a topic, subscribing for up to 1.5 s; None if no master replies."""
     chosen = master_address(address)
     try:
         check_topic(topic)
@@ -44,7 +44,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
 
 
 def reach_of(endpoint: str) -> Reach:
-    """Whether a publisher's endpoint can be connected to from here, by connecting once."""
+    """Try to connect to an endpoint from here; return why it fails, or ""."""
     place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
         return ""
@@ -68,7 +68,7 @@ def _look(node: Node, topic: str, address: str) -> TopicFacts:
             topic, time.time(), address, bool(view.listens), others=others, services=tuple(view.services)
         )
     received, refused, unreadable, listened_s = _listen(node, info)
-    view = node.graph(_ASK_S)  # what was noticed meanwhile
+    view = node.graph(_ASK_S)  # includes alerts raised while subscribed
     info = view.topics.get(topic, info)
     return TopicFacts(
         topic,
@@ -87,7 +87,6 @@ def _look(node: Node, topic: str, address: str) -> TopicFacts:
 
 
 def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
-    """(received, refused, why the newest can't be read, seconds): until one came, or the time is over."""
     began = time.monotonic()
     with node.new_sub(info.name, info.msg_type, wildcards=False) as ear:
         message, unreadable = ear.receive(_LISTEN_S), ""
@@ -126,7 +125,7 @@ def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[s
 
 
 def _reached(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tuple[str, Reach]:
-    """Where a program here connects to it, and why that fails; the same place is tried once."""
+    # Each endpoint is tried once.
     if not each.endpoints:
         return "", ""
     endpoint = nearest(each.endpoints, address)
@@ -138,7 +137,6 @@ def _reached(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tupl
 
 
 def _last_s(view: GraphView, each: PublisherInfo) -> float | None:
-    """When its newest message was sent, by the clock of this computer."""
     if each.last_stamp_ns is None:
         return None
     theirs = _offsets(view)

@@ -1,4 +1,4 @@
-"""One look of the doctor: everything, and first of all the topic that somebody misses."""
+"""Complete run of the doctor, optionally for one topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nep.programs.doctor.topics import topic_findings
 __all__ = ["Tell", "look"]
 
 Tell = Callable[[tuple[Finding, ...], int, int], object]
-"""What is found so far, the worst first; how many things were looked at, of how many."""
+"""Progress callback: findings so far (worst first), number of checks done, number of all checks."""
 
 
 def look(
@@ -24,10 +24,14 @@ def look(
     folders: Sequence[tuple[str, Path]] = (),
     tell: Tell | None = None,
 ) -> tuple[Finding, ...]:
-    """Everything that is found, the worst first; takes some seconds. `folders` as for `collect_facts`.
+    """Run all checks and return the findings, worst first; takes some seconds.
 
-    What is found of `topic`, when there is one, stands before what is as bad, and in place of what is told
-    under the same id in general. `tell` is called meanwhile, after each step.
+    Args:
+        address: Address of the master.
+        topic: Topic whose messages don't arrive. Its findings come before others of the same severity and
+            replace general ones with the same id.
+        folders: As for `collect_facts`.
+        tell: Called after each step with the findings so far.
     """
     found: dict[str, tuple[Finding, ...]] = {}
     facts: Facts | None = None

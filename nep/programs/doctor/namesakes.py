@@ -1,6 +1,6 @@
-"""Packages named `nep` and `nep-js` on this computer: NEP Studio's or those of the original NEP.
+"""Detection of packages named `nep` and `nep-js` of NEP Studio or of the original NEP.
 
-The names on the public registries belong to the original NEP. The search neither imports nor runs anything.
+On the public registries these names belong to the original NEP. The search neither imports nor runs anything.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The part of the doctor's judgement that is about masters, ports and who is on the net."""
+"""Part of the diagnosis about masters, their ports and the programs in the network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NATIVE = {"native", "gateway"}
 
 
 def loopback(facts: Facts) -> Iterator[Finding]:
-    """Whether programs of this computer can reach each other at all."""
+    """Check whether programs of this computer can reach each other."""
     if facts.loopback:
         yield Finding(
             "loopback",
@@ -31,7 +31,7 @@ def loopback(facts: Facts) -> Iterator[Finding]:
 
 
 def masters(facts: Facts) -> Iterator[Finding]:
-    """Whether a master answers, who it is, and whether there are two."""
+    """Check whether exactly one master is running and replies."""
     port = facts.master_port
     holder = port.holder if port is not None else None
     if facts.view is not None:
@@ -64,7 +64,6 @@ def _unknown_host(facts: Facts) -> Finding:
 
 
 def _closed(facts: Facts) -> Finding:
-    """It is asked by an address of the network and listens at loopback alone."""
     return Finding(
         "master:closed",
         "error",
@@ -121,7 +120,6 @@ def _none(facts: Facts) -> Finding:
 
 
 def _never_there(facts: Facts) -> Finding:
-    """It is asked by an address of the network, and none runs here; one would begin at loopback alone."""
     own = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
     return Finding(
         "master:network",
@@ -137,7 +135,6 @@ def _never_there(facts: Facts) -> Finding:
 
 
 def _unreached(facts: Facts) -> Finding:
-    """It is on another computer: how that was not reached tells what is to be looked at there."""
     host, _colon, port = facts.address.rpartition(":")
     if facts.reach == "timeout":
         sentence = _("Nothing answers at {address}, so no master is found.")
@@ -162,7 +159,7 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
     view = facts.view
     people = ""
     if view is not None:
-        # what nep itself only waits for, such as log records, is nobody's topic yet
+        # skip nep's own topics that have only subscribers, such as log records
         live = [name for name, info in view.topics.items() if info.publishers or not name.startswith("/nep/")]
         nodes = ngettext("{count} node", "{count} nodes", len(view.nodes)).format(count=len(view.nodes))
         topics = ngettext("{count} topic", "{count} topics", len(live)).format(count=len(live))
@@ -187,7 +184,6 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
 
 
 def _of_another_version(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
-    """A master that another version of NEP Studio has started, or this one before it was installed anew."""
     install, own = facts.master_install, facts.versions.get("NEP Studio", "")
     if install is None or holder is None or not own[:1].isdigit():
         return
@@ -237,7 +233,7 @@ def _several(facts: Facts) -> Iterator[Finding]:
 
 
 def originals(facts: Facts) -> Iterator[Finding]:
-    """Who is a program of the original NEP, and which of them cannot be served."""
+    """Report programs of the original NEP, and those that can't be served."""
     if facts.view is None:
         return
     nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE]
@@ -256,7 +252,7 @@ def originals(facts: Facts) -> Iterator[Finding]:
 
 
 def master_alerts(facts: Facts) -> Iterator[Finding]:
-    """What the master itself has noticed; ports are judged here already."""
+    """Report the master's alerts, except those about ports, which are checked here."""
     if facts.view is None:
         return
     for alert in facts.view.alerts:
@@ -266,7 +262,7 @@ def master_alerts(facts: Facts) -> Iterator[Finding]:
 
 
 def clocks(facts: Facts) -> Iterator[Finding]:
-    """Computers whose clocks are ahead of this one's."""
+    """Report computers whose clocks are ahead of this one's."""
     for clock in facts.clocks:
         yield Finding(
             f"clock:{clock.host}",
@@ -283,7 +279,6 @@ def _wire(generation: str) -> str:
 
 
 def _master(facts: Facts, holder: ProcessFact | None) -> str:
-    """Where it is: "127.0.0.1:7780 (process 12)"."""
     return with_process(facts.address, holder.pid if holder is not None else None)
 
 
@@ -298,7 +293,7 @@ def _other_port(number: str) -> int:
 
 
 def not_served(finding_id: str, program: str, generation: str) -> Finding:
-    """A program uses a version of the original NEP that no other understands."""
+    """Return the finding for a program with an incompatible version of the original NEP."""
     return Finding(
         finding_id,
         "error",

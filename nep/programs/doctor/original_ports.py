@@ -1,4 +1,4 @@
-"""The part of the doctor's judgement that is about the fixed ports of the original NEP: one line for all."""
+"""Part of the diagnosis about the fixed ports of the original NEP, merged into few findings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
 
 
 def ports(facts: Facts) -> Iterator[Finding]:
-    """Who holds the ports where programs of the original NEP ask."""
+    """Report which programs hold the ports that programs of the original NEP connect to."""
     if not facts.joins_originals:
         yield Finding("ports", "info", _("Programs of the original NEP are not joined (NEP_GATEWAY=0)."))
         return
@@ -38,13 +38,12 @@ def ports(facts: Facts) -> Iterator[Finding]:
 
 
 def _is_masters(facts: Facts, port: PortFact) -> bool:
-    """Whether the master that is asked holds the port: no other master, nor one that says it could not."""
     view, here = facts.view, facts.master_port
     if here is None or (view is not None and any(each.id == f"port:{port.port}" for each in view.alerts)):
         return False
     if port.holder is not None and here.holder is not None:
         return port.holder.pid == here.holder.pid
-    # the system names no process: a master with a gateway that does not complain has what it wants
+    # no process is reported: a master with a gateway and without a port alert holds its ports
     return view is not None and any(node.generation == "gateway" for node in view.nodes.values())
 
 

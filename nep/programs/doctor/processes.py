@@ -1,4 +1,4 @@
-"""Who holds which port of this computer, and which processes are masters."""
+"""Holders of ports on this computer, and processes that run a master."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ __all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "
 
 _LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
 _TEXT_OF_A_PROGRAM = frozenset({"-c", "-e", "--eval", "-p", "--print"})
-"""Behind these options of Python and Node.js comes the text of a program, which is no name."""
+"""Options of Python and Node.js that are followed by source code instead of a file name."""
 _NEAR = 20
-"""A master's port is looked for so near to the usual one, when it listens on several."""
+"""Maximum distance of a master's port from the usual one if it listens on several."""
 
 
 def listening() -> dict[int, int | None]:
-    """The TCP ports that somebody listens on, with the process where the system tells it."""
+    """Return the listening TCP ports with their process, None if the system doesn't report it."""
     try:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
-    except psutil.AccessDenied:  # macOS tells all of them to root only; its own to everybody
+    except psutil.AccessDenied:  # macOS: all connections for root only, own ones for everyone
         connections = _own_connections()
     return holders(connections)
 
 
 def holders(connections: Iterable[object]) -> dict[int, int | None]:
-    """Return the process of each port that is listened on, None where the system does not tell it.
+    """Return the process of each listening port, None if the system doesn't report it.
 
-    Several programs may listen on one port at different addresses: who is reached at 127.0.0.1 counts.
+    Several programs may listen on one port at different addresses: the one reached at 127.0.0.1 wins.
     """
     at_loopback: dict[int, int | None] = {}
     elsewhere: dict[int, int | None] = {}
@@ -63,7 +63,7 @@ def _own_connections() -> Iterable[object]:
 
 
 class _Owned:
-    """A connection of one process, with its process as the system-wide list has it."""
+    """Connection with the pid of its process, as in the system-wide list."""
 
     def __init__(self, connection: object, pid: int) -> None:
         self.status = getattr(connection, "status", "")
@@ -72,9 +72,9 @@ class _Owned:
 
 
 def is_free(port: int) -> bool:
-    """Whether a program could listen on the port now. It is taken for a moment to see."""
+    """Return whether the port can be bound now, by binding it for a moment."""
     with socket.socket() as probe:
-        if sys.platform != "win32":  # elsewhere the connections of one that was killed hold its port a while
+        if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port for a while
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))
@@ -84,7 +84,7 @@ def is_free(port: int) -> bool:
 
 
 def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
-    """The process, None when it is not known or has ended."""
+    """Return the facts of a process, or None if it is unknown or has ended."""
     if pid is None:
         return None
     try:
@@ -98,7 +98,7 @@ def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | No
 
 
 def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessFact, int | None], ...]:
-    """Processes that run a master, each with its port; the one at the usual port first."""
+    """Return processes that run a master with their ports, the usual port first."""
     held: dict[int, list[int]] = {}
     for port, pid in ports.items():
         if pid is not None:
@@ -117,7 +117,7 @@ def _masters_port(ports: Sequence[int], usual: int) -> int | None:
 
 
 def is_master_command(command: Sequence[str]) -> bool:
-    """Whether a command line is one that runs a master: `nep master`, `python -m nep master`."""
+    """Return whether a command line runs a master: `nep master`, `python -m nep master`."""
     for word, following in itertools.pairwise(command):
         if following == "master" and PurePath(word).stem in {"nep", "__main__"}:
             return True
@@ -125,7 +125,7 @@ def is_master_command(command: Sequence[str]) -> bool:
 
 
 def open_files(pid: int) -> tuple[int | None, int | None]:
-    """How many files a process has open, and how many it may; None where the system does not tell."""
+    """Return a process's number of open files and its limit, None for unknown ones."""
     try:
         process = psutil.Process(pid)
         opened = process.num_fds() if hasattr(process, "num_fds") else None
@@ -144,7 +144,6 @@ def _command(process: psutil.Process) -> list[str]:
 
 
 def _name(name: str, command: Sequence[str]) -> str:
-    """What a person would call the program: of an interpreter, its script."""
     if PurePath(name).stem.lower().startswith(("python", "node", "java")):
         for word in command[1:]:
             if word in _TEXT_OF_A_PROGRAM:

@@ -1,4 +1,4 @@
-"""Why nothing is seen of one topic: facts in, findings out. No sockets, no clock."""
+"""Diagnosis of one topic: a pure function from facts to findings, without sockets or clock."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from nep.system.addresses import is_loopback
 __all__ = ["meant_topic", "topic_findings"]
 
 QUIET_S = 2.0
-"""Who sends once in a while is not called silent before this."""
+"""Silence before a publisher that sends rarely counts as silent."""
 _MOST_NAMED = 5
 
 
 def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
-    """What is wrong, or well, with the topic that somebody misses; the most likely reason first."""
+    """Return the findings about the topic under diagnosis, most likely cause first."""
     if facts.bad_name:
         return (
             Finding(
@@ -40,9 +40,10 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
 
 
 def meant_topic(topic: str, names: Iterable[str]) -> str | None:
-    """The name among these that somebody meant who wrote `topic`: without its slash, in other letters.
+    """Return the published name that `topic` most likely means, or None.
 
-    Then one that ends in the same part, when it is the only one, then one that is spelled nearly so.
+    Tries in this order: the name without slashes and case, a unique name with the same last part, similar
+    spelling.
     """
     names = [name for name in names if name != topic]
     wanted = _bare(topic)
@@ -61,7 +62,6 @@ def _bare(topic: str) -> str:
 
 
 def _nobody(facts: TopicFacts) -> Iterator[Finding]:
-    """Nobody publishes it: which name is meant, or where its program may be."""
     sentence = _("Nobody publishes {topic}.").format(topic=facts.topic)
     near = meant_topic(facts.topic, facts.others)
     service = facts.topic if facts.topic in facts.services else ""
@@ -72,9 +72,7 @@ def _nobody(facts: TopicFacts) -> Iterator[Finding]:
         yield Finding("topic:service", "error", sentence, words, instead=service)
     else:
         words = _("Start the program that does; what is published now: {topics}.")
-        known = sorted(
-            name for name in facts.others if not name.startswith("/nep/")
-        )  # NEP's own are nobody's
+        known = sorted(name for name in facts.others if not name.startswith("/nep/"))  # hide nep's own topics
         some = known[:_MOST_NAMED]
         if not some:
             words = _("Start the program that does; nothing else is published, either.")
@@ -109,7 +107,6 @@ def _near_words(facts: TopicFacts, near: str) -> str:
 
 
 def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    """What keeps the messages of one publisher from being here."""
     if each.generation in NOT_SERVED:
         yield not_served(f"topic:version:{each.node}", each.node, each.generation)
     elif each.reach:
@@ -143,10 +140,9 @@ def _unreached(each: PublisherFact) -> Finding:
 
 
 def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    """It is reached, and nothing came."""
     quiet_s = facts.now_s - each.last_s if each.last_s is not None else None
     if quiet_s is not None and quiet_s < max(QUIET_S, facts.listened_s):
-        return  # it sends: what did not come is told by `_arrival`
+        return  # it sends; `_arrival` reports missing messages
     if quiet_s is None and each.sent:
         return
     if quiet_s is None or each.last_s is None:
@@ -174,12 +170,10 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
 
 
 def _noticed(id: str, sentence: str, hint: str) -> Finding:
-    """What the master was told about this topic explains why somebody sees nothing."""
     return Finding(id, "error", sentence if sentence.endswith(".") else f"{sentence}.", hint)
 
 
 def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
-    """Whether its messages come here, and can be read."""
     if facts.unreadable:
         yield Finding(
             "topic:unreadable",

@@ -184,7 +184,6 @@ class NativeNetwork:
                     self._inbox.post(message)
 
     def _try(self, topic: str, make: Callable[[Node], _Made]) -> _Made | None:
-        """Something native for a topic of the originals; what cannot be becomes an alert."""
         id = f"topic:{topic}"
         if time.monotonic() < self._again_at.get(topic, 0.0):
             return None

@@ -161,7 +161,6 @@ def shield_csharp(data: bytes) -> bytes:
 
 
 def _utf16_units(letter: str) -> tuple[int, ...]:
-    """The numbers that JSON writes for a letter: one, or two beyond U+FFFF."""
     packed = letter.encode("utf-16-be", "surrogatepass")
     return tuple(int.from_bytes(packed[at : at + 2], "big") for at in range(0, len(packed), 2))
 
@@ -182,7 +181,6 @@ def _is_json_in_json(frame: bytes) -> bool:
 
 
 def _without_nan(data: bytes) -> bytes:
-    """JSON with `null` for NaN and infinity, which JSON does not have and strict readers refuse."""
     try:
         value = json.loads(data, parse_constant=lambda _: None, parse_float=_finite)
     except (ValueError, RecursionError):
@@ -194,6 +192,5 @@ def _without_nan(data: bytes) -> bytes:
 
 
 def _finite(written: str) -> float | None:
-    """A number as JSON has it; `1e999` is infinity, too."""
     number = float(written)
     return number if math.isfinite(number) else None

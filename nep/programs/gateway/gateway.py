@@ -164,7 +164,6 @@ class Gateway:
         return poller
 
     def _look(self) -> None:
-        """Once a second: who has ended, which lines nobody uses, which taken ports are free now."""
         self._look_at = time.monotonic() + _LOOK_S
         self._relay.look()
         self._programs.look()
@@ -240,7 +239,6 @@ class Gateway:
         raise RequestError(_("no ports are left between 9000 and 9999"), line.topic)
 
     def _open(self, line: TopicLine, base: int) -> bool:
-        """Open a line's sockets on `base`; whether that port and the next were to be had."""
         if line.is_service:
             return is_free(base)
         if not has_room(_PAIR_FILES + SPARE):

@@ -105,7 +105,6 @@ class GraphRegistrar:
         self.show(())
 
     def _load(self, node_id: str, pid: int | None) -> float | None:
-        """The share of a core that an original uses: the system knows what it does not say itself."""
         if pid is None:
             return None
         if node_id not in self._loads:
@@ -170,7 +169,6 @@ def _subscriber(id: int, link: TopicLink) -> SubscriberRecord:
 
 
 def _type(link: TopicLink) -> str:
-    """The originals' names of types differ where the datum does not: the codec's name is what all share."""
     return link.codec
 
 

@@ -133,7 +133,6 @@ class PortMap:
             raise
 
     def _load(self, file: Path) -> None:
-        """A missing or damaged file is an empty map; numbering then starts anew."""
         try:
             document = json.loads(file.read_text(encoding="utf-8"))
             if document["version"] != _VERSION:

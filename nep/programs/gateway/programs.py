@@ -167,7 +167,6 @@ class ProgramTable:
         return OriginalProgram(node_id, first.node, first.pid, generation, first.language, tuple(links))
 
     def _service_links(self, asked: list[Registration]) -> Iterator[TopicLink]:
-        """Services of programs whose end would be noticed: their connections can't be seen."""
         for each in asked:
             if each.line.is_service and each.started is not None and each.socket in get_args(ServiceRole):
                 role = cast("ServiceRole", each.socket)
@@ -175,7 +174,6 @@ class ProgramTable:
                 yield TopicLink(each.line.topic, each.msg_type, each.line.codec, role, port)
 
     def _unserved(self, asked: list[Registration]) -> str | None:
-        """The version of a program that can't be served, where no other program on the line can be meant."""
         for registration in asked:
             pair = self._pair_of(registration.line)
             for role in self._roles.get(registration, ()):
@@ -193,7 +191,6 @@ class ProgramTable:
                 yield end.role
 
     def _is_joined(self, registration: Registration, end: Endpoint) -> bool:
-        """By the system's list of connections; where that cannot be had, by what the program said."""
         if registration.pid is not None and registration.started is not None:
             known = self._processes.is_joined(registration.pid, end.port, binds=end.bound_by_program)
             if known is not None:

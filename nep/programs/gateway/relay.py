@@ -211,7 +211,6 @@ class Relay:
         self._alerts.tell(f"message:{topic}", words.format(reason=refused.reason, count=refused.count))
 
     def _judge(self, pair: ProxyPair) -> None:
-        """Name again who can't be served (its name may be known by now), or take it back."""
         if pair.has_0546:
             self._tell_version("subscriber", pair, "0.5.4.6")
         else:

@@ -1,8 +1,8 @@
-"""Robots as every program can see them: which topics move one, and who may publish there.
+"""Motion protection: which topics move a robot, and which programs may publish there.
 
-`moving` answers "does publishing on this topic move a robot, and which?" from descriptions, types and
-subscribers. `guard` reads the live descriptions for programs without a window, and refuses what nobody has
-allowed. Commands, drivers and Studio's question to a person are in `app`.
+`moving` decides from descriptions, types and subscribers whether a topic moves a robot, and which one.
+`guard` reads the live descriptions for programs without a window, and denies what was not allowed. Commands,
+drivers and Studio's permission dialog are in `app`.
 """
 
 from nep.programs.robots.guard import MotionGuard

@@ -1,7 +1,7 @@
-"""Guard of programs without a window: they move no robot that nobody has allowed them to move.
+"""Motion guard of programs without a window: they move only robots that they were allowed to move.
 
 It subscribes to the descriptions of all robots on the network. The claim "virtual" of a description is not
-believed here, because only the program that started a virtual robot can verify it (docs/trust.md).
+trusted here, because only the program that started a virtual robot can verify it (docs/trust.md).
 """
 
 from __future__ import annotations
@@ -42,22 +42,22 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class MotionGuard:
-    """Decide whether a program may publish on a topic. Thread-safe.
+    """Check whether a program may publish on a topic. Thread-safe.
 
     Call `see` with each new graph; `refusal` is a dictionary look-up until something has changed. Before the
-    first graph nothing is known about robots, and only the message type and RIZE's topic decide.
+    first graph no robot is known, and only the message type and RIZE's topic decide.
+
+    Args:
+        node: Node that subscribes to the robots' descriptions.
+        allowed: Names of robots that may be moved. A topic stands for the robots that it moves.
+        own_nodes: Ids of the program's own nodes (default: that of `node`).
     """
 
     def __init__(
         self, node: Node, allowed: Collection[str] = (), *, own_nodes: Collection[str] | None = None
     ) -> None:
-        """Guard what `node` publishes.
-
-        Args:
-            node: Subscribes to the robots' descriptions.
-            allowed: Names of robots that may be moved. A topic stands for whatever robot it moves.
-            own_nodes: Ids of the program's own nodes; without it only that of `node`.
-        """
+        # `node` subscribes to descriptions. `allowed`: names of robots that may be moved; a topic stands for
+        # the robots that it moves. `own_nodes`: ids of the program's own nodes (default: that of `node`).
         self._node = node
         self._allowed = frozenset(allowed)
         self._own_nodes = frozenset((node.id,) if own_nodes is None else own_nodes)
@@ -65,9 +65,9 @@ class MotionGuard:
         self._received_lock = threading.Lock()  # never held while subscribing, which may wait for the sink
         self._subscribers: dict[str, Subscriber] = {}
         self._received: dict[tuple[str, int | None], Message] = {}
-        """Descriptions that wait to be read, the newest of each publisher."""
+        """Descriptions to be parsed, the newest of each publisher."""
         self._controls: dict[str, dict[int | None, RobotControls]] = {}
-        """By description topic what each publisher described last in a readable form."""
+        """Last valid description of each publisher, by description topic."""
         self._moving = MovingTopics()
         self._view: GraphView | None = None
         self._is_dirty = False
@@ -75,28 +75,28 @@ class MotionGuard:
 
     @property
     def moving(self) -> MovingTopics:
-        """The topics that move robots now."""
+        """Topics that move robots now."""
         return self._moving
 
     @property
     def is_settled(self) -> bool:
-        """Whether a graph was seen and every description in it was read."""
+        """True if a graph was received and all its descriptions were read."""
         with self._lock:
             return self._view is not None and not self._is_dirty and not self._unread(self._view)
 
     def see(self, view: GraphView) -> None:
-        """Take over a new graph; costs little when nobody came or went and no description arrived."""
+        """Process a new graph; cheap if nothing has changed."""
         with self._lock:
             before = self._view
             if before is not None and (before.epoch, before.revision) == (view.epoch, view.revision):
                 if not self._is_dirty:
                     return
             else:
-                self._view = view if self._subscribe(view) else None  # else it is tried again
+                self._view = view if self._subscribe(view) else None  # retried with the next graph
             self._rebuild(view)
 
     def look(self) -> None:
-        """Ask the master who is there and take that over; what was known stays while it does not answer."""
+        """Query the graph and process it; do nothing while the master doesn't reply."""
         try:
             view = self._node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
@@ -104,7 +104,7 @@ class MotionGuard:
         self.see(view)
 
     def settle(self, timeout_s: float) -> bool:
-        """Wait until all descriptions that are there were read, `timeout_s` at most; whether they were."""
+        """Wait up to `timeout_s` until all descriptions were read; return whether they were."""
         until = time.monotonic() + timeout_s
         while True:
             self.look()
@@ -124,7 +124,7 @@ class MotionGuard:
             return _not_allowed(topic, self._moving.moved_by(topic, msg_type), self._allowed)
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
-        """Return why nothing may be published on a topic, with the option that allows it; "" when it may."""
+        """Return why publishing on a topic is denied, with the option that allows it; "" if it is allowed."""
         key = topic, msg_type
         said = self._cache.get(key)
         if said is None:
@@ -136,7 +136,7 @@ class MotionGuard:
         return said
 
     def close(self) -> None:
-        """Unsubscribe from the descriptions; what was known stays."""
+        """Unsubscribe from the descriptions; known robots stay protected."""
         with self._lock:
             subscribers, self._subscribers = list(self._subscribers.values()), {}
         for each in subscribers:
@@ -145,15 +145,13 @@ class MotionGuard:
     # ---- descriptions
 
     def _subscribe(self, view: GraphView) -> bool:
-        """Subscribe to descriptions; whether all are subscribed.
-
-        One that has gone stays known: its program may only have slept.
-        """
+        # Returns False if a subscription failed. Robots that left stay known: the computer may have been
+        # suspended.
         for topic in sorted(description_topics(view) - self._subscribers.keys()):
             if len(self._subscribers) >= MAX_DESCRIPTIONS:
                 gone = next((each for each in self._subscribers if each not in view.topics), None)
                 if gone is None:
-                    return True  # those that are left out count as not read
+                    return True  # the remaining ones count as unread
                 self._subscribers.pop(gone).close()
                 self._controls.pop(gone, None)
             try:
@@ -171,7 +169,7 @@ class MotionGuard:
                 if len(message.data) <= MAX_DESCRIPTION_BYTES:
                     self._received[key] = message
             while sum(len(each.data) for each in self._received.values()) > _MAX_WAITING_BYTES:
-                del self._received[next(iter(self._received))]  # its robot counts as not read
+                del self._received[next(iter(self._received))]  # its robot counts as unread
             self._is_dirty = True
 
     def _rebuild(self, view: GraphView) -> None:
@@ -192,8 +190,6 @@ class MotionGuard:
         self._cache = {}
 
     def _unread(self, view: GraphView) -> frozenset[str]:
-        """The description topics with a publisher whose description could not be read so far."""
-
         def is_unread(topic: str) -> bool:
             read = self._controls.get(topic, {}).keys()
             return None not in read and any(each.id not in read for each in view.topics[topic].publishers)
@@ -202,10 +198,10 @@ class MotionGuard:
 
 
 def _read(message: Message, topic: str) -> RobotControls | None:
-    """The robot that a message describes; everybody's word counts here, because it only protects."""
+    # Every publisher's description is used, because it can only protect.
     try:
         return controls_in(message.payload, described_name(topic))
-    except Exception:  # noqa: BLE001 - a stranger wrote it; what its program hears is protected
+    except Exception:  # noqa: BLE001 - untrusted input; an unread robot is protected by its subscriptions
         return None
 
 
@@ -214,7 +210,7 @@ def _not_allowed(topic: str, robots: Sequence[str], allowed: Collection[str]) ->
 
 
 def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
-    """Return the sentence that names the robots and the option that allows it; "" when all are allowed."""
+    """Return a sentence naming the robots and the option that allows it; "" if all are allowed."""
     missing = list(_not_allowed(topic, robots, allowed))
     if not missing:
         return ""

@@ -1,7 +1,7 @@
-"""Which topics move a robot, and which robot: decided from descriptions, types and subscribers. No sockets.
+"""Topics that move robots, decided from descriptions, types and subscribers. Pure.
 
-Everything that publishes for a person or a program asks `MovingTopics.moved_by`: alarms, `nep play`,
-`nep bridge`, behaviours, and what a person sends by hand in Studio.
+Everything that publishes for a person or a program asks `MovingTopics.moved_by`: alarms, `nep play`, `nep
+bridge`, behaviours, and the Publish panel of Studio.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
 ANSWER_TYPE = "robot/answer"
 RIZE_COMMANDS = "robot_action"
-"""One topic for the commands of all robots of RIZE. Robots of the kit subscribe to it, too."""
+"""Topic of commands to all RIZE robots. Robots of the driver kit subscribe to it, too."""
 _CONTROL_KEYS = ("command", "world")
 _DESCRIPTION, _ANSWER = "/description", "/answer"
 _HREF_SCHEME = "nep:"
@@ -51,7 +51,14 @@ class RobotControls:
 
 
 class MovingTopics:
-    """Topics that move robots at one moment. Immutable, so any thread may read it."""
+    """Topics that move robots at one moment. Immutable, hence thread-safe.
+
+    Args:
+        robots: Robots and the topics by which they are moved.
+        unidentified: Topics or patterns that move robots of unknown names.
+        uses_names: Also treat topics named like commands (``.../command``, ``.../cmd_vel``) as moving. For
+            recordings, which may lack the robot's description.
+    """
 
     __slots__ = ("_by_topic", "_everybody", "_patterns", "_unidentified", "_uses_names")
 
@@ -62,14 +69,6 @@ class MovingTopics:
         unidentified: Iterable[str] = (),
         uses_names: bool = False,
     ) -> None:
-        """Index the topics of `robots`.
-
-        Args:
-            robots: Robots and the topics by which they are moved.
-            unidentified: Topics (or patterns) by which robots are moved whose names are unknown.
-            uses_names: Also treat topics named like commands (``.../command``, ``.../cmd_vel``) as moving.
-                For recordings, where the robot that heard a topic may not be described.
-        """
         known = tuple(robots)
         by_topic: dict[str, dict[str, None]] = {}
         for robot in known:
@@ -105,10 +104,10 @@ class MovingTopics:
         return tuple(names)
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the names of the robots that a message moves; empty when it moves none.
+        """Return the names of the robots that a message moves; empty if it moves none.
 
-        The name is the topic itself when a robot is moved whose name is unknown: by the type
-        ``robot/command``, by RIZE's topic, or by what the graph tells about the topic.
+        If a robot of unknown name is moved (by the type ``robot/command``, RIZE's topic, or subscribers in
+        the graph), the name is the topic itself.
 
         Args:
             topic: The topic to publish on.
@@ -127,13 +126,16 @@ class MovingTopics:
 
 
 def controls_in(description: object, fallback_name: str = "") -> RobotControls | None:
-    """Read the name and the controlling topics from a robot's description; None when it names none.
+    """Read the name and the controlling topics from a robot's description.
 
-    Only these parts are looked at, so a description that is wrong elsewhere still protects its robot.
+    Only these parts are read, so an otherwise invalid description still protects its robot.
 
     Args:
-        description: The decoded message of the type ``robot/description``.
-        fallback_name: The name for a description without a title.
+        description: Decoded message of the type ``robot/description``.
+        fallback_name: Name for a description without a title.
+
+    Returns:
+        The controls, or None if the description names no topics.
     """
     if not isinstance(description, Mapping):
         return None
@@ -141,7 +143,7 @@ def controls_in(description: object, fallback_name: str = "") -> RobotControls |
     name = title if isinstance(title, str) and title and len(title) <= _MAX_NAME_LENGTH else fallback_name
     topics = set[str]()
     for topic in _topics_in(description):
-        with suppress(BadTopicError):  # nobody can publish there
+        with suppress(BadTopicError):  # publishing there is impossible
             topics.add(check_topic(topic))
         if len(topics) >= _MAX_TOPICS:
             break
@@ -179,14 +181,14 @@ def moving_topics(
     unread: Collection[str] = (),
     own_nodes: Collection[str] = (),
 ) -> MovingTopics:
-    """Combine the robots that are known by their descriptions with what the graph tells about others.
+    """Combine the robots known by their descriptions with those found in the graph.
 
     Args:
-        view: Who publishes and subscribes now.
+        view: Current graph.
         robots: Robots whose descriptions were read.
-        unread: Description topics that could not be read yet. All that their programs subscribe to counts as
-            moving, and so do the topics that robots have by default.
-        own_nodes: Ids of nodes of the asking program; what they subscribe to does not count.
+        unread: Description topics not read yet. All topics that their programs subscribe to count as moving,
+            and so do a robot's default topics.
+        own_nodes: Ids of the caller's nodes, whose subscriptions don't count.
     """
     known = [*robots, *_unread_robots(view, unread, own_nodes)]
     typed = [(info.name, info.subscribers) for info in view.topics.values() if info.msg_type == COMMAND_TYPE]
@@ -202,11 +204,8 @@ def moving_topics(
 def _unread_robots(
     view: GraphView, unread: Collection[str], own_nodes: Collection[str]
 ) -> Iterator[RobotControls]:
-    """Robots without a description so far: all that their programs subscribe to counts.
-
-    A driver of the kit publishes its answer topic first, then subscribes to commands, and announces itself
-    last: who publishes answers and no description is about to do so.
-    """
+    # A driver of the kit publishes its answer topic first, then subscribes to commands, and publishes its
+    # description last: a publisher of answers without a description is about to announce a robot.
     announcing = {id for topic in description_topics(view) for id in _publishers(view, topic)}
     programs: list[tuple[str, set[str]]] = [
         (topic.removesuffix(_DESCRIPTION), _publishers(view, topic)) for topic in unread
@@ -225,13 +224,11 @@ def _unread_robots(
 
 
 def _publishers(view: GraphView, topic: str) -> set[str]:
-    """The ids of the nodes that publish a topic."""
     info = view.topics.get(topic)
     return {each.node_id for each in info.publishers} if info is not None else set()
 
 
 def _subscriptions(view: GraphView) -> dict[str, set[str]]:
-    """The topics and patterns that each node subscribes to."""
     found: dict[str, set[str]] = {}
     subscriptions = [(info.name, info.subscribers) for info in view.topics.values()]
     subscriptions += [(info.name, info.subscribers) for info in view.patterns.values()]
@@ -242,7 +239,7 @@ def _subscriptions(view: GraphView) -> dict[str, set[str]]:
 
 
 def original_robots(view: GraphView) -> Iterator[RobotControls]:
-    """Yield the programs of the original NEP that hear RIZE's commands: robots without a description."""
+    """Yield original NEP programs that subscribe to RIZE commands: robots without a description."""
     info = view.topics.get(RIZE_COMMANDS)
     for subscriber in info.subscribers if info is not None else ():
         node = view.nodes.get(subscriber.node_id)
