@@ -18,8 +18,8 @@ from nep.programs.alarms.sentences import what_words
 __all__ = ["Alarms", "Carrier", "Done"]
 
 RETRY_S = 30.0
-MOST_TRIES = 20
-_MOST_DEEDS = 1_000
+MAX_TRIES = 20
+_MAX_DEEDS = 1_000
 
 Done = Callable[[bool, str], None]
 """Completion callback of an action: success, and the result in words. Called once, from any thread."""
@@ -63,10 +63,10 @@ class Alarms:
         self.history = history if history is not None else AlarmHistory()
         self._carriers = dict(carriers or {})
         self._clock, self._clock_s = clock, clock_s
-        self._answers: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
+        self._results: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
         self._retries: dict[tuple[str, str], _Retry] = {}
-        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MOST_DEEDS)
-        self._under_way = 0
+        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_DEEDS)
+        self._running_count = 0
         self.revision = 0
         """Number of rule changes."""
 
@@ -109,7 +109,7 @@ class Alarms:
     @property
     def is_busy(self) -> bool:
         """True while an action is running."""
-        return self._under_way > 0
+        return self._running_count > 0
 
     def take_deeds(self) -> list[tuple[AlarmRule, str, float]]:
         """Return the actions completed since the last call: (rule, result in words, seconds since 1970)."""
@@ -119,14 +119,14 @@ class Alarms:
 
     def tick(self) -> list[AlarmEvent]:
         """Evaluate time-based rules, start actions and retries, and return the new events."""
-        self._take_answers()
+        self._process_results()
         events = self.evaluator.tick()
         for event in events:
-            self._happened(event)
-        self._try_again()
+            self._handle_event(event)
+        self._run_retries()
         return events
 
-    def _happened(self, event: AlarmEvent) -> None:
+    def _handle_event(self, event: AlarmEvent) -> None:
         rule = event.rule
         if event.kind == "on":
             words = what_words(rule.condition, event.seen)
@@ -140,27 +140,29 @@ class Alarms:
             self._retries = {key: each for key, each in self._retries.items() if key[0] != rule.id}
         elif not event.is_snoozed:
             for action in rule.actions:
-                self._carry(event, action, 1)
+                self._start_action(event, action, 1)
 
-    def _carry(self, event: AlarmEvent, action: AlarmAction, tries: int) -> None:
+    def _start_action(self, event: AlarmEvent, action: AlarmAction, tries: int) -> None:
         carrier = self._carriers.get(action.kind)
-        self._under_way += 1
+        self._running_count += 1
         if carrier is None:
-            self._answers.put((event, action, MOST_TRIES, False, _("it can't be done here")))
+            self._results.put((event, action, MAX_TRIES, False, _("it can't be done here")))
             return
-        done = partial(self._answer, event, action, tries)
+        done = partial(self._action_done, event, action, tries)
         try:
             carrier(event, action, done)
         except Exception as error:  # noqa: BLE001  a failing action must not block the next
             done(False, str(error) or type(error).__name__)
 
-    def _answer(self, event: AlarmEvent, action: AlarmAction, tries: int, well: bool, words: str) -> None:
-        self._answers.put((event, action, tries, well, words))
+    def _action_done(
+        self, event: AlarmEvent, action: AlarmAction, tries: int, is_ok: bool, words: str
+    ) -> None:
+        self._results.put((event, action, tries, is_ok, words))
 
-    def _take_answers(self) -> None:
-        for _number in range(self._answers.qsize()):
-            event, action, tries, well, words = self._answers.get()
-            self._under_way -= 1
+    def _process_results(self) -> None:
+        for _number in range(self._results.qsize()):
+            event, action, tries, is_ok, words = self._results.get()
+            self._running_count -= 1
             self._deeds.append((event.rule, words, self._clock_s()))
             record = self.history.last(event.rule.id)
             if record is None:
@@ -168,11 +170,11 @@ class Alarms:
             if words:
                 record.add(AlarmDeed(action.kind, words))
                 self.history.revision += 1
-            if not well and action.kind == "call" and record.is_on and tries < MOST_TRIES:
+            if not is_ok and action.kind == "call" and record.is_on and tries < MAX_TRIES:
                 retry = _Retry(event, action, tries + 1, self._clock() + RETRY_S)
                 self._retries[event.rule.id, action.name] = retry
 
-    def _try_again(self) -> None:
+    def _run_retries(self) -> None:
         now, now_s = self._clock(), self._clock_s()
         for key, retry in list(self._retries.items()):
             rule = self.rule(retry.event.rule.id)
@@ -180,4 +182,4 @@ class Alarms:
                 del self._retries[key]
             elif now >= retry.due and not rule.is_snoozed(now_s):
                 del self._retries[key]
-                self._carry(retry.event, retry.action, retry.tries)
+                self._start_action(retry.event, retry.action, retry.tries)

@@ -18,17 +18,17 @@ __all__ = ["CALL_S", "AlarmCommands"]
 
 CALL_S = 5.0
 """Timeout of a service call."""
-_MOST_KEPT = 50
+_MAX_CACHED = 50
 
 
-def _never(_node: Node, _topic: str, _msg_type: str) -> str:
+def _allow_all(_node: Node, _topic: str, _msg_type: str) -> str:
     return ""
 
 
 class AlarmCommands:
     """Runner of the actions "call" and "send" with a node. Thread-safe."""
 
-    def __init__(self, refusal: Callable[[Node, str, str], str] = _never) -> None:
+    def __init__(self, refusal: Callable[[Node, str, str], str] = _allow_all) -> None:
         self._refusal = refusal
         self._lock = threading.Lock()
         self._clients: dict[str, Client] = {}
@@ -39,7 +39,7 @@ class AlarmCommands:
         """Start an action. Blocks for a publisher's first handshake, not for replies. Never raises."""
         try:
             with self._lock:
-                self._use(node)
+                self._use_node(node)
                 if action.kind == "call":
                     self._call(node, action, done)
                     return
@@ -51,12 +51,12 @@ class AlarmCommands:
                     done(False, _("not sent: {reason}").format(reason=refusal))
                     return
                 publisher.publish(action.payload)
-                heard = publisher.subscribers > 0
+                has_subscribers = publisher.subscribers > 0
         except NepError as error:
             done(False, str(error))
             return
-        said = _("sent to {topic}") if heard else _("nobody hears {topic}")
-        done(heard, said.format(topic=action.name))
+        said = _("sent to {topic}") if has_subscribers else _("nobody hears {topic}")
+        done(has_subscribers, said.format(topic=action.name))
 
     def close(self) -> None:
         """Drop cached clients and publishers; their node closes them."""
@@ -64,7 +64,7 @@ class AlarmCommands:
             self._clients.clear()
             self._publishers.clear()
 
-    def _use(self, node: Node) -> None:
+    def _use_node(self, node: Node) -> None:
         if node is not self._node:
             self._node = node
             self._clients.clear()
@@ -73,23 +73,23 @@ class AlarmCommands:
     def _call(self, node: Node, action: AlarmAction, done: Done) -> None:
         client = self._clients.get(action.name)
         if client is None:
-            if len(self._clients) >= _MOST_KEPT:
+            if len(self._clients) >= _MAX_CACHED:
                 self._clients.pop(next(iter(self._clients))).close()
             client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_S)
-        client.call_async(action.payload).add_done_callback(_teller(action.name, done))
+        client.call_async(action.payload).add_done_callback(_reply_handler(action.name, done))
 
     def _publisher(self, node: Node, action: AlarmAction) -> Publisher:
         key = (action.name, action.msg_type)
         publisher = self._publishers.get(key)
         if publisher is None:
-            if len(self._publishers) >= _MOST_KEPT:
+            if len(self._publishers) >= _MAX_CACHED:
                 self._publishers.pop(next(iter(self._publishers))).close(0.0)
             publisher = self._publishers[key] = node.new_pub(action.name, action.msg_type)
         return publisher
 
 
-def _teller(service: str, done: Done) -> Callable[[Future[object]], None]:
-    def tell(ended: Future[object]) -> None:
+def _reply_handler(service: str, done: Done) -> Callable[[Future[object]], None]:
+    def on_reply(ended: Future[object]) -> None:
         error = None if ended.cancelled() else ended.exception()
         if isinstance(error, NoServerError):
             done(False, _("nobody serves {service}").format(service=service))
@@ -101,4 +101,4 @@ def _teller(service: str, done: Done) -> Callable[[Future[object]], None]:
         else:
             done(True, _("{service} answered").format(service=service))
 
-    return tell
+    return on_reply

@@ -16,7 +16,7 @@ from typing import Literal
 from nep.errors import DecodeError
 from nep.messages.message import Message
 from nep.programs.alarms.losses import TopicLosses
-from nep.programs.alarms.rule import MOST_LETTERS, AlarmRule, Scalar, problem_of, topics_of
+from nep.programs.alarms.rule import MAX_CHARACTERS, AlarmRule, Scalar, problem_of, topics_of
 from nep.programs.alarms.track import AlarmTrack, Turn
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import matches
@@ -25,12 +25,12 @@ __all__ = ["AlarmEvaluator", "AlarmEvent", "AlarmPhase", "AlarmState"]
 
 LARGE_BYTES = 256 * 1024
 """Of larger messages only the newest of each batch is decoded."""
-MOST_EVENTS = 1_000
+MAX_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
 """Time in which nodes register at a restarted master; until then none counts as gone."""
-RATE_WINDOW_S, LONGEST_RATE_WINDOW_S = 2.0, 60.0
-_SAMPLE_S = 0.25
-_SAMPLES = 256
+RATE_WINDOW_S, MAX_RATE_WINDOW_S = 2.0, 60.0
+_SAMPLE_PERIOD_S = 0.25
+_MAX_SAMPLES = 256
 
 AlarmPhase = Literal["off", "faulty", "waits", "well", "pending", "on"]
 
@@ -74,7 +74,7 @@ class AlarmState:
 
 
 @dataclass(slots=True, eq=False)
-class _Heard:
+class _SubscribedTopic:
     """Subscribed topic: its message count, last arrival, and the rules that read its values."""
 
     readers: list[AlarmTrack] = field(default_factory=list)
@@ -82,7 +82,7 @@ class _Heard:
     last: float | None = None
     count: int = 0
     unreadable: bool = False
-    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
+    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_MAX_SAMPLES))
 
     def rate_hz(self, window_s: float, now: float) -> float | None:
         begin = None
@@ -107,10 +107,10 @@ class AlarmEvaluator:
         self._lock = threading.Lock()
         self._rules: tuple[AlarmRule, ...] = ()
         self._tracks: dict[str, AlarmTrack] = {}
-        self._heard: dict[str, _Heard] = {}
+        self._subscribed: dict[str, _SubscribedTopic] = {}
         self._losses: dict[str, TopicLosses] = {}
-        self._events: deque[AlarmEvent] = deque(maxlen=MOST_EVENTS)
-        self._quiet: set[str] = set()
+        self._events: deque[AlarmEvent] = deque(maxlen=MAX_EVENTS)
+        self._snoozed_on: set[str] = set()
         """Ids of alarms that turned on while snoozed."""
         self._view: GraphView | None = None
         self._nodes: frozenset[str] = frozenset()
@@ -143,7 +143,7 @@ class AlarmEvaluator:
                 if not rule.is_on or problem_of(rule) is not None:
                     continue
                 known = before.get(rule.id)
-                if known is not None and _watches_the_same(known.rule, rule):
+                if known is not None and _is_same_condition(known.rule, rule):
                     known.rule = rule
                     self._tracks[rule.id] = known
                     del before[rule.id]
@@ -152,20 +152,20 @@ class AlarmEvaluator:
             for id, track in before.items():
                 turn = track.end(now)
                 if turn is not None:
-                    self._tell(track, turn)
-                self._quiet.discard(id)
+                    self._emit(track, turn)
+                self._snoozed_on.discard(id)
             self._rules = tuple(rules)
-            self._listen()
+            self._update_topics()
 
-    def _listen(self) -> None:
-        heard, self._heard = self._heard, {}
+    def _update_topics(self) -> None:
+        heard, self._subscribed = self._subscribed, {}
         losses, self._losses = self._losses, {}
         for track in self._tracks.values():
             condition = track.rule.condition
             if condition.hears:
-                topic = self._heard.get(condition.name)
+                topic = self._subscribed.get(condition.name)
                 if topic is None:
-                    topic = self._heard[condition.name] = heard.get(condition.name) or _Heard()
+                    topic = self._subscribed[condition.name] = heard.get(condition.name) or _SubscribedTopic()
                     topic.readers = []
                 if condition.is_about_value:
                     topic.readers.append(track)
@@ -177,7 +177,7 @@ class AlarmEvaluator:
 
     def take(self, topic: str, messages: Sequence[Message]) -> None:
         """Process messages of a topic, oldest first. Does nothing for topics without a rule."""
-        heard = self._heard.get(topic)
+        heard = self._subscribed.get(topic)
         if heard is None or not messages:
             return
         payloads, unreadable, skipped = _payloads(messages) if heard.readers else ([], False, 0)
@@ -193,7 +193,7 @@ class AlarmEvaluator:
                 for payload in payloads:
                     turn = track.read(payload, now)
                     if turn is not None:
-                        self._tell(track, turn)
+                        self._emit(track, turn)
                         is_news = True
         if is_news:
             self.came.set()
@@ -212,15 +212,15 @@ class AlarmEvaluator:
             came_nodes, came_topics = nodes - self._nodes, topics - self._topics
             is_settled = before is not None and now - self._epoch_at >= MASTER_GRACE_S
             self._nodes, self._topics = nodes, topics
-            for name, heard in self._heard.items():
+            for name, heard in self._subscribed.items():
                 if heard.there_since is None and name in topics:
                     heard.there_since = now
             for name, losses in self._losses.items():
                 losses.add(view.topics.get(name), now)
             for track in self._tracks.values():
-                self._see(track, came_nodes, came_topics, now, is_settled=is_settled)
+                self._evaluate_graph(track, came_nodes, came_topics, now, is_settled=is_settled)
 
-    def _see(
+    def _evaluate_graph(
         self,
         track: AlarmTrack,
         nodes: frozenset[str],
@@ -243,10 +243,10 @@ class AlarmEvaluator:
             found = sorted(topic for topic in topics if matches(name, topic))
             track.was_seen = True
             if is_settled and found:
-                track.seen = found[0][:MOST_LETTERS]
+                track.seen = found[0][:MAX_CHARACTERS]
                 turn = track.happened(now)
         if turn is not None:
-            self._tell(track, turn)
+            self._emit(track, turn)
 
     def tick(self) -> list[AlarmEvent]:
         """Evaluate time-based conditions and return the events since the last call.
@@ -256,17 +256,17 @@ class AlarmEvaluator:
         now, now_s = self._clock(), self._clock_s()
         with self._lock:
             self.came.clear()
-            if now - self._sampled_at >= _SAMPLE_S:
+            if now - self._sampled_at >= _SAMPLE_PERIOD_S:
                 self._sampled_at = now
-                for heard in self._heard.values():
+                for heard in self._subscribed.values():
                     if heard.there_since is not None:
                         heard.samples.append((now, heard.count))
             for track in self._tracks.values():
-                turn = self._pass(track, now)
+                turn = self._evaluate_time(track, now)
                 if turn is not None:
-                    self._tell(track, turn)
-            for id in [id for id in self._quiet if not self._tracks[id].rule.is_snoozed(now_s)]:
-                self._quiet.discard(id)
+                    self._emit(track, turn)
+            for id in [id for id in self._snoozed_on if not self._tracks[id].rule.is_snoozed(now_s)]:
+                self._snoozed_on.discard(id)
                 track = self._tracks[id]
                 if track.is_on:
                     event = AlarmEvent("still", track.rule, now_s, track.seen, count=track.count)
@@ -275,9 +275,9 @@ class AlarmEvaluator:
             self._events.clear()
         return events
 
-    def _pass(self, track: AlarmTrack, now: float) -> Turn | None:
+    def _evaluate_time(self, track: AlarmTrack, now: float) -> Turn | None:
         condition = track.rule.condition
-        heard = self._heard.get(condition.name) if condition.hears else None
+        heard = self._subscribed.get(condition.name) if condition.hears else None
         if condition.kind == "silent" and heard is not None and heard.there_since is not None:
             silent_s = now - max(heard.there_since, heard.last or heard.there_since)
             return track.observe(silent_s >= condition.for_s, silent_s, now)
@@ -293,13 +293,13 @@ class AlarmEvaluator:
             return None  # without a master it is unknown which nodes exist
         return track.settle(now)
 
-    def _tell(self, track: AlarmTrack, turn: Turn) -> None:
+    def _emit(self, track: AlarmTrack, turn: Turn) -> None:
         rule, now_s = track.rule, self._clock_s()
         is_snoozed = rule.is_snoozed(now_s)
         if turn.is_on and is_snoozed:
-            self._quiet.add(rule.id)
+            self._snoozed_on.add(rule.id)
         elif not turn.is_on:
-            self._quiet.discard(rule.id)
+            self._snoozed_on.discard(rule.id)
         self._events.append(
             AlarmEvent(
                 "on" if turn.is_on else "off", rule, now_s, turn.seen, turn.lasted_s, turn.times, is_snoozed
@@ -316,7 +316,7 @@ class AlarmEvaluator:
             if track is None:  # validate again only if the rule is not evaluated
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
-            heard = self._heard.get(condition.name) if condition.hears else None
+            heard = self._subscribed.get(condition.name) if condition.hears else None
             was_seen = track.was_seen or (heard is not None and heard.there_since is not None)
             if condition.is_about_value:
                 was_seen = heard is not None and heard.last is not None
@@ -332,12 +332,12 @@ class AlarmEvaluator:
         return {rule.id: self.state(rule) for rule in self._rules}
 
 
-def _watches_the_same(one: AlarmRule, other: AlarmRule) -> bool:
+def _is_same_condition(one: AlarmRule, other: AlarmRule) -> bool:
     return one.condition == other.condition and one.calm_s == other.calm_s
 
 
 def _window_s(limit_hz: float) -> float:
-    return min(LONGEST_RATE_WINDOW_S, max(RATE_WINDOW_S, 3.0 / limit_hz))
+    return min(MAX_RATE_WINDOW_S, max(RATE_WINDOW_S, 3.0 / limit_hz))
 
 
 def _payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:

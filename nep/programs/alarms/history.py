@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from nep.text import shortened
 
-__all__ = ["MOST_RECORDS", "AlarmDeed", "AlarmHistory", "AlarmRecord", "record_from", "record_plain"]
+__all__ = ["MAX_RECORDS", "AlarmDeed", "AlarmHistory", "AlarmRecord", "record_from", "record_plain"]
 
-MOST_RECORDS = 500
-_MOST_DEEDS = 20
-_MOST_LETTERS = 300
-_LATEST_S = 3e10
+MAX_RECORDS = 500
+_MAX_DEEDS = 20
+_MAX_CHARACTERS = 300
+_MAX_TIME_S = 3e10
 """Later times (after the year 2920) are invalid: some systems have no date for them."""
 
 
@@ -52,14 +52,14 @@ class AlarmRecord:
     def add(self, deed: AlarmDeed) -> None:
         """Add a completed action; it replaces an earlier one of the same kind."""
         kept = [each for each in self.deeds if each.kind != deed.kind]
-        self.deeds = [*kept, deed][-_MOST_DEEDS:]
+        self.deeds = [*kept, deed][-_MAX_DEEDS:]
 
 
 class AlarmHistory:
     """The last `MAX_RECORDS` records, oldest first; iteration is newest first. Not thread-safe."""
 
     def __init__(self, records: Iterable[AlarmRecord] = ()) -> None:
-        self.records: deque[AlarmRecord] = deque(records, maxlen=MOST_RECORDS)
+        self.records: deque[AlarmRecord] = deque(records, maxlen=MAX_RECORDS)
         self.revision = 0
 
     def __iter__(self) -> Iterator[AlarmRecord]:
@@ -87,7 +87,7 @@ class AlarmHistory:
 
     def clear(self) -> None:
         """Remove all records except of alarms that are on."""
-        self.records = deque((each for each in self.records if each.is_on), maxlen=MOST_RECORDS)
+        self.records = deque((each for each in self.records if each.is_on), maxlen=MAX_RECORDS)
         self.revision += 1
 
 
@@ -105,30 +105,30 @@ def record_plain(record: AlarmRecord) -> dict[str, object]:
     return plain
 
 
-def record_from(told: object) -> AlarmRecord | None:
+def record_from(plain: object) -> AlarmRecord | None:
     """Convert JSON to a record; None if it is invalid. Records are never on: their end was not seen."""
-    if not isinstance(told, Mapping):
+    if not isinstance(plain, Mapping):
         return None
-    rule_id, words, at_s = told.get("alarm"), told.get("words"), told.get("at_s")
+    rule_id, words, at_s = plain.get("alarm"), plain.get("words"), plain.get("at_s")
     if not isinstance(rule_id, str) or not isinstance(words, str) or not _is_number(at_s):
         return None
-    lasted_s, count, did = told.get("lasted_s"), told.get("count", 1), told.get("did")
+    lasted_s, count, did = plain.get("lasted_s"), plain.get("count", 1), plain.get("did")
     deeds = [
-        AlarmDeed(str(each[0]), shortened(str(each[1]), _MOST_LETTERS))
-        for each in (did if isinstance(did, list) else [])[:_MOST_DEEDS]
+        AlarmDeed(str(each[0]), shortened(str(each[1]), _MAX_CHARACTERS))
+        for each in (did if isinstance(did, list) else [])[:_MAX_DEEDS]
         if isinstance(each, list) and len(each) == 2
     ]
     return AlarmRecord(
         rule_id,
-        shortened(words, _MOST_LETTERS),
+        shortened(words, _MAX_CHARACTERS),
         float(at_s),  # type: ignore[arg-type]
         float(lasted_s) if _is_number(lasted_s) else None,  # type: ignore[arg-type]
         count=count if isinstance(count, int) and not isinstance(count, bool) and count > 0 else 1,
-        was_snoozed=told.get("snoozed") is True,
+        was_snoozed=plain.get("snoozed") is True,
         deeds=deeds,
     )
 
 
 def _is_number(value: object) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and 0 <= value <= _LATEST_S  # type: ignore[operator]
+    return is_number and 0 <= value <= _MAX_TIME_S  # type: ignore[operator]

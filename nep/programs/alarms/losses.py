@@ -8,8 +8,8 @@ from nep.protocol.graph_view import TopicInfo
 
 __all__ = ["TopicLosses"]
 
-_EVERY_S = 0.9
-_MOST = 700
+_SAMPLE_PERIOD_S = 0.9
+_MAX_SAMPLES = 700
 """Number of samples: ten minutes."""
 
 
@@ -18,7 +18,7 @@ class TopicLosses:
 
     def __init__(self) -> None:
         self._before: dict[int, tuple[int, int]] = {}
-        self._grew: deque[tuple[float, int, int]] = deque(maxlen=_MOST)
+        self._samples: deque[tuple[float, int, int]] = deque(maxlen=_MAX_SAMPLES)
         self._known = False
 
     def add(self, info: TopicInfo | None, now: float) -> None:
@@ -36,18 +36,18 @@ class TopicLosses:
                 received += max(0, received_now - received_then)
         self._before = counts
         self._known = self._known or bool(counts)
-        if self._grew and now - self._grew[-1][0] < _EVERY_S:
-            at, lost_before, received_before = self._grew[-1]
-            self._grew[-1] = (at, lost_before + lost, received_before + received)
+        if self._samples and now - self._samples[-1][0] < _SAMPLE_PERIOD_S:
+            at, lost_before, received_before = self._samples[-1]
+            self._samples[-1] = (at, lost_before + lost, received_before + received)
         else:
-            self._grew.append((now, lost, received))
+            self._samples.append((now, lost, received))
 
     def percent(self, window_s: float, now: float) -> float | None:
         """Return the percentage of messages lost in the last `window_s`, or None if unknown."""
         if not self._known:
             return None
         lost = received = 0
-        for at, lost_then, received_then in reversed(self._grew):
+        for at, lost_then, received_then in reversed(self._samples):
             if now - at > window_s:
                 break
             lost += lost_then

@@ -47,14 +47,14 @@ EVENT_KINDS = frozenset({"changes", "appears", "comes"})
 ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
 NAMED_ACTIONS = frozenset({"run", "call", "send"})
 
-LEAST_S, LONGEST_S = 0.1, 86_400.0
-LEAST_CALM_S, LONGEST_CALM_S = 0.5, 3_600.0
-LONGEST_WINDOW_S = 600.0
+MIN_S, MAX_S = 0.1, 86_400.0
+MIN_CALM_S, MAX_CALM_S = 0.5, 3_600.0
+MAX_WINDOW_S = 600.0
 CALM_S = 2.0
 KEEP_S = 60.0
-MOST_ACTIONS = 10
-MOST_LETTERS = 300
-_GREATEST = 1e300
+MAX_ACTIONS = 10
+MAX_CHARACTERS = 300
+_MAX_NUMBER = 1e300
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +187,10 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
     """Return the first problem of a rule, or None if it is valid."""
     check = _Check()
     _check_condition(rule.condition, check)
-    check.number("calm_s", rule.calm_s, LEAST_CALM_S, LONGEST_CALM_S)
-    if len(rule.actions) > MOST_ACTIONS:
+    check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
+    if len(rule.actions) > MAX_ACTIONS:
         said = _("it has more than {most} actions; make two alarms of it")
-        check.found.append(RuleProblem("do", said.format(most=MOST_ACTIONS)))
+        check.found.append(RuleProblem("do", said.format(most=MAX_ACTIONS)))
     for action in rule.actions:
         _check_action(action, check)
     return check.found[0] if check.found else None
@@ -223,19 +223,19 @@ def _check_limit(condition: AlarmCondition, check: _Check) -> None:
     elif condition.kind == "loses":
         check.number("than", limit, 0, 100)
     elif condition.kind in NUMBER_KINDS:
-        check.number("than", limit, -_GREATEST, _GREATEST)
+        check.number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
     elif condition.kind in NEEDS_LIMIT and not _is_scalar(limit):
         check.found.append(RuleProblem("than", _("it must be a number, a text, true, false or null")))
-    check.number("margin", condition.margin, 0, _GREATEST)
+    check.number("margin", condition.margin, 0, _MAX_NUMBER)
 
 
 def _check_time(condition: AlarmCondition, check: _Check) -> None:
     if condition.kind == "silent":
-        check.number("for_s", condition.for_s, LEAST_S, LONGEST_S)
+        check.number("for_s", condition.for_s, MIN_S, MAX_S)
     elif condition.kind == "loses":
-        check.number("for_s", condition.for_s, 1, LONGEST_WINDOW_S)
+        check.number("for_s", condition.for_s, 1, MAX_WINDOW_S)
     else:
-        check.number("for_s", condition.for_s, 0, LONGEST_S)
+        check.number("for_s", condition.for_s, 0, MAX_S)
 
 
 def _check_action(action: AlarmAction, check: _Check) -> None:
@@ -246,14 +246,14 @@ def _check_action(action: AlarmAction, check: _Check) -> None:
     elif action.kind == "send":
         check.named("send", check_topic, action.name)
     elif action.kind == "keep":
-        check.number("keep_s", action.seconds, 1, LONGEST_WINDOW_S)
+        check.number("keep_s", action.seconds, 1, MAX_WINDOW_S)
 
 
 def _is_scalar(value: object) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
     if isinstance(value, str):
-        return len(value) <= MOST_LETTERS
+        return len(value) <= MAX_CHARACTERS
     return value is None or isinstance(value, int)
 
 

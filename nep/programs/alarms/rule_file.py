@@ -50,8 +50,8 @@ __all__ = [
 
 FORMAT = 1
 MOST_ALARMS = 200
-_MOST_BYTES = 4_000_000
-_LATEST_S = 3e10  # the year 2920: some systems have no later dates
+_MAX_BYTES = 4_000_000
+_MAX_TIME_S = 3e10  # the year 2920: some systems have no later dates
 
 EXAMPLE = """\
 {
@@ -85,7 +85,7 @@ EXAMPLE = """\
 _ROOT_KEYS = ("format", "alarms", "history")
 _RULE_KEYS = ("id", "on", "when", "do", "calm_s", "snoozed_until_s")
 _WHEN_KEYS = ("topic", "node", "value", "is", "than", "for_s", "margin")
-_SIMPLE = ("banner", "sound", "keep", "stop", "console")
+_SIMPLE_ACTIONS = ("banner", "sound", "keep", "stop", "console")
 _ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "keep_s": (),
     "run": (),
@@ -108,7 +108,7 @@ def read_alarms(path: Path) -> AlarmFile:
     """Read the alarms of a file. Raises `NepError` for the first problem."""
     try:
         with path.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
+            data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         said = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
@@ -130,9 +130,9 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
         NepError: The data is not an alarm file, or (unless `lenient`) an alarm is invalid.
     """
     path = escaped(path)
-    if len(data) > _MOST_BYTES:
+    if len(data) > _MAX_BYTES:
         said = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
-        raise NepError(said.format(path=path, most=_MOST_BYTES))
+        raise NepError(said.format(path=path, most=_MAX_BYTES))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -197,7 +197,7 @@ class NewerAlarmsError(NepError):
     """Alarm file of a newer version; it may be valid."""
 
 
-class _Wrong(Exception):  # noqa: N818 - never leaves this module
+class _InvalidAlarm(Exception):  # noqa: N818 - never leaves this module
     """Invalid alarm; the message is complete."""
 
 
@@ -206,22 +206,22 @@ class _Reader:
 
     def __init__(self, path: str, text: str, *, lenient: bool) -> None:
         self._path, self._text, self._lenient = path, text, lenient
-        self._places: list[tuple[int, int]] | None = None
+        self._spans: list[tuple[int, int]] | None = None
 
     def file(self, value: object) -> AlarmFile:
         try:
-            told = self._root(value)
-        except _Wrong as wrong:
+            value_ = self._root(value)
+        except _InvalidAlarm as wrong:
             raise NepError(str(wrong)) from None
         rules: list[AlarmRule] = []
         problems: list[str] = []
         ids: set[str] = set()
-        for place, each in enumerate(told):
+        for index, each in enumerate(value_):
             try:
-                rule = self._rule(each, place)
+                rule = self._rule(each, index)
                 if rule.id in ids:
-                    self._fail("id", _("another alarm has it, too; give each its own, or none"), place)
-            except _Wrong as wrong:
+                    self._fail("id", _("another alarm has it, too; give each its own, or none"), index)
+            except _InvalidAlarm as wrong:
                 if not self._lenient:
                     raise NepError(str(wrong)) from None
                 problems.append(str(wrong))
@@ -240,158 +240,158 @@ class _Reader:
             said = _("'{path}' is of a newer version of nep (format {found}, known is {format}); update nep")
             raise NewerAlarmsError(said.format(path=self._path, found=version, format=FORMAT))
         self._check_keys(value, _ROOT_KEYS, None)
-        told = value.get("alarms")
-        if not isinstance(told, list):
+        value_ = value.get("alarms")
+        if not isinstance(value_, list):
             self._fail("alarms", _('no alarms are in it; write "alarms": [...]'))
-        if len(told) > MOST_ALARMS:
+        if len(value_) > MOST_ALARMS:
             self._fail("alarms", _("there are more than {most} alarms").format(most=MOST_ALARMS))
-        return told
+        return value_
 
     def _history(self, value: object) -> AlarmHistory:
-        told = value.get("history") if isinstance(value, dict) else None
-        found = [record_from(each) for each in told] if isinstance(told, list) else []
+        value_ = value.get("history") if isinstance(value, dict) else None
+        found = [record_from(each) for each in value_] if isinstance(value_, list) else []
         return AlarmHistory([record for record in found if record is not None])
 
-    def _rule(self, told: object, place: int) -> AlarmRule:
-        if not isinstance(told, dict):
-            self._fail("", _('it is no alarm; write {"when": {...}, "do": [...]}'), place)
-        self._check_keys(told, _RULE_KEYS, place)
-        when = told.get("when")
+    def _rule(self, value_: object, index: int) -> AlarmRule:
+        if not isinstance(value_, dict):
+            self._fail("", _('it is no alarm; write {"when": {...}, "do": [...]}'), index)
+        self._check_keys(value_, _RULE_KEYS, index)
+        when = value_.get("when")
         if not isinstance(when, dict):
-            self._fail("when", _('it does not say when; write "when": {"topic": ..., "is": ...}'), place)
-        do = told.get("do", [])
+            self._fail("when", _('it does not say when; write "when": {"topic": ..., "is": ...}'), index)
+        do = value_.get("do", [])
         if not isinstance(do, list):
-            self._fail("do", _("it must be a list of what is done"), place)
-        is_on = told.get("on", True)
+            self._fail("do", _("it must be a list of what is done"), index)
+        is_on = value_.get("on", True)
         if not isinstance(is_on, bool):
-            self._fail("on", _("it must be true or false"), place)
-        rule_id = told.get("id") or new_id()
+            self._fail("on", _("it must be true or false"), index)
+        rule_id = value_.get("id") or new_id()
         if not isinstance(rule_id, str) or len(rule_id) > 64:
-            self._fail("id", _("it must be a short text"), place)
+            self._fail("id", _("it must be a short text"), index)
         rule = AlarmRule(
             rule_id,
-            self._condition(when, place),
-            tuple(self._action(each, place) for each in do),
+            self._condition(when, index),
+            tuple(self._action(each, index) for each in do),
             is_on,
-            self._number(told, "calm_s", CALM_S, place),
-            min(self._number(told, "snoozed_until_s", 0.0, place), _LATEST_S),
+            self._number(value_, "calm_s", CALM_S, index),
+            min(self._number(value_, "snoozed_until_s", 0.0, index), _MAX_TIME_S),
         )
         problem = problem_of(rule)
         if problem is not None:
-            self._fail(problem.key, problem.sentence, place)
+            self._fail(problem.key, problem.sentence, index)
         return rule
 
-    def _condition(self, when: dict[str, object], place: int) -> AlarmCondition:
-        self._check_keys(when, _WHEN_KEYS, place)
+    def _condition(self, when: dict[str, object], index: int) -> AlarmCondition:
+        self._check_keys(when, _WHEN_KEYS, index)
         kind = when.get("is")
         if not isinstance(kind, str) or kind not in KINDS:
             if kind is None:
-                self._fail("when", _('it does not say what; write "is": "silent"'), place)
+                self._fail("when", _('it does not say what; write "is": "silent"'), index)
             said = _("there is no '{kind}'; {did_you_mean}")
-            told = quotable(str(kind))
-            self._fail("is", said.format(kind=told, did_you_mean=did_you_mean(told, KINDS)), place)
+            value_ = quotable(str(kind))
+            self._fail("is", said.format(kind=value_, did_you_mean=did_you_mean(value_, KINDS)), index)
         subject = "node" if kind in NODE_KINDS else "topic"
         other = "topic" if kind in NODE_KINDS else "node"
         if other in when:
             said = _("'{kind}' is about a {subject}; write \"{subject}\": ...")
-            self._fail(other, said.format(kind=kind, subject=subject), place)
+            self._fail(other, said.format(kind=kind, subject=subject), index)
         name, path = when.get(subject, ""), when.get("value", "")
         if not isinstance(name, str) or not isinstance(path, str):
-            self._fail(subject if not isinstance(name, str) else "value", _("it must be a text"), place)
+            self._fail(subject if not isinstance(name, str) else "value", _("it must be a text"), index)
         if path and kind not in VALUE_KINDS:
-            self._fail("value", _("'{kind}' is about no value; leave it out").format(kind=kind), place)
+            self._fail("value", _("'{kind}' is about no value; leave it out").format(kind=kind), index)
         if kind in NEEDS_LIMIT and "than" not in when:
-            self._fail("is", _('it does not say how much; write "than": ...'), place)
+            self._fail("is", _('it does not say how much; write "than": ...'), index)
         return AlarmCondition(
             kind,
             name,
             path,
-            self._scalar(when.get("than"), place),
-            self._number(when, "for_s", _DEFAULT_FOR.get(kind, 0.0), place),
-            self._number(when, "margin", 0.0, place),
+            self._scalar(when.get("than"), index),
+            self._number(when, "for_s", _DEFAULT_FOR.get(kind, 0.0), index),
+            self._number(when, "margin", 0.0, index),
         )
 
-    def _action(self, told: object, place: int) -> AlarmAction:
-        if isinstance(told, str):
-            if told not in _SIMPLE:
-                known = [*_SIMPLE, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE)]
+    def _action(self, value_: object, index: int) -> AlarmAction:
+        if isinstance(value_, str):
+            if value_ not in _SIMPLE_ACTIONS:
+                known = [*_SIMPLE_ACTIONS, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE_ACTIONS)]
                 said = _("there is no action '{kind}'; {did_you_mean}")
-                shown = quotable(told)
-                self._fail("do", said.format(kind=shown, did_you_mean=did_you_mean(shown, known)), place)
-            return AlarmAction(told)
-        kind = next((key for key in _ACTION_KEYS if isinstance(told, dict) and key in told), None)
-        if not isinstance(told, dict) or kind is None:
+                shown = quotable(value_)
+                self._fail("do", said.format(kind=shown, did_you_mean=did_you_mean(shown, known)), index)
+            return AlarmAction(value_)
+        kind = next((key for key in _ACTION_KEYS if isinstance(value_, dict) and key in value_), None)
+        if not isinstance(value_, dict) or kind is None:
             said = _('an action is {simple}, or {{"call": "name", "with": {{}}}}, "send", "run" or "keep_s"')
-            self._fail("do", said.format(simple=", ".join(f'"{each}"' for each in _SIMPLE)), place)
-        self._check_keys(told, (kind, *_ACTION_KEYS[kind]), place)
+            self._fail("do", said.format(simple=", ".join(f'"{each}"' for each in _SIMPLE_ACTIONS)), index)
+        self._check_keys(value_, (kind, *_ACTION_KEYS[kind]), index)
         if kind == "keep_s":
-            return AlarmAction("keep", seconds=self._number(told, "keep_s", 60.0, place))
-        name, msg_type = told[kind], told.get("type", "json")
+            return AlarmAction("keep", seconds=self._number(value_, "keep_s", 60.0, index))
+        name, msg_type = value_[kind], value_.get("type", "json")
         if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
-            self._fail(kind if not isinstance(name, str) else "type", _("it must be a text"), place)
-        payload = told.get("message" if kind == "send" else "with", {} if kind == "call" else None)
+            self._fail(kind if not isinstance(name, str) else "type", _("it must be a text"), index)
+        payload = value_.get("message" if kind == "send" else "with", {} if kind == "call" else None)
         return AlarmAction(kind, name, payload, msg_type)
 
-    def _scalar(self, value: object, place: int) -> Scalar:
+    def _scalar(self, value: object, index: int) -> Scalar:
         if value is not None and not isinstance(value, str | int | float):
-            self._fail("than", _("it must be a number, a text, true, false or null"), place)
+            self._fail("than", _("it must be a number, a text, true, false or null"), index)
         return value
 
-    def _number(self, told: Mapping[str, object], key: str, default: float, place: int) -> float:
-        value = told.get(key, default)
+    def _number(self, value_: Mapping[str, object], key: str, default: float, index: int) -> float:
+        value = value_.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 < value < 1e300:
-            self._fail(key, _("it must be a number"), place)
+            self._fail(key, _("it must be a number"), index)
         return float(value)
 
-    def _check_keys(self, told: Mapping[str, object], known: Sequence[str], place: int | None) -> None:
-        for key in told:
+    def _check_keys(self, value_: Mapping[str, object], known: Sequence[str], index: int | None) -> None:
+        for key in value_:
             if key not in known:
                 said = _("there is no '{key}' here; {did_you_mean}")
                 shown = quotable(key)
-                self._fail(key, said.format(key=shown, did_you_mean=did_you_mean(shown, known)), place)
+                self._fail(key, said.format(key=shown, did_you_mean=did_you_mean(shown, known)), index)
 
-    def _fail(self, key: str, sentence: str, place: int | None = None) -> NoReturn:
-        line = self._line(key, place)
+    def _fail(self, key: str, sentence: str, index: int | None = None) -> NoReturn:
+        line = self._line(key, index)
         if key:
             said = _("line {line} of '{path}', '{key}': {sentence}")
-            raise _Wrong(said.format(line=line, path=self._path, key=quotable(key), sentence=sentence))
-        raise _Wrong(
+            raise _InvalidAlarm(said.format(line=line, path=self._path, key=quotable(key), sentence=sentence))
+        raise _InvalidAlarm(
             _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=sentence)
         )
 
-    def _line(self, key: str, place: int | None) -> int:
-        if self._places is None:
-            self._places = list(_places_of(self._text))
+    def _line(self, key: str, index: int | None) -> int:
+        if self._spans is None:
+            self._spans = list(_alarm_spans(self._text))
         begin, end = 0, len(self._text)
-        if place is not None and place < len(self._places):
-            begin, end = self._places[place]
+        if index is not None and index < len(self._spans):
+            begin, end = self._spans[index]
         found = re.compile(re.escape(json.dumps(key, ensure_ascii=False))).search(self._text, begin, end)
         at = found.start() if key and found is not None else begin
         return self._text.count("\n", 0, at) + 1
 
 
-def _places_of(text: str) -> list[tuple[int, int]]:
+def _alarm_spans(text: str) -> list[tuple[int, int]]:
     places: list[tuple[int, int]] = []
     decode: Callable[[str, int], tuple[object, int]] = json.JSONDecoder().raw_decode
-    at = _after(text, 1 if text[:1] == "{" else text.find("{") + 1)
+    at = _skip_space(text, 1 if text[:1] == "{" else text.find("{") + 1)
     while at < len(text) and text[at] == '"':
         key, at = decode(text, at)
-        at = _after(text, _after(text, at) + 1)
+        at = _skip_space(text, _skip_space(text, at) + 1)
         if key != "alarms" or text[at : at + 1] != "[":
             _value, at = decode(text, at)
-            at = _after(text, _after(text, at) + 1)
+            at = _skip_space(text, _skip_space(text, at) + 1)
             continue
-        at = _after(text, at + 1)
+        at = _skip_space(text, at + 1)
         while at < len(text) and text[at] != "]":
             _value, end = decode(text, at)
             places.append((at, end))
-            end = _after(text, end)
-            at = _after(text, end + 1) if text[end : end + 1] == "," else end
+            end = _skip_space(text, end)
+            at = _skip_space(text, end + 1) if text[end : end + 1] == "," else end
         return places
     return places
 
 
-def _after(text: str, at: int) -> int:
+def _skip_space(text: str, at: int) -> int:
     while at < len(text) and text[at] in " \t\r\n":
         at += 1
     return at

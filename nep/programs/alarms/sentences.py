@@ -21,7 +21,7 @@ __all__ = [
     "what_words",
 ]
 
-_SHOWN = 40
+_MAX_SHOWN_CHARACTERS = 40
 _DO_NOTHING = lazy("say it in the list of alarms")
 
 _CONDITIONS: Mapping[str, str] = {
@@ -38,7 +38,7 @@ _CONDITIONS: Mapping[str, str] = {
     "leaves": lazy("{subject} leaves"),
     "comes": lazy("{subject} comes"),
 }
-_FOR: Mapping[str, str] = {
+_LASTING_CONDITIONS: Mapping[str, str] = {
     "rate_below": lazy("{subject} has fewer than {limit} for {time}"),
     "rate_above": lazy("{subject} has more than {limit} for {time}"),
     "below": lazy("{subject} is below {limit} for {time}"),
@@ -47,7 +47,7 @@ _FOR: Mapping[str, str] = {
     "is_not": lazy("{subject} is not {limit} for {time}"),
     "leaves": lazy("{subject} is away for {time}"),
 }
-_CAME: Mapping[str, str] = {
+_EVENTS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent"),
     "rate_below": lazy("{subject} has {seen}, fewer than {limit}"),
     "rate_above": lazy("{subject} has {seen}, more than {limit}"),
@@ -90,7 +90,7 @@ def value_words(value: object) -> str:
     if isinstance(value, float):
         return number(value, ".6g")
     if isinstance(value, str):
-        return f"“{quotable(shortened(value, _SHOWN))}”"
+        return f"“{quotable(shortened(value, _MAX_SHOWN_CHARACTERS))}”"
     return _("a list") if isinstance(value, list | tuple) else _("an object")
 
 
@@ -117,7 +117,7 @@ def condition_words(condition: AlarmCondition) -> str:
     """Format a condition: "/robot/camera is silent for 2 s"."""
     words = _CONDITIONS[condition.kind]
     if condition.for_s > 0:
-        words = _FOR.get(condition.kind, words)
+        words = _LASTING_CONDITIONS.get(condition.kind, words)
     return _(words).format(
         subject=subject_words(condition),
         limit=limit_words(condition, condition.limit),
@@ -142,7 +142,7 @@ def rule_words(rule: AlarmRule) -> str:
 
 def what_words(condition: AlarmCondition, seen: Scalar) -> str:
     """Format an event for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
-    return _(_CAME[condition.kind]).format(
+    return _(_EVENTS[condition.kind]).format(
         subject=subject_words(condition),
         limit=limit_words(condition, condition.limit),
         seen=quotable(seen)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from nep.messages.fields import MISSING, Path, parse_path, pick
-from nep.programs.alarms.rule import EVENT_KINDS, MOST_LETTERS, AlarmRule, Scalar, float_of
+from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Scalar, float_of
 
 __all__ = ["AlarmTrack", "Turn", "scalar_of"]
 
@@ -73,7 +73,7 @@ class AlarmTrack:
     def read(self, payload: object, now: float) -> Turn | None:
         """Process a payload of the alarm's topic; `now` is monotonic (s)."""
         value = pick(payload, self._value.path)
-        if self._is_well(value):
+        if self._is_false_fast(value):
             self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
             return None
         self.was_seen = True
@@ -97,7 +97,7 @@ class AlarmTrack:
         seen = scalar_of(value) if math.isfinite(number) else number
         return self.compare(number, now, is_below=kind == "below", seen=seen)
 
-    def _is_well(self, value: object) -> bool:
+    def _is_false_fast(self, value: object) -> bool:
         if self._bound is None or self.on_since is not None or self._true_since is not None:
             return False
         if type(value) is not float and type(value) is not int:
@@ -141,15 +141,15 @@ class AlarmTrack:
 
     def settle(self, now: float) -> Turn | None:
         """Update the state for the time that has passed."""
-        since, well = self._true_since, self._false_since
+        since, false_since = self._true_since, self._false_since
         if self.on_since is None:
             if since is None or now - since < self._for_s:
                 return None
             self.on_since, self.count, self._false_since = now, 1, None
             return Turn(True, self.seen, 0.0, 1)
-        if well is None or now - well < self._calm_s:
+        if false_since is None or now - false_since < self._calm_s:
             return None
-        turn = Turn(False, self.seen, max(0.0, well - self.on_since), self.count)
+        turn = Turn(False, self.seen, max(0.0, false_since - self.on_since), self.count)
         self.on_since = self._false_since = None
         return turn
 
@@ -169,7 +169,7 @@ def scalar_of(value: object) -> Scalar:
     Integers beyond 64 bits become floats, because few JSON readers accept them.
     """
     if isinstance(value, str):
-        return value[:MOST_LETTERS]
+        return value[:MAX_CHARACTERS]
     if isinstance(value, bool | int | float):
         return value if -(1 << 63) <= value < 1 << 64 else float_of(value)
     return (

@@ -35,12 +35,12 @@ __all__ = ["MAX_BYTES", "MAX_KEYS", "Blackboard", "BlackboardChange", "Blackboar
 
 MAX_KEYS = 100_000
 MAX_BYTES = 256 * 2**20
-_MOST_CHANGES = 10_000
-_SLICE_S = 0.1
+_MAX_CHANGES = 10_000
+_WAIT_SLICE_S = 0.1
 """Waits are split into slices, to notice a closed node, and for Ctrl+C on Windows."""
-_AT_ONCE_S = 1e-6
-_SOON_S = 0.001
-_NEAR_KEYS = 1_000
+_IMMEDIATE_S = 1e-6
+_MIN_TIMER_S = 0.001
+_MAX_SUGGESTIONS = 1_000
 _MISSING = object()
 
 
@@ -143,7 +143,7 @@ class Blackboard:
         self._max_bytes = at_least("max_bytes", max_bytes, 1)
         self._entries = Entries(at_least("max_keys", max_keys, 1), self._max_bytes)
         self._lock = threading.Lock()
-        self._news = threading.Condition(self._lock)
+        self._updated = threading.Condition(self._lock)
         self._version = 0
         self._is_closed = self._is_forked = False
         self._watches: tuple[BlackboardWatch, ...] = ()
@@ -191,27 +191,27 @@ class Blackboard:
         node = self._node
         if node is None:
             raise NepError(_("this blackboard has no node; make it with 'nep.Blackboard(node)'"))
-        lives = _life(lives_s)
+        lives = _lifetime(lives_s)
         watch = BlackboardWatch(
             topic,
             MessageReading(key, fields, each),
-            lambda message, found: self._keep(message, found, lives),
+            lambda message, found: self._store_message(message, found, lives),
             is_pattern=is_pattern(check_topic(topic)),
         )
-        with self._news:
+        with self._updated:
             self._check_open()
             self._watches = (*self._watches, watch)
         try:
             watch.attach(node.new_sub(topic, msg_type, configuration, sink=watch.take))
         except BaseException:
-            with self._news:
+            with self._updated:
                 self._watches = tuple(other for other in self._watches if other is not watch)
             raise
         return watch
 
     def ignore(self, publisher: int) -> None:
         """Ignore messages of the publisher with this id."""
-        with self._news:
+        with self._updated:
             self._ignored |= {publisher}
 
     def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
@@ -226,25 +226,26 @@ class Blackboard:
             BadKeyError: The key is invalid.
             BadValueError: The value is too deep or too large.
         """
-        names, lives = parse_key(key), _life(lives_s)
-        with self._news:
+        names, lives = parse_key(key), _lifetime(lives_s)
+        with self._updated:
             now = self._clock()
             entries = [
-                self._entry(each, leaf, now, lives) for each, leaf in leaves(_own(names, value), names)
+                self._entry(each, leaf, now, lives)
+                for each, leaf in leaves(_copied_value(names, value), names)
             ]
-        self._put(entries)
+        self._store(entries)
 
     def remove(self, key: str | tuple[str, ...]) -> int:
         """Remove a key and all keys below it; return how many."""
         names = parse_key(key)
-        with self._news:
-            self._expire()
+        with self._updated:
+            self._expire_locked()
             gone = self._entries.remove(names)
-            self._note(gone)
+            self._queue_changes_locked(gone)
         self._schedule()
         return len(gone)
 
-    def _keep(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
+    def _store_message(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
         if message.publisher in self._ignored:
             return
         since, age_by = beginning_of(message, self._clock(), self._wall_clock_ns())
@@ -256,7 +257,7 @@ class Blackboard:
                 entries.append(
                     StoredEntry(
                         key,
-                        _own(key, each.value),
+                        _copied_value(key, each.value),
                         since,
                         age_by,
                         since + lives,
@@ -268,27 +269,27 @@ class Blackboard:
                 )
             except NepError as error:
                 problem = error
-        self._put(entries)
+        self._store(entries)
         if problem is not None:
             raise problem
 
     def _entry(self, key: Key, value: object, now: float, lives: float) -> StoredEntry:
         return StoredEntry(parse_key(key), value, now, expires=now + lives)
 
-    def _put(self, entries: Sequence[StoredEntry]) -> None:
+    def _store(self, entries: Sequence[StoredEntry]) -> None:
         problem: BadValueError | None = None
-        with self._news:
-            now = self._expire()
+        with self._updated:
+            now = self._expire_locked()
             for entry in entries:
                 is_empty = isinstance(entry.value, dict) and not entry.value
                 if is_empty and self._entries.has_below(entry.key):
                     continue  # an empty map doesn't replace keys below it
                 try:
-                    self._note(self._entries.put(entry, now))
+                    self._queue_changes_locked(self._entries.put(entry, now))
                 except BadValueError as error:
                     problem = error
             self._version += 1
-            self._news.notify_all()
+            self._updated.notify_all()
         self._schedule()
         if problem is not None:
             raise problem
@@ -305,15 +306,17 @@ class Blackboard:
             default: Returned if there is no value, or none young enough.
             max_age_s: Maximum age in seconds; None accepts any.
         """
-        found = self._found(parse_key(key), seconds("max_age_s", max_age_s))
+        found = self._value_of(parse_key(key), seconds("max_age_s", max_age_s))
         return default if found is _MISSING else found
 
     def __getitem__(self, key: str | tuple[str, ...]) -> object:
         names = parse_key(key)
-        found = self._found(names, None)
+        found = self._value_of(names, None)
         if found is _MISSING:
-            with self._news:
-                known = [key_text(each.key) for each in islice(self._entries.matching(("**",)), _NEAR_KEYS)]
+            with self._updated:
+                known = [
+                    key_text(each.key) for each in islice(self._entries.matching(("**",)), _MAX_SUGGESTIONS)
+                ]
             raise NoValueError(key_text(names), known)
         return found
 
@@ -321,25 +324,25 @@ class Blackboard:
         self.put(key, value)
 
     def __contains__(self, key: object) -> bool:
-        return isinstance(key, str | tuple) and self._found(parse_key(key), None) is not _MISSING
+        return isinstance(key, str | tuple) and self._value_of(parse_key(key), None) is not _MISSING
 
     def __len__(self) -> int:
-        with self._news:
-            self._expire()
+        with self._updated:
+            self._expire_locked()
             return len(self._entries)
 
     def age_s(self, key: str | tuple[str, ...]) -> float:
         """Return the age of a key's value, or of the youngest below it; infinite if there is none."""
         names = parse_key(key)
-        with self._news:
-            now = self._expire()
+        with self._updated:
+            now = self._expire_locked()
             return min((each.age_s(now) for each in self._entries.below(names)), default=math.inf)
 
     def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
         """Return the entry of exactly this key, or None."""
         names = parse_key(key)
-        with self._news:
-            now = self._expire()
+        with self._updated:
+            now = self._expire_locked()
             found = self._entries.get(names)
         return None if found is None else _public(found, now)
 
@@ -349,25 +352,25 @@ class Blackboard:
         ``*`` stands for one name, ``**`` for any number of names: ``human.*.position``.
         """
         names = parse_key(pattern)
-        with self._news:
-            self._expire()
+        with self._updated:
+            self._expire_locked()
             found = list(self._entries.matching(names))
         return sorted(key_text(each.key) for each in found)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
         """Return the matching entries by key, all at one moment."""
         names = parse_key(pattern)
-        with self._news:
-            now = self._expire()
+        with self._updated:
+            now = self._expire_locked()
             found = list(self._entries.matching(names))
         return {
             each.key: each for each in sorted((_public(each, now) for each in found), key=lambda e: e.key)
         }
 
-    def _found(self, key: Key, max_age_s: float | None) -> object:
+    def _value_of(self, key: Key, max_age_s: float | None) -> object:
         most = math.inf if max_age_s is None else max_age_s
-        with self._news:
-            now = self._expire()
+        with self._updated:
+            now = self._expire_locked()
             found = [each for each in self._entries.below(key) if each.age_s(now) <= most]
         if not found:
             return _MISSING
@@ -414,16 +417,16 @@ class Blackboard:
         deadline = math.inf if limit_s is None else time.monotonic() + limit_s
         while True:
             version = self._version
-            found = self._found(names, None)
+            found = self._value_of(names, None)
             if found is not _MISSING and (condition is None or condition(found)):
                 return found
             self._check_open()
-            left = min(_SLICE_S, deadline - time.monotonic())
+            left = min(_WAIT_SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 raise WaitTimeoutError(key_text(names), limit_s or 0.0)
-            with self._news:
+            with self._updated:
                 if self._version == version:
-                    self._news.wait(left)
+                    self._updated.wait(left)
 
     def on_change(self, pattern: str, callback: OnChange) -> Callable[[], None]:
         """Call `callback` with each `BlackboardChange` of a matching key, in the thread that spins the node.
@@ -440,11 +443,11 @@ class Blackboard:
             A function that ends the subscription.
         """
         observer = _Observer(parse_key(pattern), plain_function("callback", callback))
-        with self._news:
+        with self._updated:
             self._observers = (*self._observers, observer)
 
         def end() -> None:
-            with self._news:
+            with self._updated:
                 self._observers = tuple(each for each in self._observers if each is not observer)
 
         self._schedule()
@@ -456,13 +459,13 @@ class Blackboard:
         Returns:
             The number of calls.
         """
-        with self._news:
-            self._expire()
+        with self._updated:
+            self._expire_locked()
             waiting = len(self._pending)
         calls = 0
         try:
             while calls < waiting:
-                with self._news:
+                with self._updated:
                     if not self._pending:
                         break
                     observer, change = self._pending.popleft()
@@ -476,30 +479,30 @@ class Blackboard:
             self._schedule()
         return calls
 
-    def _expire(self) -> float:
+    def _expire_locked(self) -> float:
         # Call with the lock held. Returns the current time.
         now = self._clock()
         if self._entries.next_end <= now:
             gone = self._entries.expire(now)
             if gone:
-                self._note(gone)
+                self._queue_changes_locked(gone)
         return now
 
-    def _note(self, changes: Sequence[EntryChange]) -> None:
+    def _queue_changes_locked(self, changes: Sequence[EntryChange]) -> None:
         # Call with the lock held. Queues changes for callbacks, up to a limit.
         for change in changes:
             for observer in self._observers:
                 if key_matches(observer.pattern, change.entry.key):
                     self._pending.append((observer, change))
                     self._pending_bytes += change.entry.bytes
-            while len(self._pending) > _MOST_CHANGES or self._pending_bytes > 2 * self._max_bytes:
+            while len(self._pending) > _MAX_CHANGES or self._pending_bytes > 2 * self._max_bytes:
                 _observer, oldest = self._pending.popleft()
                 self._pending_bytes -= oldest.entry.bytes
                 self.changes_dropped += 1
 
     def _schedule(self) -> None:
         node = self._node
-        with self._news:
+        with self._updated:
             if node is None or not self._observers or self._is_closed:
                 return
             now = self._clock()
@@ -507,13 +510,13 @@ class Blackboard:
             if math.isinf(due) or self._timer_at <= due:
                 return
             self._timer_at = due
-            wait_s = _AT_ONCE_S if self._pending else max(_SOON_S, due - now)
+            wait_s = _IMMEDIATE_S if self._pending else max(_MIN_TIMER_S, due - now)
         made: list[Timer] = []
 
         def call() -> None:
             for timer in made:  # empty if the timer fires before it is appended; then it fires again at once
                 timer.cancel()
-                with self._news:
+                with self._updated:
                     self._timer_at = math.inf
                 self.deliver()
 
@@ -529,13 +532,13 @@ class Blackboard:
 
     def close(self) -> None:
         """Stop watching and wake waiting threads; values can still be read and put. Idempotent."""
-        with self._news:
+        with self._updated:
             self._is_closed = True
             watches, self._watches, self._observers = self._watches, (), ()
             self._pending.clear()
             self._pending_bytes = 0
             self._version += 1
-            self._news.notify_all()
+            self._updated.notify_all()
         for watch in watches:
             watch.close()
 
@@ -545,7 +548,7 @@ class Blackboard:
         if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
             self._entries = self._entries.rebuilt()
         self._lock = threading.Lock()
-        self._news = threading.Condition(self._lock)
+        self._updated = threading.Condition(self._lock)
         self._observers = ()
         self._pending = deque()
         for watch in self._watches:
@@ -561,12 +564,12 @@ class Blackboard:
         return f"Blackboard({len(self._entries)} keys)"
 
 
-def _life(lives_s: object) -> float:
+def _lifetime(lives_s: object) -> float:
     found = seconds("lives_s", lives_s)
     return math.inf if found is None else period("lives_s", found)
 
 
-def _own(key: Key, value: object) -> object:
+def _copied_value(key: Key, value: object) -> object:
     try:
         return copied(value)
     except (ValueError, RecursionError) as error:

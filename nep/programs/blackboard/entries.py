@@ -24,7 +24,7 @@ AgeBy = Literal["stamp", "arrival"]
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]
 _ENTRY_BYTES = 600
 _NAME_BYTES = 100
-_SPARE_ENDS = 1_000
+_MAX_STALE_ENDS = 1_000
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Entries:
         self._max_bytes = max_bytes
         self._tree = _Tree()
         self._by_age: OrderedDict[Key, StoredEntry] = OrderedDict()
-        self._ends: list[tuple[float, Key]] = []
-        self._end_of: dict[Key, float] = {}
+        self._expiry_heap: list[tuple[float, Key]] = []
+        self._expiry_of: dict[Key, float] = {}
         self.bytes = 0
         self.dropped = 0
         self.outdated = 0
@@ -83,7 +83,7 @@ class Entries:
     @property
     def next_end(self) -> float:
         """Time of the next `expire`; infinite if nothing expires."""
-        return self._ends[0][0] if self._ends else math.inf
+        return self._expiry_heap[0][0] if self._expiry_heap else math.inf
 
     def rebuilt(self) -> Entries:
         """Return a copy built from the entries; for a fork that interrupted a change."""
@@ -139,8 +139,8 @@ class Entries:
             return []
         changes: list[EntryChange] = []
         if before is None:
-            for each in self._in_the_way(entry.key):
-                self._take(each.key)
+            for each in self._conflicting(entry.key):
+                self._pop(each.key)
                 changes.append(EntryChange(each, "replaced"))
             changes.append(EntryChange(entry, "new"))
         else:
@@ -149,7 +149,7 @@ class Entries:
                 changes.append(EntryChange(entry, "changed"))
         self._insert(entry)
         while len(self._by_age) > self._max_keys or self.bytes > self._max_bytes:
-            changes.append(EntryChange(self._take(next(iter(self._by_age))), "dropped"))
+            changes.append(EntryChange(self._pop(next(iter(self._by_age))), "dropped"))
             self.dropped += 1
         return changes
 
@@ -159,26 +159,26 @@ class Entries:
 
     def remove(self, key: Key) -> list[EntryChange]:
         """Remove a key and all below it."""
-        return [EntryChange(self._take(each.key), "removed") for each in list(self.below(key))]
+        return [EntryChange(self._pop(each.key), "removed") for each in list(self.below(key))]
 
     def expire(self, now: float) -> list[EntryChange]:
         """Remove expired entries."""
         changes = []
-        while self._ends and self._ends[0][0] <= now:
-            end, key = heapq.heappop(self._ends)
-            if self._end_of.get(key) != end:  # superseded by an earlier expiry
+        while self._expiry_heap and self._expiry_heap[0][0] <= now:
+            end, key = heapq.heappop(self._expiry_heap)
+            if self._expiry_of.get(key) != end:  # superseded by an earlier expiry
                 continue
-            del self._end_of[key]
+            del self._expiry_of[key]
             entry = self.get(key)
             if entry is None or math.isinf(entry.expires):
                 continue
             if entry.expires > now:  # it was updated since
-                self._note_end(entry)
+                self._add_expiry(entry)
             else:
-                changes.append(EntryChange(self._take(key), "expired"))
+                changes.append(EntryChange(self._pop(key), "expired"))
         return changes
 
-    def _in_the_way(self, key: Key) -> list[StoredEntry]:
+    def _conflicting(self, key: Key) -> list[StoredEntry]:
         found: StoredEntry | _Tree = self._tree
         for name in key:
             if isinstance(found, StoredEntry):
@@ -201,23 +201,25 @@ class Entries:
         self._by_age.move_to_end(entry.key)
         self.bytes += entry.bytes
         if not math.isinf(entry.expires):
-            self._note_end(entry)
+            self._add_expiry(entry)
 
-    def _note_end(self, entry: StoredEntry) -> None:
-        if entry.expires >= self._end_of.get(entry.key, math.inf):
+    def _add_expiry(self, entry: StoredEntry) -> None:
+        if entry.expires >= self._expiry_of.get(entry.key, math.inf):
             return
-        if len(self._ends) > 2 * len(self._by_age) + _SPARE_ENDS:  # drop stale heap entries of deleted keys
-            self._end_of = {
+        if (
+            len(self._expiry_heap) > 2 * len(self._by_age) + _MAX_STALE_ENDS
+        ):  # drop stale heap entries of deleted keys
+            self._expiry_of = {
                 each.key: each.expires for each in self._by_age.values() if each.expires < math.inf
             }
-            self._ends = [(end, key) for key, end in self._end_of.items()]
-            heapq.heapify(self._ends)
-            if entry.key in self._end_of:
+            self._expiry_heap = [(end, key) for key, end in self._expiry_of.items()]
+            heapq.heapify(self._expiry_heap)
+            if entry.key in self._expiry_of:
                 return
-        self._end_of[entry.key] = entry.expires
-        heapq.heappush(self._ends, (entry.expires, entry.key))
+        self._expiry_of[entry.key] = entry.expires
+        heapq.heappush(self._expiry_heap, (entry.expires, entry.key))
 
-    def _take(self, key: Key) -> StoredEntry:
+    def _pop(self, key: Key) -> StoredEntry:
         entry = self._by_age.pop(key)
         self.bytes -= entry.bytes
         path = [self._tree]

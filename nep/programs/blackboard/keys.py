@@ -12,12 +12,12 @@ from nep.errors import BadKeyError
 from nep.i18n import _
 from nep.protocol.topic_pattern import levels_match
 
-__all__ = ["MOST_LEVELS", "Key", "key_matches", "key_of_topic", "key_text", "literal_levels", "parse_key"]
+__all__ = ["MAX_LEVELS", "Key", "key_matches", "key_of_topic", "key_text", "literal_levels", "parse_key"]
 
 Key = tuple[str, ...]
-MOST_LEVELS = 32
-_MOST_LETTERS = 1_000
-_LONGEST = 2 * _MOST_LETTERS + MOST_LEVELS
+MAX_LEVELS = 32
+_MAX_CHARACTERS = 1_000
+_MAX_WRITTEN_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
 """Length of the longest written key: each character escaped, plus dots."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
@@ -28,7 +28,7 @@ _WILD = frozenset({"*", "**"})
 def parse_key(key: str | Sequence[str]) -> Key:
     """Split a key into its names; a tuple is returned as is. Raises `BadKeyError`."""
     if isinstance(key, str):
-        if len(key) > _LONGEST:  # splitting it would take long
+        if len(key) > _MAX_WRITTEN_LENGTH:  # splitting it would take long
             raise _too_long(key)
         names = tuple(key.split(".")) if "\\" not in key else _names(key)
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
@@ -37,9 +37,9 @@ def parse_key(key: str | Sequence[str]) -> Key:
         raise BadKeyError(str(type(key).__name__), _("give a text such as 'human.1.position'"))
     if not names or names == ("",):
         raise BadKeyError("", _("it is empty; give a name such as 'human.1.position'"))
-    if len(names) > MOST_LEVELS:
-        raise BadKeyError(key_text(names), _("use {most} names at most").format(most=MOST_LEVELS))
-    if sum(map(len, names)) > _MOST_LETTERS:
+    if len(names) > MAX_LEVELS:
+        raise BadKeyError(key_text(names), _("use {most} names at most").format(most=MAX_LEVELS))
+    if sum(map(len, names)) > _MAX_CHARACTERS:
         raise _too_long(key_text(names))
     try:
         "".join(names).encode()
@@ -49,7 +49,7 @@ def parse_key(key: str | Sequence[str]) -> Key:
 
 
 def _too_long(key: str) -> BadKeyError:
-    return BadKeyError(key, _("use {most} letters at most").format(most=_MOST_LETTERS))
+    return BadKeyError(key, _("use {most} letters at most").format(most=_MAX_CHARACTERS))
 
 
 def _names(text: str) -> Key:

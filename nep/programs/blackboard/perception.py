@@ -44,11 +44,11 @@ def perception_in(payload: object) -> Perception | None:
         given = {given: 1}
     if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
         return None
-    values = {name.strip(_QUOTES): _meant(value) for name, value in given.items()}
+    values = {name.strip(_QUOTES): _parsed_number(value) for name, value in given.items()}
     return Perception(primitive, values, robot if isinstance(robot, str) else "")
 
 
-def _meant(value: object) -> object:
+def _parsed_number(value: object) -> object:
     if not isinstance(value, str):
         return value
     try:

@@ -26,12 +26,12 @@ from nep.text import bounded_str
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-__all__ = ["DEFAULT_NAME", "MOST_ENTRIES", "BlackboardServer", "service_of"]
+__all__ = ["DEFAULT_NAME", "MAX_ENTRIES", "BlackboardServer", "service_of"]
 
 DEFAULT_NAME = "blackboard"
-MOST_ENTRIES = 10_000
+MAX_ENTRIES = 10_000
 """Maximum number of entries in a reply, which includes the number of omitted ones."""
-_MOST_ANSWER_BYTES = 32 * 2**20
+_MAX_REPLY_BYTES = 32 * 2**20
 
 
 def service_of(name: str, what: str) -> str:
@@ -55,31 +55,31 @@ class BlackboardServer:
             node.new_server(service_of(name, what), answer)
             for what, answer in (("get", self._get), ("set", self._set), ("keys", self._keys))
         ]
-        self._end = board.on_change("**", self._tell)
+        self._end = board.on_change("**", self._publish_change)
 
-    def _tell(self, change: BlackboardChange) -> None:
-        told = {"blackboard": self._name, "cause": change.cause, **_as_map(change.entry)}
+    def _publish_change(self, change: BlackboardChange) -> None:
+        change_map = {"blackboard": self._name, "cause": change.cause, **_as_map(change.entry)}
         if change.is_gone:
-            told["value"] = None
-        self._changes.publish(told)
+            change_map["value"] = None
+        self._changes.publish(change_map)
 
     def _get(self, request: object) -> object:
-        asked = _request(request)
-        max_age_s = seconds("max_age_s", asked.get("max_age_s"))
-        if "key" not in asked:
-            return self._entries(_text(asked, "pattern", "**"), math.inf if max_age_s is None else max_age_s)
-        key = _text(asked, "key")
+        fields = _request(request)
+        max_age_s = seconds("max_age_s", fields.get("max_age_s"))
+        if "key" not in fields:
+            return self._entries(_text(fields, "pattern", "**"), math.inf if max_age_s is None else max_age_s)
+        key = _text(fields, "key")
         missing = object()
         value = self._board.get(key, missing, max_age_s=max_age_s)
         if value is missing:
-            return {"found": False, "value": asked.get("default"), "age_s": None}
+            return {"found": False, "value": fields.get("default"), "age_s": None}
         return {"found": True, "value": _sendable(value), "age_s": _finite(self._board.age_s(key))}
 
     def _entries(self, pattern: str, max_age_s: float) -> object:
         young = [each for each in self._board.snapshot(pattern).values() if each.age_s <= max_age_s]
         entries: list[object] = []
-        room = _MOST_ANSWER_BYTES
-        for each in young[:MOST_ENTRIES]:
+        room = _MAX_REPLY_BYTES
+        for each in young[:MAX_ENTRIES]:
             entry = _as_map(each)
             room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
             if room < 0 and entries:
@@ -88,12 +88,12 @@ class BlackboardServer:
         return {"entries": entries, "more": len(young) - len(entries)}
 
     def _set(self, request: object) -> object:
-        asked = _request(request)
-        lives_s = seconds("lives_s", asked.get("lives_s"))
-        if "key" in asked and "value" in asked:
-            values: Mapping[object, object] = {_text(asked, "key"): asked["value"]}
+        fields = _request(request)
+        lives_s = seconds("lives_s", fields.get("lives_s"))
+        if "key" in fields and "value" in fields:
+            values: Mapping[object, object] = {_text(fields, "key"): fields["value"]}
         else:
-            given = asked.get("values")
+            given = fields.get("values")
             if not isinstance(given, Mapping) or not given:
                 raise NepError(_("nothing is to be set; give 'key' and 'value', or a map 'values'"))
             values = given
@@ -103,7 +103,7 @@ class BlackboardServer:
 
     def _keys(self, request: object) -> object:
         found = self._board.keys(_text(_request(request), "pattern", "**"))
-        return {"keys": found[:MOST_ENTRIES], "more": max(0, len(found) - MOST_ENTRIES)}
+        return {"keys": found[:MAX_ENTRIES], "more": max(0, len(found) - MAX_ENTRIES)}
 
     def close(self) -> None:
         """Stop publishing and serving; the board stays open. Idempotent."""
@@ -127,8 +127,8 @@ def _request(request: object) -> Mapping[object, object]:
     return request
 
 
-def _text(asked: Mapping[object, object], field: str, default: str | None = None) -> str:
-    value = asked.get(field, default)
+def _text(fields: Mapping[object, object], field: str, default: str | None = None) -> str:
+    value = fields.get(field, default)
     if not isinstance(value, str):
         raise BadKeyError(bounded_str(value), _("give a text such as 'human.1.position'"))
     return value

@@ -6,17 +6,17 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 
-from nep.programs.blackboard.keys import MOST_LEVELS, Key
+from nep.programs.blackboard.keys import MAX_LEVELS, Key
 
 __all__ = ["copied", "is_same", "leaves", "size_of"]
 
-_DEEPEST = 100
+_MAX_DEPTH = 100
 _PLAIN = frozenset({int, float, bool, type(None)})
 _NUMBER_BYTES = 40
 _ITEM_BYTES = 8
 
 
-def copied(value: object, depth: int = _DEEPEST) -> object:
+def copied(value: object, depth: int = _MAX_DEPTH) -> object:
     """Copy lists and maps deeply. Raises `ValueError` if the value is too deep or contains itself."""
     if isinstance(value, list | tuple):
         if _has_only_numbers(value):
@@ -29,7 +29,7 @@ def copied(value: object, depth: int = _DEEPEST) -> object:
 
 def _below(depth: int) -> int:
     if depth <= 0:
-        raise ValueError(f"{_DEEPEST}")
+        raise ValueError(f"{_MAX_DEPTH}")
     return depth - 1
 
 
@@ -77,7 +77,7 @@ def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
 
     A map with keys other than text and whole numbers, or nested too deeply for keys, is one value, too.
     """
-    if not isinstance(value, Mapping) or not value or len(key) >= MOST_LEVELS or not _has_names(value):
+    if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_names(value):
         yield key, value
         return
     for name, each in value.items():

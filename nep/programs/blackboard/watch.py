@@ -71,11 +71,11 @@ class MessageReading:
         """Yield the values of an item with their keys. Raises `NepError` if no key can be formed."""
         seen = None if self._fields is not None else perception_in(item)
         if seen is not None:
-            beginning = () if self._key is None else self._filled(item)
+            beginning = () if self._key is None else self._key_for(item)
             for key, value in leaves(seen.values, (*beginning, *parse_key(seen.primitive))):
                 yield PerceivedValue(key, value, seen.robot)
             return
-        beginning = key_of_topic(topic) if self._key is None else self._filled(item)
+        beginning = key_of_topic(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
         said = robot if isinstance(robot, str) else ""
         for at, value in self._chosen(item):
@@ -91,7 +91,7 @@ class MessageReading:
             if value is not _MISSING:
                 yield name, value
 
-    def _filled(self, item: object) -> Key:
+    def _key_for(self, item: object) -> Key:
         if not self._has_holes:
             return self._key or ()
         return tuple(_HOLE.sub(lambda found: _name_in(item, found[1]), name) for name in self._key or ())
@@ -136,7 +136,7 @@ class BlackboardWatch:
         self.problem = ""
         """Reason why the last message was rejected, "" if it was not."""
         self._reading = reading
-        self._keep = keep
+        self._store = keep
         self._is_pattern = is_pattern
         self._subscriber: Subscriber | None = None
         self._is_closed = False
@@ -158,7 +158,7 @@ class BlackboardWatch:
             try:
                 self._take(message)
             except Exception as error:  # noqa: BLE001 - a bad message must not affect the others
-                self._refuse(message, error)
+                self._reject(message, error)
 
     def _take(self, message: Message) -> None:
         subscriber = self._subscriber
@@ -170,19 +170,19 @@ class BlackboardWatch:
         problem: NepError | None = None
         for item in self._reading.items(payload):
             try:
-                self._keep(message, tuple(self._reading.findings(message.topic, item)))
+                self._store(message, tuple(self._reading.findings(message.topic, item)))
             except NepError as error:
                 problem = error  # the other items are stored
         if problem is not None:
             raise problem
         self.problem = ""
 
-    def _refuse(self, message: Message, error: Exception) -> None:
+    def _reject(self, message: Message, error: Exception) -> None:
         self.refused += 1
         self.problem = str(error)
         if not isinstance(error, DecodeError) and is_logged(self.refused):
             _logger.warning(
-                "a message on '%s' is not kept as a whole (%d so far): %s",
+                "a message on '%s' was not stored completely (%d so far): %s",
                 message.topic,
                 self.refused,
                 error,

@@ -53,9 +53,9 @@ PORTS: Mapping[int, str] = {
     7777: lazy("where tools of the original NEP hear of topics"),
     12345: lazy("where original nodes are told to end"),
 }
-_ASK_S = 1.0
-_AHEAD_S = 0.5
-_LEAST_FREE_BYTES = 10_000_000
+_GRAPH_TIMEOUT_S = 1.0
+_MAX_CLOCK_AHEAD_S = 0.5
+_MIN_FREE_BYTES = 10_000_000
 _ORIGINAL_FILES = ("helpers.py", "master.py", "publisher.py", "subscriber.py")
 _GATEWAY_OFF = {"0", "false", "no", "off"}
 
@@ -116,9 +116,9 @@ def collect_in_steps(
 def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
     chosen = facts.address
     number = int(chosen.rpartition(":")[2])
-    view, answered_s, is_known = _ask(chosen)
+    view, answered_s, is_known = _query_graph(chosen)
     listening = processes.listening()
-    master_port = _port(number, "the master's", listening) if _is_here(chosen) else None
+    master_port = _port(number, "the master's", listening) if _is_own_address(chosen) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
     elsewhere = view is None and master_port is not None and master_port.is_taken
@@ -140,7 +140,7 @@ def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | No
 
 def _answers_at(address: str) -> str:
     own = f"127.0.0.1:{address.rpartition(':')[2]}"
-    return own if not is_loopback(address) and _ask(own)[0] is not None else ""
+    return own if not is_loopback(address) and _query_graph(own)[0] is not None else ""
 
 
 def start_obstacle(address: str | None = None) -> Finding | None:
@@ -161,18 +161,18 @@ def start_obstacle(address: str | None = None) -> Finding | None:
     return None
 
 
-def _ask(address: str) -> tuple[GraphView | None, float | None, bool]:
+def _query_graph(address: str) -> tuple[GraphView | None, float | None, bool]:
     began = time.monotonic()
     try:
         with Node(f"nep-doctor-{os.getpid()}", master=address) as node:
-            return node.graph(_ASK_S), time.monotonic() - began, True
+            return node.graph(_GRAPH_TIMEOUT_S), time.monotonic() - began, True
     except nep.errors.MasterUnreachable as error:
         return None, None, error.is_known
     except (nep.errors.NepError, zmq.ZMQError, OSError):
         return None, None, True
 
 
-def _is_here(address: str) -> bool:
+def _is_own_address(address: str) -> bool:
     host = host_of(address)
     if host in {"localhost", "*", "0.0.0.0", "[::1]"} or host.startswith("127."):  # noqa: S104 - no binding
         return True
@@ -265,7 +265,7 @@ def _folder(purpose: str, path: Path) -> FolderFact:
         free = psutil.disk_usage(str(existing)).free
     except OSError as error:
         return FolderFact(str(path), purpose, (error.strerror or str(error)).lower())
-    problem = _("the disk is full") if free < _LEAST_FREE_BYTES else ""
+    problem = _("the disk is full") if free < _MIN_FREE_BYTES else ""
     return FolderFact(str(path), purpose, problem)
 
 
@@ -278,5 +278,5 @@ def _clocks(view: GraphView | None) -> Iterator[ClockFact]:
             if node is not None and publisher.last_stamp_ns is not None:
                 ahead[node.host] = max(ahead.get(node.host, 0.0), publisher.last_stamp_ns / 1e9 - now_s)
     for host, seconds in ahead.items():
-        if seconds > _AHEAD_S:
+        if seconds > _MAX_CLOCK_AHEAD_S:
             yield ClockFact(host, seconds)

@@ -15,9 +15,9 @@ from nep.programs.doctor.original_ports import ports
 
 __all__ = ["PARTS", "findings", "in_order", "report", "to_plain", "worst"]
 
-FEWEST_FILES = 1024
-NEARLY = 0.8
-_FILES_A_TOPIC = 20
+MIN_FILES = 1024
+FILES_WARNING_RATIO = 0.8
+_FILES_PER_TOPIC = 20
 """File descriptors of the master per topic of the original NEP; a native topic needs fewer."""
 _ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
 _SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
@@ -151,12 +151,12 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
 
 def _files(facts: Facts) -> Iterator[Finding]:
     files = facts.files
-    if files.soft is not None and files.soft < FEWEST_FILES:
+    if files.soft is not None and files.soft < MIN_FILES:
         yield Finding(
             "files",
             "warning",
             _("A program may open {files} files only; that is enough for about {topics} topics.").format(
-                files=files.soft, topics=files.soft // _FILES_A_TOPIC
+                files=files.soft, topics=files.soft // _FILES_PER_TOPIC
             ),
             _("Allow more in the terminal from which you start programs."),
             command=f"ulimit -n {min(8192, files.hard or 8192)}",
@@ -164,7 +164,7 @@ def _files(facts: Facts) -> Iterator[Finding]:
     elif files.soft is not None:
         yield Finding("files", "ok", _("A program may open {files} files.").format(files=files.soft))
     opened, limit = files.master_open, files.master_limit
-    if opened is not None and limit is not None and opened > NEARLY * limit:
+    if opened is not None and limit is not None and opened > FILES_WARNING_RATIO * limit:
         yield Finding(
             "files:master",
             "warning",
@@ -178,7 +178,7 @@ def _files(facts: Facts) -> Iterator[Finding]:
 
 def _programs(facts: Facts) -> Iterator[Finding]:
     for program in facts.programs:
-        if program.opened > NEARLY * program.limit:
+        if program.opened > FILES_WARNING_RATIO * program.limit:
             yield Finding(
                 f"files:{program.pid}",
                 "warning",

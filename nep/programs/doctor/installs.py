@@ -21,7 +21,7 @@ else:
 
 __all__ = ["Install", "environment_of", "install_in", "install_of"]
 
-_PLACES = ("lib/python*/site-packages", "Lib/site-packages")
+_SITE_PACKAGES = ("lib/python*/site-packages", "Lib/site-packages")
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
 
 def install_in(environment: Path) -> Install | None:
     """Return the installation of NEP Studio in an environment; None if there is none, or two."""
-    found = [info for place in _PLACES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
+    found = [info for place in _SITE_PACKAGES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
     if len(found) != 1:
         return None
     try:

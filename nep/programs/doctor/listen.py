@@ -20,10 +20,10 @@ from nep.system.addresses import master_address, nearest
 
 __all__ = ["collect_topic", "reach_of"]
 
-_ASK_S = 1.0
+_GRAPH_TIMEOUT_S = 1.0
 _LISTEN_S = 1.5
-_CONNECT_S = 0.7
-_MOST_TRIED = 4
+_CONNECT_TIMEOUT_S = 0.7
+_MAX_TRIED = 4
 """Publisher addresses tried; each that doesn't reply takes `_CONNECT_TIMEOUT_S`."""
 _REMEDIES = ("restart", "reset", "start")
 """Prefixes of service names that can restart a program."""
@@ -38,7 +38,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
         return TopicFacts(topic, time.time(), chosen, bad_name=str(error))
     try:
         with Node(f"nep-doctor-topic-{os.getpid()}", master=chosen) as node:
-            return _look(node, topic, chosen)
+            return _collect(node, topic, chosen)
     except (nep.errors.NepError, zmq.ZMQError, OSError):
         return None
 
@@ -49,7 +49,7 @@ def reach_of(endpoint: str) -> Reach:
     if not endpoint.startswith("tcp://") or not colon:
         return ""
     try:
-        with socket.create_connection((place, int(port)), timeout=_CONNECT_S):
+        with socket.create_connection((place, int(port)), timeout=_CONNECT_TIMEOUT_S):
             return ""
     except TimeoutError:
         return "timeout"
@@ -59,8 +59,8 @@ def reach_of(endpoint: str) -> Reach:
         return "unknown"
 
 
-def _look(node: Node, topic: str, address: str) -> TopicFacts:
-    view = node.graph(_ASK_S)
+def _collect(node: Node, topic: str, address: str) -> TopicFacts:
+    view = node.graph(_GRAPH_TIMEOUT_S)
     info = view.topics.get(topic)
     others = {name: each.rate_hz for name, each in view.topics.items() if each.publishers}
     if info is None or not info.publishers:
@@ -68,7 +68,7 @@ def _look(node: Node, topic: str, address: str) -> TopicFacts:
             topic, time.time(), address, bool(view.listens), others=others, services=tuple(view.services)
         )
     received, refused, unreadable, listened_s = _listen(node, info)
-    view = node.graph(_ASK_S)  # includes alerts raised while subscribed
+    view = node.graph(_GRAPH_TIMEOUT_S)  # includes alerts raised while subscribed
     info = view.topics.get(topic, info)
     return TopicFacts(
         topic,
@@ -88,14 +88,14 @@ def _look(node: Node, topic: str, address: str) -> TopicFacts:
 
 def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
     began = time.monotonic()
-    with node.new_sub(info.name, info.msg_type, wildcards=False) as ear:
-        message, unreadable = ear.receive(_LISTEN_S), ""
+    with node.new_sub(info.name, info.msg_type, wildcards=False) as subscriber:
+        message, unreadable = subscriber.receive(_LISTEN_S), ""
         if message is not None:
             try:
                 message.kind.decode(message.raw, message.extension)
             except nep.errors.NepError as error:
                 unreadable = str(error)
-        return ear.received, ear.refused, unreadable, time.monotonic() - began
+        return subscriber.received, subscriber.refused, unreadable, time.monotonic() - began
 
 
 def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[PublisherFact, ...]:
@@ -106,7 +106,7 @@ def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[Publish
 def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[str, Reach]) -> PublisherFact:
     node = view.nodes.get(each.node_id)
     is_native = node is None or node.generation == "native"
-    endpoint, reach = _reached(each, address, tried) if is_native else ("", "")
+    endpoint, reach = _endpoint_and_reach(each, address, tried) if is_native else ("", "")
     services = [
         name
         for name, service in view.services.items()
@@ -124,14 +124,14 @@ def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[s
     )
 
 
-def _reached(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tuple[str, Reach]:
+def _endpoint_and_reach(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tuple[str, Reach]:
     # Each endpoint is tried once.
     if not each.endpoints:
         return "", ""
     endpoint = nearest(each.endpoints, address)
     if not endpoint:
         return each.endpoints[0], "elsewhere"
-    if endpoint not in tried and len(tried) < _MOST_TRIED:
+    if endpoint not in tried and len(tried) < _MAX_TRIED:
         tried[endpoint] = reach_of(endpoint)
     return endpoint, tried.get(endpoint, "")
 
@@ -139,9 +139,9 @@ def _reached(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tupl
 def _last_s(view: GraphView, each: PublisherInfo) -> float | None:
     if each.last_stamp_ns is None:
         return None
-    theirs = _offsets(view)
-    offset_ns = theirs.get(each.node_id, 0)
-    here = next((theirs[id] for id, node in view.nodes.items() if id in theirs and _is_own(node.host)), 0)
+    offsets = _offsets(view)
+    offset_ns = offsets.get(each.node_id, 0)
+    here = next((offsets[id] for id, node in view.nodes.items() if id in offsets and _is_own(node.host)), 0)
     return (each.last_stamp_ns + offset_ns - here) / 1e9
 
 

@@ -48,6 +48,6 @@ def look(
 
 
 def _all(found: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()) -> tuple[Finding, ...]:
-    told = {each.id for each in about}
-    general = [each for name in PARTS for each in found.get(name, ()) if each.id not in told]
+    topic_ids = {each.id for each in about}
+    general = [each for name in PARTS for each in found.get(name, ()) if each.id not in topic_ids]
     return in_order([*about, *general])

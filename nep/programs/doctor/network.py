@@ -36,22 +36,22 @@ def masters(facts: Facts) -> Iterator[Finding]:
     holder = port.holder if port is not None else None
     if facts.view is not None:
         yield _running(facts, holder)
-        yield from _of_another_version(facts, holder)
+        yield from _version_mismatch(facts, holder)
     elif not facts.is_known:
         yield _unknown_host(facts)
     elif facts.answers_at:
-        yield _closed(facts)
+        yield _loopback_only(facts)
     elif holder is not None and holder.is_master:
         yield _hung(facts, holder)
     elif port is not None and port.is_taken:
-        yield _foreign(facts, holder)
+        yield _port_taken(facts, holder)
     elif facts.reach is not None:
         yield _unreached(facts)
     elif not is_loopback(facts.address):
-        yield _never_there(facts)
+        yield _not_loopback(facts)
     else:
-        yield _none(facts)
-    yield from _several(facts)
+        yield _not_running(facts)
+    yield from _multiple_masters(facts)
 
 
 def _unknown_host(facts: Facts) -> Finding:
@@ -63,7 +63,7 @@ def _unknown_host(facts: Facts) -> Finding:
     )
 
 
-def _closed(facts: Facts) -> Finding:
+def _loopback_only(facts: Facts) -> Finding:
     return Finding(
         "master:closed",
         "error",
@@ -89,14 +89,14 @@ def _hung(facts: Facts, holder: ProcessFact) -> Finding:
     )
 
 
-def _foreign(facts: Facts, holder: ProcessFact | None) -> Finding:
+def _port_taken(facts: Facts, holder: ProcessFact | None) -> Finding:
     number = facts.address.rpartition(":")[2]
     other = _other_port(number)
     return Finding(
         "master:foreign",
         "error",
         _("Port {number} is held by {program}, which is no master.").format(
-            number=number, program=_who(holder)
+            number=number, program=_holder_text(holder)
         ),
         _(
             "End that program, or start the master on port {other} and tell it to all programs "
@@ -106,7 +106,7 @@ def _foreign(facts: Facts, holder: ProcessFact | None) -> Finding:
     )
 
 
-def _none(facts: Facts) -> Finding:
+def _not_running(facts: Facts) -> Finding:
     number = facts.address.rpartition(":")[2]
     return Finding(
         "master:none",
@@ -119,7 +119,7 @@ def _none(facts: Facts) -> Finding:
     )
 
 
-def _never_there(facts: Facts) -> Finding:
+def _not_loopback(facts: Facts) -> Finding:
     own = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
     return Finding(
         "master:network",
@@ -183,7 +183,7 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
     return Finding("master", "ok", f"{sentence}.")
 
 
-def _of_another_version(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
+def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Finding]:
     install, own = facts.master_install, facts.versions.get("NEP Studio", "")
     if install is None or holder is None or not own[:1].isdigit():
         return
@@ -215,7 +215,7 @@ def _kill(facts: Facts, holder: ProcessFact) -> str:
     return f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}"
 
 
-def _several(facts: Facts) -> Iterator[Finding]:
+def _multiple_masters(facts: Facts) -> Iterator[Finding]:
     if len(facts.masters) < 2:
         return
     places = ", ".join(
@@ -282,7 +282,7 @@ def _master(facts: Facts, holder: ProcessFact | None) -> str:
     return with_process(facts.address, holder.pid if holder is not None else None)
 
 
-def _who(holder: ProcessFact | None) -> str:
+def _holder_text(holder: ProcessFact | None) -> str:
     if holder is None:
         return _("a program that the system does not name")
     return with_process(f"“{holder.name}”", holder.pid)

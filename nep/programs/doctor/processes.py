@@ -20,9 +20,9 @@ else:
 __all__ = ["describe", "is_free", "is_master_command", "listening", "masters", "open_files"]
 
 _LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
-_TEXT_OF_A_PROGRAM = frozenset({"-c", "-e", "--eval", "-p", "--print"})
+_CODE_OPTIONS = frozenset({"-c", "-e", "--eval", "-p", "--print"})
 """Options of Python and Node.js that are followed by source code instead of a file name."""
-_NEAR = 20
+_MAX_PORT_DISTANCE = 20
 """Maximum distance of a master's port from the usual one if it listens on several."""
 
 
@@ -57,12 +57,12 @@ def _own_connections() -> Iterable[object]:
     for process in psutil.process_iter():
         try:
             for each in process.net_connections(kind="tcp"):
-                yield _Owned(each, process.pid)
+                yield _OwnedConnection(each, process.pid)
         except psutil.Error:
             continue
 
 
-class _Owned:
+class _OwnedConnection:
     """Connection with the pid of its process, as in the system-wide list."""
 
     def __init__(self, connection: object, pid: int) -> None:
@@ -113,7 +113,7 @@ def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessF
 
 def _masters_port(ports: Sequence[int], usual: int) -> int | None:
     near = sorted(ports, key=lambda port: abs(port - usual))
-    return near[0] if near and (abs(near[0] - usual) <= _NEAR or len(near) == 1) else None
+    return near[0] if near and (abs(near[0] - usual) <= _MAX_PORT_DISTANCE or len(near) == 1) else None
 
 
 def is_master_command(command: Sequence[str]) -> bool:
@@ -146,7 +146,7 @@ def _command(process: psutil.Process) -> list[str]:
 def _name(name: str, command: Sequence[str]) -> str:
     if PurePath(name).stem.lower().startswith(("python", "node", "java")):
         for word in command[1:]:
-            if word in _TEXT_OF_A_PROGRAM:
+            if word in _CODE_OPTIONS:
                 break
             if not word.startswith("-"):
                 return f"{name} {PurePath(word).name}"

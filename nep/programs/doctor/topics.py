@@ -16,7 +16,7 @@ __all__ = ["meant_topic", "topic_findings"]
 
 QUIET_S = 2.0
 """Silence before a publisher that sends rarely counts as silent."""
-_MOST_NAMED = 5
+_MAX_NAMED = 5
 
 
 def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
@@ -33,9 +33,9 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
             ),
         )
     if not facts.publishers:
-        return tuple(_nobody(facts))
+        return tuple(_unpublished(facts))
     found = [finding for each in facts.publishers for finding in _publisher(facts, each)]
-    found += [_noticed(each.id, each.sentence, each.hint) for each in facts.alerts]
+    found += [_from_alert(each.id, each.sentence, each.hint) for each in facts.alerts]
     return (*found, *_arrival(facts, is_explained=any(each.severity == "error" for each in found)))
 
 
@@ -46,22 +46,22 @@ def meant_topic(topic: str, names: Iterable[str]) -> str | None:
     spelling.
     """
     names = [name for name in names if name != topic]
-    wanted = _bare(topic)
-    same = [name for name in names if _bare(name) == wanted]
+    wanted = _normalized(topic)
+    same = [name for name in names if _normalized(name) == wanted]
     if same:
         return same[0]
-    ends = [name for name in names if _bare(name).rpartition("/")[2] == wanted.rpartition("/")[2]]
+    ends = [name for name in names if _normalized(name).rpartition("/")[2] == wanted.rpartition("/")[2]]
     if len(ends) == 1:
         return ends[0]
-    by_bare = {_bare(name): name for name in names}
+    by_bare = {_normalized(name): name for name in names}
     return next((by_bare[near] for near in get_close_matches(wanted, list(by_bare), n=1)), None)
 
 
-def _bare(topic: str) -> str:
+def _normalized(topic: str) -> str:
     return topic.strip("/").casefold()
 
 
-def _nobody(facts: TopicFacts) -> Iterator[Finding]:
+def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
     sentence = _("Nobody publishes {topic}.").format(topic=facts.topic)
     near = meant_topic(facts.topic, facts.others)
     service = facts.topic if facts.topic in facts.services else ""
@@ -73,7 +73,7 @@ def _nobody(facts: TopicFacts) -> Iterator[Finding]:
     else:
         words = _("Start the program that does; what is published now: {topics}.")
         known = sorted(name for name in facts.others if not name.startswith("/nep/"))  # hide nep's own topics
-        some = known[:_MOST_NAMED]
+        some = known[:_MAX_NAMED]
         if not some:
             words = _("Start the program that does; nothing else is published, either.")
         more = len(known) - len(some)
@@ -169,7 +169,7 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     )
 
 
-def _noticed(id: str, sentence: str, hint: str) -> Finding:
+def _from_alert(id: str, sentence: str, hint: str) -> Finding:
     return Finding(id, "error", sentence if sentence.endswith(".") else f"{sentence}.", hint)
 
 
@@ -182,7 +182,7 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
                 topic=facts.topic, reason=facts.unreadable
             ),
             _("Look at their bytes in the Inspector, and at the program that sends them: {nodes}.").format(
-                nodes=_named(facts.publishers)
+                nodes=_publisher_text(facts.publishers)
             ),
         )
     elif facts.received:
@@ -195,7 +195,7 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
             _("What comes on {topic} is of a version of NEP that this one does not read.").format(
                 topic=facts.topic
             ),
-            _("Give all programs the same version: {nodes}.").format(nodes=_named(facts.publishers)),
+            _("Give all programs the same version: {nodes}.").format(nodes=_publisher_text(facts.publishers)),
         )
     elif not is_explained:
         yield Finding(
@@ -203,13 +203,13 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
             "error",
             _("{topic} is sent by {nodes}, but nothing came here in {seconds} s.").format(
                 topic=facts.topic,
-                nodes=_named(facts.publishers),
+                nodes=_publisher_text(facts.publishers),
                 seconds=number(facts.listened_s, ".1f"),
             ),
             _("This computer or its network may be very busy, or a firewall lets nothing through."),
         )
 
 
-def _named(publishers: Sequence[PublisherFact]) -> str:
+def _publisher_text(publishers: Sequence[PublisherFact]) -> str:
     places = dict.fromkeys(f"{each.node} ({each.host})" for each in publishers)
-    return listed(list(places)[:_MOST_NAMED])
+    return listed(list(places)[:_MAX_NAMED])

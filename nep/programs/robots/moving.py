@@ -60,7 +60,7 @@ class MovingTopics:
             recordings, which may lack the robot's description.
     """
 
-    __slots__ = ("_by_topic", "_everybody", "_patterns", "_unidentified", "_uses_names")
+    __slots__ = ("_all_names", "_by_topic", "_patterns", "_unidentified", "_uses_names")
 
     def __init__(
         self,
@@ -77,26 +77,26 @@ class MovingTopics:
         self._by_topic = {topic: tuple(names) for topic, names in by_topic.items()}
         self._unidentified = frozenset(unidentified)
         self._patterns = tuple(topic for topic in {*self._by_topic, *self._unidentified} if is_pattern(topic))
-        self._everybody = tuple(dict.fromkeys(robot.name for robot in known))
+        self._all_names = tuple(dict.fromkeys(robot.name for robot in known))
         self._uses_names = uses_names
 
     @property
     def robots(self) -> tuple[str, ...]:
         """Names of all identified robots."""
-        return self._everybody
+        return self._all_names
 
     @property
     def topics(self) -> dict[str, tuple[str, ...]]:
         """Each topic or pattern that moves an identified robot, with the names of these robots."""
         found = dict(self._by_topic)
-        if self._everybody:
-            found[RIZE_COMMANDS] = self._everybody
+        if self._all_names:
+            found[RIZE_COMMANDS] = self._all_names
         return found
 
     def robots_on(self, topic: str) -> tuple[str, ...]:
         """Return the names of the identified robots that a message moves."""
         if topic == RIZE_COMMANDS:
-            return self._everybody
+            return self._all_names
         names = dict.fromkeys(self._by_topic.get(topic, ()))
         for pattern in self._patterns:
             if matches(pattern, topic):
@@ -195,10 +195,10 @@ def moving_topics(
     typed += [
         (info.name, info.subscribers) for info in view.patterns.values() if info.msg_type == COMMAND_TYPE
     ]
-    heard = (
+    subscribed = (
         name for name, subscribers in typed if any(each.node_id not in own_nodes for each in subscribers)
     )
-    return MovingTopics(known, unidentified=heard)
+    return MovingTopics(known, unidentified=subscribed)
 
 
 def _unread_robots(
@@ -215,11 +215,11 @@ def _unread_robots(
         for topic, info in view.topics.items()
         if info.msg_type == ANSWER_TYPE and (nodes := _publishers(view, topic) - announcing)
     ]
-    heard = _subscriptions(view) if programs else {}
+    subscribed = _subscriptions(view) if programs else {}
     for home, nodes in programs:
         topics = {f"{home}/{key}" for key in _CONTROL_KEYS}
         for node in nodes.difference(own_nodes):
-            topics |= heard.get(node, set())
+            topics |= subscribed.get(node, set())
         yield RobotControls(home.strip("/") or home, frozenset(topics))
 
 

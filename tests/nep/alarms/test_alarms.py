@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nep.programs.alarms import AlarmAction
 from nep.programs.alarms.alarms import RETRY_S
-from nep.programs.alarms.history import MOST_RECORDS, AlarmHistory, AlarmRecord
+from nep.programs.alarms.history import MAX_RECORDS, AlarmHistory, AlarmRecord
 from tests.nep.alarms.scene import MIDNIGHT_S, Scene, rule
 
 CALL = AlarmAction("call", "restart", {})
@@ -126,9 +126,9 @@ def test_a_snooze_that_ends_when_it_is_well_does_nothing() -> None:
 
 def test_the_history_is_bounded_and_says_how_often() -> None:
     history = AlarmHistory()
-    for number in range(MOST_RECORDS + 10):
+    for number in range(MAX_RECORDS + 10):
         history.add(AlarmRecord("a" if number % 2 else "b", "x", float(number), is_on=number == 509))
-    assert len(history) == MOST_RECORDS
+    assert len(history) == MAX_RECORDS
     assert history.since("a", 500.0) == 5
     last = history.last("a")
     assert last is not None

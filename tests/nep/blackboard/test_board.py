@@ -246,8 +246,8 @@ def test_lives_of_keys_that_are_gone_take_no_room(clock: Clock) -> None:
         board.put(f"x.{number}", 1, lives_s=1e6)
     assert len(board) == 10
     assert board.dropped == 4_990
-    assert len(board._entries._ends) < 1_100
-    assert len(board._entries._end_of) < 1_100
+    assert len(board._entries._expiry_heap) < 1_100
+    assert len(board._entries._expiry_of) < 1_100
     clock.now += 1e6
     assert len(board) == 0
 

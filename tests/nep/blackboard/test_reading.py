@@ -169,7 +169,7 @@ class Walls:
 def kept(board: nep.Blackboard, message: Message, lives_s: float = math.inf) -> None:
     reading = MessageReading("v")
     found = tuple(reading.findings(message.topic, message.payload))
-    board._keep(message, found, lives_s)
+    board._store_message(message, found, lives_s)
 
 
 def test_an_older_message_of_another_writer_does_not_win() -> None:

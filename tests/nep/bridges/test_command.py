@@ -113,7 +113,7 @@ def test_ctrl_c_ends_it_without_a_word_and_its_nodes_are_gone(file, nodes):
         _out, err = program.end()
         assert program.process.returncode == INTERRUPTED
         assert re.fullmatch(
-            r"lab: forwarding between a \(zeromq:127\.0\.0\.1:\d+@.*\) and b \(zenoh:local/bridge-.*\); press Ctrl\+C to stop\n",
+            r"lab: forwarding between a \(zeromq:127\.0\.0\.1:\d+@.*\) and b \(zenoh:local/bridge-.*\); .*\n",
             err,
         )
         for node in nodes:

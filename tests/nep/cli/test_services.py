@@ -123,9 +123,7 @@ def test_what_goes_wrong_is_one_sentence(arm, type_in, tmp_path):
         assert err.count("\n") == 1
     for wrong in ("-1", "nan", "soon"):
         assert type_in("service", "call", SERVICE, "{}", "--timeout", wrong)[0] == 2
-    sentence = (
-        "no service '/arm/mvoe'; did you mean '/arm/move'? 'nep service list' shows all services"
-    )
+    sentence = "no service '/arm/mvoe'; did you mean '/arm/move'? 'nep service list' shows all services"
     assert type_in("service", "info", "/arm/mvoe") == (1, "", f"nep: {sentence}\n")
     assert type_in("service", "info", "bad name")[0] == 1
 

@@ -54,9 +54,7 @@ def test_the_type_of_a_topic_and_the_topics_of_a_type(robot, type_in):
 
 
 def test_what_nobody_has_is_a_sentence_with_the_near_name(robot, type_in):
-    sentence = (
-        "no topic '/odmo'; did you mean '/odom'? 'nep topic list' shows all topics"
-    )
+    sentence = "no topic '/odmo'; did you mean '/odom'? 'nep topic list' shows all topics"
     for command in ("info", "type"):
         assert type_in("topic", command, "/odmo") == (1, "", f"nep: {sentence}\n")
         assert type_in("topic", command, "bad topic")[0] == 1
