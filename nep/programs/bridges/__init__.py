@@ -1,8 +1,8 @@
-"""Bridges: topics of two back ends, or of two networks of one, joined.
+"""Bridges: forwarding of topics between two back ends, or two networks of one.
 
-`configuration` has what a bridge is told and `toml_file` reads it, `bridge` joins two of `side`, a `route`
-carries one topic one way at the pace of `pacer`. `trail` keeps a message from coming back, `other_bridges`
-know who joins the same networks, and `topic_types` as what messages are subscribed and published.
+`configuration` defines a bridge and `toml_file` parses it; `bridge` connects two instances of `side`; a
+`route` forwards one topic in one direction at the rate of `pacer`. `trail` prevents loops, `other_bridges`
+detects bridges between the same networks, and `topic_types` chooses message types.
 """
 
 from nep.programs.bridges.bridge import Bridge

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["Bridge", "check_installed"]
 
 ROUTES_MOST = 500
-"""Patterns find no more topics than these, both ways together."""
+"""Maximum number of routes, in both directions, that patterns create."""
 IDLE_S = 60.0
-"""So long a topic that a pattern found is kept when nobody publishes it any more."""
+"""Time after which a route created by a pattern is removed if its topic has no publisher."""
 _OWN_TOPICS = "/nep/"
 _SLICE_S = 0.05
 _FLUSH_S, _LEAVE_S = 2.0, 0.2
@@ -45,22 +45,20 @@ _logger = logging.getLogger("nep")
 
 
 class Bridge:
-    """Joins what `configuration` says, from when it is made until it is closed; a context manager.
+    """Bridge that forwards the topics of `configuration` until it is closed. Usable as a context manager.
 
-    A network that is not there is waited for, and so is a topic. Raises `NepError` for a back end that is not
-    installed, or does not know a type.
+    Networks and topics that don't exist yet are waited for. Raises `NepError` for a back end that is not
+    installed or does not know a type.
+
+    Args:
+        configuration: The two networks and their topics.
+        allow_moving: Names of robots that may be moved; messages that would move others are dropped and
+            counted as failed. None forwards everything, for programs that check by themselves.
     """
 
     def __init__(
         self, configuration: BridgeConfiguration, *, allow_moving: Collection[str] | None = None
     ) -> None:
-        """Begin to join.
-
-        Args:
-            configuration: The two networks and their topics.
-            allow_moving: Names of the robots that may be moved; what would move another one is not carried
-                and counts as failed. None carries everything: for programs that decide by themselves.
-        """
         self.configuration = configuration
         self.id = secrets.token_hex(8)
         self._own: set[int] = set()
@@ -74,7 +72,7 @@ class Bridge:
         self._warned: set[str] = set()
         self._closed = threading.Event()
         self.own_nodes: frozenset[str] = frozenset()
-        """The ids of its two nodes."""
+        """Ids of the bridge's two nodes."""
         self.sides: dict[SideName, BridgeSide] = {}
         try:
             for name in SIDES:
@@ -97,18 +95,21 @@ class Bridge:
 
     @property
     def routes(self) -> tuple[Route, ...]:
-        """One for each topic and way, those of patterns behind the others."""
+        """Routes, one per topic and direction; those created by patterns come last."""
         return self._routes
 
     @property
     def is_ready(self) -> bool:
-        """Whether the topics that are named are subscribed, where types are known, and both networks seen."""
+        """True if both graphs are known and all named topics of known type are subscribed."""
         return all(each.is_ready for each in self._routes) and all(
             side.view is not None for side in self.sides.values()
         )
 
     def wait_until_ready(self, timeout_s: float | None = None) -> bool:
-        """Wait until it is ready or closed, None without a limit; whether it is ready."""
+        """Wait until the bridge is ready or closed; return whether it is ready.
+
+        `timeout_s` of None waits without limit.
+        """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self.is_ready:
             if self._closed.is_set() or (deadline is not None and time.monotonic() >= deadline):
@@ -117,9 +118,9 @@ class Bridge:
         return True
 
     def refusals(self, timeout_s: float) -> tuple[str, ...]:
-        """Return why named topics are not carried: they move robots that nobody has allowed to move.
+        """Return why named topics are blocked: they move robots without permission.
 
-        Waits `timeout_s` at most until both networks and the descriptions of their robots are known.
+        Waits up to `timeout_s` until both graphs and the descriptions of their robots are known.
         """
         deadline = time.monotonic() + timeout_s
         while not all(side.knows_robots for side in self.sides.values()) and time.monotonic() < deadline:
@@ -128,7 +129,7 @@ class Bridge:
         return tuple(dict.fromkeys(filter(None, refusals)))
 
     def status(self) -> dict[str, object]:
-        """What it joins and what became of the messages, as it is published on `/nep/bridges`."""
+        """Return configuration and message counts, as published on `/nep/bridges`."""
         return {
             "bridge": self.configuration.name,
             "id": self.id,
@@ -183,7 +184,7 @@ class Bridge:
         return RouteEnd(side, told.network, told.backend, name, end.msg_type, end.qos, echoes, guard)
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
-        """Make routes for topics that others publish there and a pattern matches. In the side's thread."""
+        """Create routes for published topics that match a pattern. Runs in the side's thread."""
         self._heed_others()
         self._forget_idle(side, view, time.monotonic())
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
@@ -220,19 +221,20 @@ class Bridge:
                 route.close()
 
     def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Not on side b where both back ends have one graph: their nodes on one topic would miss each other.
+        """Return whether the status is published on this side.
 
-        Side a is there since the first look.
+        If both back ends share one graph, it is published on side a only, because two nodes of one topic
+        would conflict.
         """
         return side.name == "a" or (side.looks > 1 and self.sides["a"].node.id not in view.nodes)
 
     def heard(self, side: SideName, message: Message) -> None:
-        """Another bridge may have told what it joins. In a thread of the side's node."""
+        """Process the status of another bridge. Runs in a thread of the side's node."""
         with suppress(DecodeError):
             self._others.heard(side, message.payload, time.monotonic())
 
     def _heed_others(self) -> None:
-        """Say which messages arrive twice, and let go of what would go round for ever."""
+        # Warns of duplicate messages, and stops routes that would loop.
         keeps_trails = any(
             side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
         )
@@ -264,23 +266,20 @@ class Bridge:
                 try:
                     checked_topic_names(a, b)
                 except NepError:
-                    continue  # its name would be too long there
+                    continue  # the name would be too long on the other side
                 yield topic, a, b
                 return
 
-    # ---- the end
+    # ---- closing
 
     def close(self, timeout_s: float = _FLUSH_S) -> None:
-        """Carry nothing any more; what was carried is delivered first, within `timeout_s`.
-
-        May be called twice.
-        """
+        """Stop forwarding; received messages are delivered first, within `timeout_s`. Idempotent."""
         deadline = time.monotonic() + timeout_s
         self._closed.set()
         for side in self.sides.values():
             side.begin_close()
         for side in self.sides.values():
-            side.join(_LEAVE_S)  # who waits for a master that is not there ends later, with its node
+            side.join(_LEAVE_S)  # a thread waiting for a missing master ends later, with its node
         for route in self._routes:
             route.end_taking()
         self._pacer.close(max(0.1, timeout_s))
@@ -297,7 +296,7 @@ class Bridge:
 
 
 def check_installed(configuration: BridgeConfiguration) -> None:
-    """Raises `NepError` for what is not installed, or a type that its side's back end does not know."""
+    """Raise `NepError` for a back end that is not installed or doesn't know a type."""
     for name in SIDES:
         side = configuration.side(name)
         with Node(configuration.node_name(name), side.backend.name, master=side.master):

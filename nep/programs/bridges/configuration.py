@@ -1,6 +1,6 @@
-"""What a bridge shall join: the values, the names of topics on the other side, and the short form of a line.
+"""Configuration of a bridge, and the short form of the command line.
 
-The form in a file is read by `nep.programs.bridges.toml_file`.
+The file format is parsed by `nep.programs.bridges.toml_file`.
 """
 
 from __future__ import annotations
@@ -41,18 +41,18 @@ SideName = Literal["a", "b"]
 SIDES: tuple[SideName, SideName] = ("a", "b")
 DIRECTIONS: dict[str, Direction] = {"a->b": "a->b", "b->a": "b->a", "both": "both"}
 NODE_PREFIX = "bridge-"
-"""How the names of a bridge's nodes begin."""
+"""Prefix of the names of a bridge's nodes."""
 _WILDCARD = re.compile(r"\*\*|\*")
 _FAR = re.compile(r"(?:^|[/,])(?!127\.|localhost:)[\w.-]+:\d+", re.ASCII)
-"""The address of another computer, or one of this computer that others know, too."""
+"""Address of another computer, or one of this computer that others can reach."""
 _NAME_MOST = 60
 
 
 @dataclass(frozen=True)
 class SideConfiguration:
-    """One of the two networks. `network` is its name for all bridges: see `nep.programs.bridges.trail`.
+    """One of the two networks. `network` identifies it for all bridges: see `nep.programs.bridges.trail`.
 
-    Nodes are made with `backend` and `master`.
+    Nodes are created with `backend` and `master`.
     """
 
     backend: Backend
@@ -62,10 +62,10 @@ class SideConfiguration:
 
 @dataclass(frozen=True)
 class TopicEnd:
-    """A topic, or a pattern of topics, on one side.
+    """Topic or pattern on one side.
 
-    `msg_type` is that under which messages are published and subscribed there, "" when the bridge shall find
-    out. `qos` is one of the back end's words, or "".
+    `msg_type` is the type used for publishing and subscribing there, "" to detect it. `qos` is a profile name
+    of the back end, or "".
     """
 
     name: str
@@ -74,27 +74,27 @@ class TopicEnd:
 
     @property
     def wildcard(self) -> str:
-        """`*` (letters between slashes), `**` (any letters), or "" for the name of one topic."""
+        """Wildcard of the pattern: `*` (within slashes), `**` (any characters), or "" for a topic."""
         found = _WILDCARD.search(self.name)
         return found.group() if found is not None else ""
 
     def part_in(self, topic: str) -> str:
-        """What stands in `topic` for the wildcard; "" when it does not match."""
+        """Return the part of `topic` that the wildcard matches, or "" if the pattern doesn't match."""
         before, wildcard, after = self.name.partition(self.wildcard or "*")
         part = topic.removeprefix(before).removesuffix(after)
         is_whole = wildcard and part and topic == before + part + after
         return part if is_whole and (wildcard == "**" or "/" not in part) else ""
 
     def with_part(self, part: str) -> str:
-        """The topic in which `part` stands for the wildcard."""
+        """Return the topic with `part` in place of the wildcard."""
         return self.name.replace(self.wildcard, part, 1) if self.wildcard else self.name
 
 
 @dataclass(frozen=True)
 class BridgeTopic:
-    """A topic as it is called on both sides; `max_rate_hz` of 0 lets all through.
+    """Topic and its names on both sides; `max_rate_hz` of 0 means unlimited.
 
-    Either both ends have the same wildcard, or none has one.
+    Either both ends have the same wildcard, or neither has one.
     """
 
     a: TopicEnd
@@ -104,22 +104,25 @@ class BridgeTopic:
 
     @property
     def is_pattern(self) -> bool:
-        """Whether it stands for any number of topics."""
+        """True if it stands for any number of topics."""
         return bool(self.a.wildcard)
 
     @property
     def origins(self) -> tuple[SideName, ...]:
-        """The sides from which it is carried."""
+        """Sides from which messages are forwarded."""
         return SIDES if self.direction == "both" else ("a",) if self.direction == "a->b" else ("b",)
 
     def end(self, side: SideName) -> TopicEnd:
-        """Its end on that side."""
+        """Return the end on that side."""
         return self.a if side == "a" else self.b
 
 
 @dataclass(frozen=True)
 class BridgeConfiguration:
-    """All that a bridge is told. Its nodes are called `bridge-NAME-to-BACKEND`, after the other side's."""
+    """Configuration of a bridge.
+
+    Its nodes are named `bridge-NAME-to-BACKEND`, after the other side's back end.
+    """
 
     name: str
     a: SideConfiguration
@@ -127,17 +130,17 @@ class BridgeConfiguration:
     topics: tuple[BridgeTopic, ...]
 
     def side(self, name: SideName) -> SideConfiguration:
-        """One of the two."""
+        """Return the configuration of a side."""
         return self.a if name == "a" else self.b
 
     def node_name(self, side: SideName) -> str:
-        """What the node on that side is called: who looks at its graph learns where topics come from."""
+        """Return the name of the node on that side; it shows in the graph where topics come from."""
         other = self.b if side == "a" else self.a
         return f"{NODE_PREFIX}{self.name}-to-{other.backend.name}"
 
 
 def checked_name(name: str) -> str:
-    """`name` itself when a bridge may have it. Raises `NepError`."""
+    """Return `name` if it is a valid bridge name, else raise `NepError`."""
     check_node_name(f"{NODE_PREFIX}{name}")
     if not name or len(name) > _NAME_MOST:
         raise NepError(_("a bridge's name has 1 to {most} letters; choose another").format(most=_NAME_MOST))
@@ -145,11 +148,11 @@ def checked_name(name: str) -> str:
 
 
 def side_of(backend: str, master: str = "", network: str = "") -> SideConfiguration:
-    """One side; without `master` where this back end's nodes meet by default. Raises `NepError`."""
+    """Return the configuration of a side; without `master`, at the back end's default. Raises `NepError`."""
     found = backend_named(backend)
     try:
         place = found.master(master or None)
-    except ValueError as error:  # also numbers that are none
+    except ValueError as error:  # also invalid numbers
         raise NepError(
             _("'{master}' is no place where nodes of '{backend}' meet; see docs/backends.md").format(
                 master=master, backend=found.name
@@ -166,7 +169,7 @@ def _network(backend: Backend, master: str) -> str:
 
 
 def checked_topic_names(a: str, b: str) -> None:
-    """Raises `NepError` when these cannot be the two names of a topic."""
+    """Raise `NepError` unless these are valid names of one topic on both sides."""
     wildcards = []
     for name in (check_topic(a), check_topic(b)):
         found = _WILDCARD.findall(name)
@@ -186,7 +189,7 @@ def checked_topic_names(a: str, b: str) -> None:
 
 
 def direction_named(name: str) -> Direction:
-    """The direction of this name. Raises `NepError`."""
+    """Return the direction with this name. Raises `NepError`."""
     if name not in DIRECTIONS:
         raise NepError(
             _("'{name}' is no direction; {did_you_mean}").format(
@@ -199,9 +202,9 @@ def direction_named(name: str) -> Direction:
 def join_line(
     a: str, b: str, *, name: str, direction: str = "both", max_rate_hz: float = 0.0
 ) -> BridgeConfiguration:
-    """The configuration of `nep bridge A B`, where each is BACKEND:TOPIC or BACKEND@MASTER:TOPIC.
+    """Return the configuration of `nep bridge A B`; both are BACKEND:TOPIC or BACKEND@MASTER:TOPIC.
 
-    Without a topic (`ros:`) it is called as on the other side. Raises `NepError`.
+    Without a topic (`ros:`) it has the same name as on the other side. Raises `NepError`.
     """
     (a_side, a_topic), (b_side, b_topic) = _side_and_topic(a), _side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic
@@ -214,7 +217,7 @@ def join_line(
 
 
 def check_apart(a: SideConfiguration, b: SideConfiguration) -> None:
-    """Raises `NepError` when both are one network: every message would come back."""
+    """Raise `NepError` if both sides are the same network, in which every message would return."""
     if a.network == b.network:
         raise NepError(
             _("both sides are the network '{network}'; give one of them another back end or master").format(

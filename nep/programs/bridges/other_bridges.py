@@ -1,8 +1,8 @@
-"""Other bridges between the same two networks, known by what they tell on `BRIDGES_TOPIC`.
+"""Detection of other bridges between the same two networks, by their status on `BRIDGES_TOPIC`.
 
-A bridge that is heard on both sides joins the same networks, whatever it calls them. Where it carries a topic
-the same way, each message arrives twice. Where it carries it back and neither network keeps trails, messages
-would go round for ever: then the bridge with the greater id carries that topic no more.
+A bridge seen on both sides connects the same networks, whatever their names. If it forwards a topic in the
+same direction, each message arrives twice. If it forwards it back and neither network carries trails,
+messages would loop: then the bridge with the greater id stops forwarding that topic.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from nep.programs.bridges.configuration import SIDES, SideName
 __all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
 
 HEARTBEAT_S = 5.0
-"""A bridge tells of itself so often at least."""
+"""Maximum interval between two status messages of a bridge."""
 _FORGOTTEN_S = 3 * HEARTBEAT_S
 _MOST = 64
 _ID_MOST = 100
 _ROUTES_MOST = 1000
 
 Way = tuple[SideName, str, str]
-"""From that side of ours, the topic there, and the topic on the other side."""
+"""Origin side, topic there, topic on the other side."""
 
 
 class OtherBridge(NamedTuple):
-    """A bridge between the same networks, and which ways it carries messages, in the words of this bridge."""
+    """Bridge between the same networks, and its routes in terms of our sides."""
 
     id: str
     name: str
@@ -36,7 +36,10 @@ class OtherBridge(NamedTuple):
 
 
 class _Told(NamedTuple):
-    """What was heard of a bridge on one side of ours. `on` is the side of its own on which it said so."""
+    """Status of a bridge received on one of our sides.
+
+    `on` is the side of that bridge on which it was published.
+    """
 
     at: float
     name: str
@@ -45,7 +48,7 @@ class _Told(NamedTuple):
 
 
 class OtherBridges:
-    """Works in any thread. `own` is the id of the bridge itself."""
+    """Tracker of other bridges. Thread-safe. `own` is the id of our bridge."""
 
     def __init__(self, own: str) -> None:
         self._own = own
@@ -53,7 +56,7 @@ class OtherBridges:
         self._told: dict[SideName, OrderedDict[str, _Told]] = {side: OrderedDict() for side in SIDES}
 
     def heard(self, side: SideName, status: object, now: float) -> None:
-        """A bridge told this on that side of ours. Whatever is no bridge's status is ignored."""
+        """Process a status received on that side of ours; invalid ones are ignored."""
         if not isinstance(status, Mapping):
             return
         id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
@@ -69,7 +72,7 @@ class OtherBridges:
                 told.popitem(last=False)
 
     def between(self, now: float) -> list[OtherBridge]:
-        """Those that were heard on both sides lately."""
+        """Return the bridges seen on both sides recently."""
         with self._lock:
             on_a, on_b = ({**self._told[side]} for side in SIDES)
         found = []

@@ -1,4 +1,4 @@
-"""Pace: how many messages a second a route may carry, and a thread that calls when a turn has come."""
+"""Rate limit of a route, and a thread that calls functions at given times."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ _LATE = 0.1
 
 
 class Limit:
-    """`rate_hz` messages a second, evenly: what is late by a tenth of the time between two is caught up."""
+    """Evenly spaced limit of `rate_hz` messages per second.
+
+    Delays up to a tenth of the period are caught up.
+    """
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
         self.next_at = float("-inf")
-        """When there is room for one more."""
+        """Time of the next free slot."""
 
     def has_room(self, now: float) -> bool:
-        """Whether one may go now; it is taken as gone."""
+        """Take the next slot if it is due; return whether it was."""
         if now < self.next_at:
             return False
         self.next_at = max(self.next_at, now - _LATE * self._period_s) + self._period_s
@@ -30,7 +33,7 @@ class Limit:
 
 
 class Pacer:
-    """Calls functions at their time (monotonic, s) in a thread of its own, which the first one starts."""
+    """Timer thread that calls functions at given times (monotonic, s). Started by the first call."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -41,7 +44,7 @@ class Pacer:
         self._is_closed = False
 
     def call_at(self, due: float, call: Callable[[], None]) -> None:
-        """Call it once, then. Never waits."""
+        """Call `call` once at time `due`. Does not block."""
         with self._changed:
             if self._is_closed:
                 return
@@ -52,7 +55,7 @@ class Pacer:
             self._changed.notify()
 
     def close(self, timeout_s: float = 2.0) -> None:
-        """Call nothing any more."""
+        """Stop the thread; pending calls are dropped."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""Route: carries the messages of one topic one way, and counts what becomes of each of them."""
+"""Route: forwards the messages of one topic in one direction, and counts their outcomes."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from nep.text import escaped, shortened
 __all__ = ["Route", "RouteCounts", "RouteEnd"]
 
 HELD_MESSAGES = 10_000
-"""So many wait for the other side, 64 MB at most; then the oldest are dropped and counted."""
+"""Messages buffered for the other side, at most 64 MB; then the oldest are dropped and counted."""
 _HELD_BYTES = 64 * 2**20
 _LATCHED_MOST = 256
-"""Publishers of one topic whose last message is kept each for itself."""
+"""Publishers per topic whose latched message is forwarded by a publisher of its own."""
 _GONE_S = 10.0
-"""Who is not in the graph for so long is gone; a master that was started again knows it sooner."""
+"""Absence from the graph after which a publisher counts as gone; a restarted master relearns it sooner."""
 _PROBLEM_MOST = 300
 
 
 @dataclass(frozen=True)
 class RouteEnd:
-    """A topic on one side, and what that side is. `msg_type` is "" when the bridge shall find out."""
+    """Topic on one side, and that side. `msg_type` is "" to detect it."""
 
     side: SideName
     network: str
@@ -47,18 +47,25 @@ class RouteEnd:
     qos: str = ""
     echoes: Echoes = field(default_factory=Echoes)
     guard: MotionGuard | None = field(default=None, compare=False)
-    """Knows what moves a robot on this side; without it everything is published there."""
+    """Guard of robots on this side; None publishes everything there."""
 
 
 @dataclass(frozen=True)
 class RouteCounts:
-    """What became of the messages so far: `received` are `sent`, `thinned`, `failed`, `dropped` or `waiting`.
+    """Outcomes of messages so far: `received` are `sent`, `thinned`, `failed`, `dropped` or `waiting`.
 
-    `lost`: they did not reach the bridge, and are not among those received; None when nobody can know.
-    `thinned`: a newer one took their place, because there were more than `max_rate_hz`. `failed`: they could
-    not be read, or not be written for the other side; `problem` says why the last one could not. `dropped`:
-    the other side was not there, and there was no more room. `returned`: a bridge had brought them from where
-    they would go, or nobody could know; they are not among those received.
+    Attributes:
+        received: Messages received from the origin.
+        sent: Messages published at the end.
+        bytes: Size of the sent messages.
+        lost: Messages that did not reach the bridge, not included in `received`; None if unknown.
+        thinned: Messages replaced by a newer one because of `max_rate_hz`.
+        failed: Messages that could not be decoded, converted or published; see `problem`.
+        dropped: Messages discarded because the other side was missing and the buffer was full.
+        waiting: Buffered messages.
+        returned: Messages that a bridge had brought from the destination, or might have; not included in
+            `received`.
+        problem: Reason of the last failure.
     """
 
     received: int = 0
@@ -74,7 +81,7 @@ class RouteCounts:
 
 
 class _Ear:
-    """Takes what one subscriber brings: at once, or from when it is opened."""
+    """Sink of one subscriber that forwards at once, or buffers until it is opened."""
 
     def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
         self.is_open = is_open
@@ -103,10 +110,10 @@ class _Ear:
 
 
 class Route:
-    """From `origin` to `end`. It takes messages in threads of the origin's node.
+    """Route from `origin` to `end`. Messages are received in threads of the origin's node.
 
-    The threads of the two sides call `subscribe` and `open_publishers` with their nodes. `bridge` is the
-    bridge's id, `own` the ids of all that it publishes. `wake` is called when `open_publishers` is to be.
+    The threads of the sides call `subscribe` and `open_publishers` with their nodes. `bridge` is the bridge's
+    id, `own` the ids of all its publishers. `wake` requests a call of `open_publishers`.
     """
 
     def __init__(
@@ -124,13 +131,13 @@ class Route:
         self.origin = origin
         self.end = end
         self.is_found = False
-        """Whether a pattern found its topic."""
+        """True if a pattern created the route."""
         self.idle_since: float | None = None
-        """Since when (monotonic, s) nobody else publishes its topic, as far as the bridge has looked."""
+        """Time (monotonic, s) since which the topic has no other publisher, None if it has one."""
         self.troubles: dict[SideName, str] = {}
-        """Why it cannot subscribe or publish at present, by the side on which that is."""
+        """Reasons why it can't subscribe or publish now, by side."""
         self.rival = ""
-        """The bridge that carries its messages instead; then it carries none."""
+        """Name of a bridge that forwards these messages instead; then this route is inactive."""
         self._bridge = bridge
         self._own = own
         self._wake = wake
@@ -155,8 +162,8 @@ class Route:
         self._problem = ""
 
     def counts(self) -> RouteCounts:
-        """What became of the messages so far."""
-        lost = self._lost()  # a back end may have a lock of its own for it
+        """Return the outcomes of messages so far."""
+        lost = self._lost()  # outside of our lock: the back end may take its own
         with self._lock:
             return RouteCounts(
                 self._received,
@@ -177,43 +184,43 @@ class Route:
 
     @property
     def trouble(self) -> str:
-        """Why it cannot subscribe or publish at present; empty when it can."""
+        """Reason why it can't subscribe or publish now, "" if it can."""
         return next(iter(self.troubles.copy().values()), "")
 
     @property
     def is_subscribed(self) -> bool:
-        """Whether messages of its topic come."""
+        """True if its topic is subscribed."""
         return self._subscriber is not None
 
     @property
     def is_ready(self) -> bool:
-        """Whether its messages come, or will when somebody publishes the topic, whose type is not told."""
+        """True if its topic is subscribed, or will be once it has a publisher with a type."""
         return self._subscriber is not None or self._waits_for_type
 
     @property
     def needs_publisher(self) -> bool:
-        """Whether messages wait for a publisher on the other side."""
+        """True if messages wait for a publisher on the other side."""
         return len(self._held) > 0
 
     @property
     def needs_type(self) -> bool:
-        """Whether messages wait, and as what they are published is not decided."""
+        """True if messages wait and the type to publish with is undecided."""
         return self._form is None and not self.end.msg_type and self.needs_publisher
 
     @property
     def refusal(self) -> str:
-        """Why nothing is published on the other side now: it would move a robot that nobody has allowed."""
+        """Reason why publishing is denied now: it would move a robot without permission."""
         if self.end.guard is None:
             return ""
         msg_type = self.end.msg_type if self._form is None else self._form.msg_type
         return self.end.guard.refusal(self.end.topic, msg_type)
 
-    # ---- in the thread of the origin's side
+    # ---- called in the thread of the origin's side
 
     def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
-        """Be subscribed; again when it is found out that the topic has another type.
+        """Subscribe, or subscribe again if the topic turns out to have another type.
 
-        Where the back end has types of its own, as soon as somebody publishes it. Raises `NepError`.
+        If the back end has its own types, wait until the topic has a publisher. Raises `NepError`.
         """
         known = type_in(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
@@ -229,13 +236,13 @@ class Route:
             self._subscribe_again(node, known)
 
     def _subscribe_again(self, node: Node, msg_type: str) -> None:
-        """By another type, unless messages come by this one: some back ends mind, others do not."""
+        # Keeps a subscription that receives messages: not every back end insists on the type.
         old, old_ear = self._subscriber, self._ear
         if old is None or old_ear is None or _has_heard(old):
             return
         ear = _Ear(self._take, is_open=False)
         new = self._new_sub(node, msg_type, ear)
-        if _has_heard(old):  # meanwhile
+        if _has_heard(old):  # a message arrived meanwhile
             ear.mute()
             new.close()
             return
@@ -253,7 +260,7 @@ class Route:
         return node.new_sub(self.origin.topic, msg_type, sink=ear.hear, qos=self.origin.qos, wildcards=False)
 
     def end_taking(self) -> None:
-        """Subscribe no more, and carry at once what waits for its turn."""
+        """Unsubscribe, and forward a rate-limited message at once."""
         with self._lock:
             subscriber, self._limit = self._subscriber, None
         if subscriber is not None:
@@ -261,7 +268,7 @@ class Route:
         self._take_newest()
 
     def close(self) -> None:
-        """End it, while its bridge goes on."""
+        """Close the route while its bridge continues."""
         self.end_taking()
         with self._lock:
             self._is_closed = True
@@ -269,7 +276,7 @@ class Route:
         for publisher in publishers:
             publisher.close()
 
-    # ---- messages come
+    # ---- receiving
 
     def _take(self, messages: Sequence[Message]) -> None:
         for message in messages:
@@ -340,10 +347,10 @@ class Route:
         key = (True, message.publisher)
         return key if key in self._publishers or len(self._publishers) < _LATCHED_MOST else (True, None)
 
-    # ---- in the thread of the end's side
+    # ---- called in the thread of the end's side
 
     def open_publishers(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
-        """Make the publishers that messages wait for, and send these. Raises `NepError`."""
+        """Create the publishers that messages wait for, and send these messages. Raises `NepError`."""
         while True:
             with self._lock:
                 message = self._send_held()
@@ -370,7 +377,7 @@ class Route:
         return self._form
 
     def close_gone(self, origin: GraphView, now: float) -> None:
-        """What was latched goes with its publisher: end what repeats those that are gone from the origin."""
+        """Close publishers of latched messages whose original publisher left the graph."""
         there = origin.topics.get(self.origin.topic)
         ids = {each.id for each in there.publishers} if there is not None else set()
         ended = []
@@ -385,15 +392,15 @@ class Route:
         for publisher in ended:
             publisher.close()
 
-    # ---- messages go
+    # ---- sending
 
     def _send(self, publisher: Publisher, message: Message) -> None:
         form = self._form
-        if form is None:  # `open_publishers` makes it before the first publisher
+        if form is None:  # set by `open_publishers` before the first publisher
             return
         if self.end.guard is not None:
             heard = publisher.subscribers
-            if heard != self._heard.get(publisher):  # a robot may have come
+            if heard != self._heard.get(publisher):  # a robot may have connected
                 self._heard[publisher] = heard
                 self.end.guard.look()
             refusal = self.refusal
@@ -404,13 +411,13 @@ class Route:
             if form.has(message):
                 try:
                     self._publish(publisher, message, Encoded(message.raw, message.extension))
-                except EncodeError:  # the other side takes less of this codec than ours: as a payload it may
+                except EncodeError:  # the other side's codec is stricter: decode and encode again
                     self._publish(publisher, message, form.codec.encode(message.payload))
             else:
                 self._publish(publisher, message, self._converted(publisher, message, form))
         except ClosedError:
             self._dropped += 1
-        except Exception as error:  # noqa: BLE001 - payloads and back ends may be of any kind; others go on
+        except Exception as error:  # noqa: BLE001 - payloads and third-party back ends may raise anything
             self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
 
     def _converted(self, publisher: Publisher, message: Message, form: Form) -> Encoded:
@@ -431,7 +438,7 @@ class Route:
             if publisher.refused == refused:
                 self._count(message)
                 return
-            self._has_room = False  # a back end that did not say so
+            self._has_room = False  # a back end that wrongly claims to support extensions
             refused = publisher.refused
         publisher.publish_bytes(made.data, beside or None)
         if publisher.refused == refused:

@@ -1,4 +1,4 @@
-"""BridgeSide: one of the two networks of a bridge, with the node there and the thread that looks after it."""
+"""One network of a bridge: its node, and the thread that maintains its subscribers and publishers."""
 
 from __future__ import annotations
 
@@ -27,33 +27,33 @@ _STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
 _LOOK_S, _SOON_S = 1.0, 0.05
 _ANSWER_S = 1.0
-"""So long may a master take to answer, and to let something be made."""
+"""Timeout of requests to the master."""
 
 
 class BridgeOfSide(Protocol):
-    """The bridge that a side belongs to."""
+    """Bridge as seen by its sides."""
 
     own_nodes: frozenset[str]
 
     @property
     def routes(self) -> tuple[Route, ...]:
-        """All routes, both ways."""
+        """All routes in both directions."""
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
-        """Told each new graph of a side."""
+        """Process a new graph of a side."""
 
     def status(self) -> dict[str, object]:
-        """What is published of the bridge."""
+        """Return the status to publish."""
 
     def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Whether it tells of itself on that side, and hears other bridges there."""
+        """Return whether the status is published, and other bridges are detected, on that side."""
 
     def heard(self, side: SideName, message: Message) -> None:
-        """A bridge told this on that side; it may be this one."""
+        """Process a status received on that side, possibly our own."""
 
 
 class BridgeSide:
-    """Makes what routes need on this side, as soon as the network is there.
+    """Side of a bridge: creates what routes need as soon as its network is available.
 
     Raises `NepError` for a back end that is not installed.
     """
@@ -69,9 +69,9 @@ class BridgeSide:
         self.configuration = configuration
         self.view: GraphView | None = None
         self.problem = ""
-        """Why the network cannot be used; empty when it can, or when nobody has looked yet."""
+        """Reason why the network is unavailable, "" if it is available or not queried yet."""
         self.looks = 0
-        """How often somebody has answered who is there."""
+        """Number of successful graph queries."""
         self.node = Node(node_name, configuration.backend.name, master=configuration.master, wait_s=_ANSWER_S)
         self.guard = None if allow_moving is None else MotionGuard(self.node, allow_moving)
         self._wanted = threading.Event()
@@ -85,34 +85,34 @@ class BridgeSide:
 
     @property
     def knows_robots(self) -> bool:
-        """Whether the descriptions of all robots that are there were read, or nobody wants to know."""
+        """True if the descriptions of all current robots were read, or there is no guard."""
         if self.guard is None or self.guard.is_settled:
             return True
         if self.view is not None:
-            self.guard.see(self.view)  # descriptions may have come since the last look
+            self.guard.see(self.view)  # descriptions may have arrived since the last poll
         return self.guard.is_settled
 
     def start(self, owner: BridgeOfSide) -> None:
-        """Begin to look after it."""
+        """Start the thread."""
         run = partial(self._run, owner)
         self._thread = threading.Thread(target=run, name=self.node.name, daemon=True)
         self._thread.start()
 
     def wake(self) -> None:
-        """Something is to be made here."""
+        """Wake the thread because a route needs something."""
         self._wanted.set()
 
     def begin_close(self) -> None:
-        """Make nothing any more."""
+        """Create nothing any more."""
         self._is_closing = True
         self._wanted.set()
 
     def join(self, timeout_s: float) -> None:
-        """Wait for the end of its thread."""
+        """Wait for the thread to end."""
         if self._thread is not None:
             self._thread.join(max(0.0, timeout_s))
 
-    # ---- in its thread
+    # ---- run in its thread
 
     def _run(self, owner: BridgeOfSide) -> None:
         while not self._is_closing:
@@ -133,7 +133,7 @@ class BridgeSide:
             self._wanted.wait(max(0.0, look_at - time.monotonic()))
 
     def _deciding(self, owner: BridgeOfSide) -> list[Route]:
-        """Whose type is to be decided: by who is there now, so after another look."""
+        # Their type depends on the current publishers, so the graph is polled first.
         routes = (each for each in owner.routes if each.end.side == self.name)
         return [each for each in routes if each.needs_type and self.name not in each.troubles]
 
@@ -142,7 +142,7 @@ class BridgeSide:
             view = self.node.graph(_ANSWER_S)
         except ClosedError:
             return
-        except Exception as error:  # noqa: BLE001 - back ends of others may raise anything
+        except Exception as error:  # noqa: BLE001 - third-party back ends may raise anything
             said = _said(error)
             if said != self.problem:
                 self.problem = said
@@ -169,10 +169,8 @@ class BridgeSide:
     def _look_after(
         self, owner: BridgeOfSide, view: GraphView, deciding: Sequence[Route], *, is_due: bool
     ) -> None:
-        """Make what routes need here. What could not be made is tried again with the next look.
-
-        `deciding`: those whose first message came before the look, when that is due; others wait for another.
-        """
+        # Failed routes are retried with the next poll. `deciding`: routes whose first message arrived before
+        # the last poll; others wait for the next one.
         for route in owner.routes:
             if self._is_closing:
                 return
@@ -213,7 +211,7 @@ class BridgeSide:
                 owner.heard(self.name, message)
 
         if self._others is None and not self._is_closing:
-            with suppress(NepError):  # with the next look it is tried again
+            with suppress(NepError):  # retried with the next poll
                 self._others = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
 
     def _tell(self, status: dict[str, object]) -> None:

@@ -1,4 +1,4 @@
-"""The file of a bridge: TOML → `BridgeConfiguration`. What is wrong is a sentence with its line and key."""
+"""Bridge file: TOML → `BridgeConfiguration`. Errors name the line and the key."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ a = "/robot/*"
 b = "/r2d2/*"
 direction = "b->a"
 """
-"""What `nep bridge --example` prints."""
+"""Output of `nep bridge --example`."""
 
 _KEYS = ("name", *SIDES, "topics")
 _SIDE_KEYS = ("backend", "master", "network")
@@ -85,12 +85,12 @@ _CHECKED = TypeVar("_CHECKED")
 
 
 def read_configuration(path: Path) -> BridgeConfiguration:
-    """The configuration in a file. Raises `NepError`."""
+    """Read the configuration in a file. Raises `NepError`."""
     shown = escaped(str(path))
     try:
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+    except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise NepError(
             _(
@@ -114,13 +114,13 @@ def read_configuration(path: Path) -> BridgeConfiguration:
 
 
 def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
-    """The configuration in the text of a file at `path`; a bridge without a name is called `stem`.
+    """Parse the configuration in the text of a file at `path`; the default name of the bridge is `stem`.
 
     Raises `NepError`.
     """
     try:
         table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also a number with thousands of digits
+    except (ValueError, RecursionError) as error:  # ValueError also for numbers with thousands of digits
         raise NepError(_toml_sentence(path, text, str(error))) from error
     return _Reader(path, text).configuration(table, stem)
 
@@ -135,9 +135,9 @@ def _toml_sentence(path: str, text: str, said: str) -> str:
 
 
 class _Reader:
-    """Turns tables into values, and knows where in the text each key is.
+    """Converter of TOML tables that knows the line of each key.
 
-    `where` is the name of a table, "" for the root; `number` tells which of the `[[topics]]`.
+    `where` is the name of a table, "" for the root; `number` is the index of the `[[topics]]` table.
     """
 
     def __init__(self, path: str, text: str) -> None:
@@ -245,7 +245,7 @@ class _Reader:
         return float(value)
 
     def _check_once(self, topics: Sequence[BridgeTopic]) -> None:
-        """No topic goes the same way twice: all would arrive twice."""
+        # Messages of a topic that is listed twice would arrive twice.
         known: set[tuple[SideName, str, str]] = set()
         for number, topic in enumerate(topics):
             for side in topic.origins:
@@ -261,7 +261,7 @@ class _Reader:
                     )
                 known.add(way)
 
-    # ---- keys, texts, and where they are
+    # ---- keys, values and their lines
 
     def _check_keys(
         self, table: Mapping[str, Any], known: Sequence[str], where: str, number: int = 0

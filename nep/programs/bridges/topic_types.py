@@ -1,4 +1,4 @@
-"""Topics' types at both ends of a bridge: as what a topic is subscribed, and as what it is published."""
+"""Message types at both ends of a bridge: for subscribing and for publishing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Form", "default_type", "type_for", "type_in"]
 
 _DEFAULT_TYPE = "json"
 _NO_MAPS = frozenset({"string", "bytes", "image"})
-"""Codecs whose payloads have no fields, and so are none of a back end's own types."""
+"""Codecs whose payloads have no fields, and so don't fit a back end's own types."""
 _UNKNOWN = frozenset({"", "*"})
 
 
 class Form:
-    """How messages are written on the other side."""
+    """Encoding of messages on the other side."""
 
     def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
         self.msg_type = msg_type
@@ -30,14 +30,14 @@ class Form:
             self.encode = JsonEncoder(topic).encode
 
     def has(self, message: Message) -> bool:
-        """Whether a message has it already. A codec of a back end's own says nothing without the type."""
+        """Return whether a message already has this form; a back end's own codec must also match the type."""
         if message.codec != self.codec.name:
             return False
         return message.codec in CODECS or message.msg_type == self.msg_type
 
 
 def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
-    """The type under which others publish a topic; "" when nobody does."""
+    """Return the type under which other nodes publish a topic, or "" if none does."""
     known = view.topics.get(topic)
     if known is None or all(each.node_id in own_nodes for each in known.publishers):
         return ""
@@ -45,15 +45,16 @@ def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
 
 
 def default_type(backend: Backend) -> str:
-    """As what a topic is subscribed that nobody publishes; "" where the type would decide what is read."""
+    """Return the type for subscribing to an unpublished topic; "" if the back end needs the real one."""
     return _DEFAULT_TYPE if backend.codec_for is codec_for else ""
 
 
 def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_nodes: Collection[str]) -> str:
-    """As what messages such as this one are published on a topic of `backend` whose type is not told.
+    """Return the type for publishing messages like `message` on a topic without configured type.
 
-    As what others have there, when only this back end knows that type and the message may be a map, or they
-    publish and its codec is the same: a topic shall not have two types. Else as what it is.
+    It is the type of the topic there if only this back end knows that type and the message may be a map, or
+    if it is published with the same codec, because a topic must not have two types. Else it is the message's
+    own type.
     """
     own = _kept_type(message, backend)
     if known is None or known.msg_type in _UNKNOWN:
@@ -70,10 +71,8 @@ def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_no
 
 
 def _kept_type(message: Message, backend: Backend) -> str:
-    """Its own type, unless that would change its form: a picture of ROS's type is an `image` elsewhere.
-
-    Also one that the back end should know and does not: then it says so.
-    """
+    # A message keeps its type unless that would change its codec: an image of a ROS type is an `image`
+    # elsewhere. A type that the back end should know but doesn't is kept, so that the back end reports it.
     is_kept = message.codec not in CODECS or _codec_name(backend, message.msg_type) in {"", message.codec}
     return message.msg_type if is_kept else message.codec
 

@@ -1,8 +1,8 @@
-"""Trails: where a message has been, so that no bridge brings it back there.
+"""Trails: the networks that a message has passed, so that no bridge sends it back.
 
-A bridge writes the trail beside what it publishes, in the message's extension under the key "bridge":
-`{"networks": [...], "bridges": [...]}`, all networks on which it has been, in this order, and the ids
-of all bridges that carried it. Where a back end has no room for that, `Echoes` know what was just sent.
+A bridge stores the trail in the message's extension under the key "bridge": `{"networks": [...], "bridges":
+[...]}`, the networks passed in order, and the ids of all bridges. For back ends without extensions, `Echoes`
+remembers recently sent messages.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ __all__ = ["TRAIL_KEY", "Echoes", "Trail", "read_trail"]
 
 TRAIL_KEY = "bridge"
 HOPS_MOST = 16
-"""No message goes over more bridges: who joins that many networks in a row has made a ring."""
+"""Maximum number of bridges that a message passes; longer chains are loops."""
 ECHO_S = 5.0
-"""What has not come back by then does not come back."""
+"""Time after which an echo is no longer expected."""
 _WORD_MOST = 400
 _ECHOES_MOST = 4096
 
 
 class Trail(NamedTuple):
-    """Where a message has been."""
+    """Networks and bridges that a message has passed."""
 
     networks: tuple[str, ...] = ()
     bridges: tuple[str, ...] = ()
 
     def may_go(self, network: str, bridge: str) -> bool:
-        """Whether this bridge may carry it into this network."""
+        """Return whether this bridge may forward it into this network."""
         return network not in self.networks and bridge not in self.bridges and len(self.bridges) < HOPS_MOST
 
     def carried(self, origin: str, network: str, bridge: str) -> Trail:
-        """The trail of the message that this bridge carries from `origin` into `network`."""
+        """Return the trail after this bridge forwards the message from `origin` into `network`."""
         been = self.networks if origin in self.networks else (*self.networks, origin)
         return Trail((*been, network), (*self.bridges, bridge))
 
     def to_plain(self) -> dict[str, object]:
-        """Its form in an extension."""
+        """Convert to the form in an extension."""
         return {"networks": list(self.networks), "bridges": list(self.bridges)}
 
 
 def read_trail(extension: Mapping[str, object]) -> Trail:
-    """The trail in an extension; an empty one when there is none, or what is there is none."""
+    """Return the trail in an extension; an empty one if it is missing or invalid."""
     found = extension.get(TRAIL_KEY)
     if not isinstance(found, Mapping):
         return Trail()
@@ -59,11 +59,11 @@ def _words(found: object) -> tuple[str, ...]:
 
 
 class Echoes:
-    """What a bridge just sent on one topic of a network that tells nobody who publishes.
+    """Recently sent messages of a topic in a network that doesn't identify publishers.
 
-    Such a message comes back without a sign of its origin. It is known by its bytes, once for each time that
-    it was sent, within `ECHO_S`: so an equal message of somebody else is taken for an echo only when the echo
-    itself did not come. Works in any thread.
+    A message that comes back has no sign of its origin. It is recognized by its bytes, once per time sent,
+    within `ECHO_S`: an equal message of another publisher is mistaken for an echo only if the echo itself is
+    missing. Thread-safe.
     """
 
     def __init__(self) -> None:
@@ -72,14 +72,14 @@ class Echoes:
         self._are_needed = True
 
     def not_needed(self) -> None:
-        """The network tells who publishes: nothing has to be remembered."""
+        """Stop remembering: the network identifies publishers."""
         if self._are_needed:
             self._are_needed = False
             with self._lock:
                 self._sent.clear()
 
     def sent(self, data: bytes | memoryview, now: float) -> None:
-        """It is sent now."""
+        """Remember a message that is being sent."""
         if self._are_needed:
             key = _digest(data)
             with self._lock:
@@ -89,7 +89,7 @@ class Echoes:
                     self._sent.popitem(last=False)
 
     def is_echo(self, data: bytes | memoryview, now: float) -> bool:
-        """Whether it was sent and comes back; it is forgotten then."""
+        """Return whether this message was sent and is coming back; forget it then."""
         key = _digest(data)
         with self._lock:
             count, at = self._sent.pop(key, (0, 0.0))

@@ -1,5 +1,5 @@
-"""The gateway: programs of the original NEP, all three wire generations, joined to the native graph.
+"""Gateway: lets programs of the original NEP (all three wire generations) join the native graph.
 
-`gateway` is the thread that does it all; what belongs to which wire generation is in `framing` and
+`gateway` is the thread that runs everything; the formats of the wire generations are in `framing` and
 `requests`.
 """

@@ -1,6 +1,6 @@
-"""The gateway as something that lives with a master, and the native network as the gateway uses it.
+"""Gateway as an attachment of a master, and its access to the native network.
 
-`NativeNetwork` has a native node of its own, shows the originals in the graph, and tells their alerts.
+`NativeNetwork` has a native node, registers original programs in the graph and reports their alerts.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ else:
     psutil = lazy_module("psutil")
 
 _WAIT_S = 3.0
-"""A master that has just started keeps newcomers waiting for a second."""
+"""A master that has just started delays new nodes by a second."""
 
 _AGAIN_S = 1.0
-"""A topic that could not be joined is tried again after this: trying costs the gateway's thread time."""
+"""Pause before a failed topic is retried; each attempt blocks the gateway's thread."""
 _ALERTS_MAX = 200
 _Made = TypeVar("_Made", Publisher, Subscriber)
 
 
 class GatewayAttachment:
-    """Joins programs of the original NEP to the master that it is attached to (`Attachment`).
+    """Attachment that lets programs of the original NEP join its master (`Attachment`).
 
-    `file` keeps who has which ports; by default it lies where the system keeps such files.
+    `file` stores the ports of programs; by default it is in the system's folder for state files.
     """
 
     def __init__(self, file: Path | None = None, ports: Ports | None = None) -> None:
@@ -59,7 +59,7 @@ class GatewayAttachment:
         self._gateway: Gateway | None = None
 
     def start(self, master: Master) -> None:
-        """Start the gateway. A port that is taken is an alert, not an error."""
+        """Start the gateway. A port in use is reported as an alert, not raised."""
         allow_many()
         address = master.address
 
@@ -70,7 +70,7 @@ class GatewayAttachment:
             try:
                 return master.submit(request)
             except (ClosedError, WaitTimeoutError):
-                return None  # the master is ending, and the graph with it
+                return None  # the master is closing
 
         def report(alerts: tuple[Alert, ...]) -> None:
             submit(ReportAlerts("gateway", alerts))
@@ -81,20 +81,20 @@ class GatewayAttachment:
         self._gateway.start()
 
     def changed(self, view: GraphView) -> None:
-        """The graph has changed; the gateway follows its own sockets instead."""
+        """Ignore graph changes: the gateway polls its own sockets."""
 
     def close(self) -> None:
-        """End the gateway and give its ports back."""
+        """Stop the gateway and release its ports."""
         if self._gateway is not None:
             self._gateway.close()
             self._gateway = None
 
 
 class NativeNetwork:
-    """The native network as the gateway uses it (see `GatewayNetwork`).
+    """Native network of the gateway (see `GatewayNetwork`).
 
-    `make_node` joins the network; it is called when the first topic is carried over, so that a master without
-    original programs has no node of a gateway.
+    `make_node` joins the network when the first topic is forwarded, so that a master without original
+    programs has no gateway node.
     """
 
     def __init__(
@@ -115,14 +115,14 @@ class NativeNetwork:
         self._again_at: dict[str, float] = {}
         self._dropped = 0
 
-    # ---- the network
+    # ---- messages
 
     def start(self, inbox: NativeInbox) -> None:
-        """See `GatewayNetwork`."""
+        """Post native messages to `inbox` from now on."""
         self._inbox = inbox
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """See `NativeSide`."""
+        """Publish data of an original program, creating the publisher if needed."""
         self._listing.count((topic, codec), len(data))
         publisher = self._publishers.get((topic, codec))
         if publisher is None:
@@ -134,13 +134,13 @@ class NativeNetwork:
         publisher.publish_bytes(data, image_codec.picture_info(data) if codec == "image" else None)
 
     def stop_publishing(self, topic: str, codec: str) -> None:
-        """See `NativeSide`."""
+        """Close the publisher of a topic."""
         publisher = self._publishers.pop((topic, codec), None)
         if publisher is not None:
             publisher.close()
 
     def subscribe(self, topic: str, codec: str) -> bool:
-        """See `NativeSide`."""
+        """Subscribe to a topic; return False if that failed."""
         subscriber = self._try(
             topic, lambda node: node.new_sub(topic, codec, sink=self._arrived, wildcards=False)
         )
@@ -150,18 +150,18 @@ class NativeNetwork:
         return True
 
     def unsubscribe(self, topic: str, codec: str) -> None:
-        """See `NativeSide`."""
+        """Close the subscriber of a topic."""
         subscriber = self._subscribers.pop((topic, codec), None)
         if subscriber is not None:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """See `GatewayNetwork`."""
+        """Return the bytes that original programs can decode: for images JPEG or PNG; None if impossible."""
         if message.codec != "image":
             return message.data
         try:
             if image_codec.raw_layout(message.extension.get("encoding")) is None:
-                examine(message.data)  # the originals decode whatever they get, a bomb as well
+                examine(message.data)  # reject decompression bombs: original programs decode anything
                 return message.data
             made = image_codec.encode(message.payload)
             if image_codec.raw_layout((made.extension or {}).get("encoding")) is not None:
@@ -177,7 +177,7 @@ class NativeNetwork:
             return None
 
     def _arrived(self, messages: Sequence[Message]) -> None:
-        """Called in the node's thread: what did not come from here goes to the gateway's thread."""
+        # Runs in the node's thread: posts messages of other publishers to the gateway's thread.
         if self._inbox is not None:
             for message in messages:
                 if message.publisher not in self._own:
@@ -208,14 +208,14 @@ class NativeNetwork:
         self.resolve(id)
         return made
 
-    # ---- the graph and the alerts
+    # ---- graph and alerts
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """See `GatewayNetwork`."""
+        """Register these original programs in the graph."""
         self._listing.show(programs)
 
     def look(self) -> None:
-        """See `GatewayNetwork`."""
+        """Send statistics to the master and report dropped messages. Call once a second."""
         self._listing.renew()
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
@@ -232,19 +232,19 @@ class NativeNetwork:
             self.resolve("gateway:full")
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
-        """See `AlertSink`."""
+        """Report a problem as an alert; repeating it has no effect."""
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _ALERTS_MAX):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 
     def resolve(self, id: str) -> None:
-        """See `AlertSink`."""
+        """Remove an alert."""
         if self._alerts.pop(id, None) is not None:
             self._report(tuple(self._alerts.values()))
 
     def close(self) -> None:
-        """See `GatewayNetwork`."""
+        """Remove the original programs from the graph and close the node."""
         self._listing.close()
         if self._node is not None:
             self._node.close()

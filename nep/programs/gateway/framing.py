@@ -1,9 +1,8 @@
-"""How the original NEP writes a datum into its one frame, and how to read it back. Pure functions.
+"""Frame formats of the original NEP, and their conversion to native codecs. Pure functions.
 
-The originals never agreed on one form. Depending on the version and on the type of the topic, a frame is
-*prefixed* (`topic {"a":1}`) or *bare* (`{"a": 1}`). Inside, the bytes are those of a native codec, except for
-pictures, which the originals write as base64 of a JPEG. Translating is therefore taking the prefix away or
-putting it there, and nothing is decoded.
+Depending on the version and the type of the topic, a frame is *prefixed* (`topic {"a":1}`) or *bare* (`{"a":
+1}`). The rest are the bytes of a native codec, except for images, which are base64 of a JPEG. So converting
+means removing or adding the prefix; nothing is decoded.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from nep.i18n import _
 Framing = Literal["prefixed", "bare"]
 
 PORT_A = 7000
-"""Where programs up to 0.5.4.5, nep-js and C# ask for a topic."""
+"""Request port of programs up to 0.5.4.5, nep-js and C#."""
 PORT_B = 50000
-"""Where programs from 0.5.4.6 on ask."""
+"""Request port of programs from 0.5.4.6 on."""
 
 _CODECS = {
     "json": "json",
@@ -40,17 +39,17 @@ _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
 
 
 def codec_of(msg_type: str) -> str:
-    """The native codec of an original's `msg_type`; what the originals do not know travels as JSON."""
+    """Return the native codec of an original `msg_type`; unknown types are JSON."""
     return _CODECS.get(msg_type, "json")
 
 
 def framing_of(port: int, msg_type: str) -> Framing:
-    """The framing used by a program that asks at `port` (7000 or 50000) for a topic of `msg_type`."""
+    """Return the framing of a program that uses request port `port` for a topic of `msg_type`."""
     return "prefixed" if has_prefix("A" if port == PORT_A else "B", msg_type) else "bare"
 
 
 class FrameError(ValueError):
-    """A frame that nobody can read; `version` names the release of NEP that writes such frames, if known."""
+    """Invalid frame; `version` is the release of NEP that writes such frames, if known."""
 
     def __init__(self, sentence: str, version: str | None = None) -> None:
         super().__init__(sentence)
@@ -59,7 +58,7 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True)
 class Shape:
-    """How frames of one topic look to one kind of original program."""
+    """Frame format of one topic for one kind of original program."""
 
     topic: str
     framing: Framing
@@ -67,11 +66,11 @@ class Shape:
 
     @property
     def prefix(self) -> bytes:
-        """What stands before the datum: the topic and a space, or nothing."""
+        """Prefix of each frame: the topic and a space, or nothing."""
         return f"{self.topic} ".encode() if self.framing == "prefixed" else b""
 
     def read(self, frame: bytes) -> bytes:
-        """The datum in `frame`, as bytes of the native codec. Raises `FrameError`."""
+        """Convert a frame to bytes of the native codec. Raises `FrameError`."""
         data = self._strip(frame)
         if self.codec == "image":
             return _from_base64(data)
@@ -80,18 +79,21 @@ class Shape:
         return data
 
     def write(self, data: bytes | memoryview) -> bytes:
-        """The frame that says `data`, which are bytes of the native codec."""
+        """Convert bytes of the native codec to a frame."""
         body = base64.b64encode(data) if self.codec == "image" else data
         return b"".join((self.prefix, body))
 
     def wants(self, subscription: bytes) -> bool:
-        """Whether a subscriber with this ZeroMQ filter gets any frame of this shape."""
+        """Return whether a subscriber with this ZeroMQ filter receives frames of this shape."""
         if self.framing == "prefixed":
             return self.prefix.startswith(subscription) or subscription.startswith(self.prefix)
         return not self.is_from_0546(subscription)
 
     def is_from_0546(self, subscription: bytes) -> bool:
-        """Whether this filter gives nep 0.5.4.6 away: it names the topic where frames are bare."""
+        """Return whether this filter belongs to nep 0.5.4.6.
+
+        That version filters by topic although its frames are bare.
+        """
         return self.framing == "bare" and bool(subscription) and self.topic.encode().startswith(subscription)
 
     def _strip(self, frame: bytes) -> bytes:
@@ -120,16 +122,16 @@ class Shape:
 
 
 def lost_numbers(frame: bytes, data: bytes) -> bool:
-    """Whether NaN or infinity in `frame` has become `null` in `data`, which was read from it."""
+    """Return whether NaN or infinity in `frame` became `null` in `data`."""
     return _NOT_A_NUMBER.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
 
 def shield_javascript(data: bytes, topic: str) -> bytes:
-    r"""The same JSON without the topic's text in it.
+    r"""Escape occurrences of the topic in JSON.
 
-    nep-js cuts a frame at every occurrence of the topic and parses the second piece, so a payload that
-    names its own topic ends the program. In JSON a letter can be written as `\uXXXX`, which every reader
-    undoes.
+    nep-js splits a frame at every occurrence of the topic and parses the second piece, so a payload that
+    contains its own topic would crash the program. The first character is written as ``\uXXXX``, which JSON
+    readers decode.
     """
     word = topic.encode()
     if not word or word not in data:
@@ -152,7 +154,7 @@ def shield_javascript(data: bytes, topic: str) -> bytes:
 
 
 def shield_csharp(data: bytes) -> bytes:
-    """The same JSON without a space: C# cuts the frame at spaces and keeps the second piece only."""
+    """Remove or escape spaces in JSON: C# splits the frame at spaces and keeps the second piece only."""
     if not any(space in data for space in (b" ", b"\n", b"\t", b"\r")):
         return data
     return _JSON_TOKEN.sub(
@@ -184,10 +186,10 @@ def _without_nan(data: bytes) -> bytes:
     try:
         value = json.loads(data, parse_constant=lambda _: None, parse_float=_finite)
     except (ValueError, RecursionError):
-        return data  # the words stood in something else; whoever decodes it will say so
+        return data  # not valid JSON: the subscriber's decoder reports it
     try:
         return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()
-    except UnicodeEncodeError:  # half a letter, which JSON can only write as its number
+    except UnicodeEncodeError:  # half of a surrogate pair: only possible as an ASCII escape
         return json.dumps(value, separators=(",", ":")).encode()
 
 

@@ -1,4 +1,4 @@
-"""The gateway's thread: it answers the originals, lets the relay work, and tells the graph who is there."""
+"""Thread of the gateway: replies to original programs, relays messages and updates the graph."""
 
 from __future__ import annotations
 
@@ -24,39 +24,39 @@ from nep.system.descriptors import SPARE, has_room
 from nep.system.forks import give_up, watch
 
 _LOOK_S = 1.0
-"""How often programs that ended are looked for, and taken ports are tried again."""
+"""Interval at which ended programs are removed and ports in use are retried."""
 _MAX_SOCKETS = 8192
 _PAIR_FILES = 20
 _PAUSE_S = 0.2
 _PROGRAMS_MAX = 2000
-"""So many programs and topics are remembered: everything asked is written to the file again."""
+"""Limit of registrations: each request rewrites the file with all of them."""
 _logger = logging.getLogger("nep.programs.gateway")
 
 
 class GatewayNetwork(NativeSide, AlertSink, Protocol):
-    """All that the gateway needs of the native network; it is called in the gateway's thread."""
+    """Native network as used by the gateway, in the gateway's thread."""
 
     def start(self, inbox: NativeInbox) -> None:
-        """Join the native network; what native programs publish is posted to `inbox`."""
+        """Join the native network; native messages are posted to `inbox`."""
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """What originals can read of a native message: bytes of its codec, for pictures a JPEG or PNG."""
+        """Return the bytes that original programs can decode: for images JPEG or PNG; None if impossible."""
 
     def look(self) -> None:
-        """A second has passed."""
+        """Called once a second."""
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """These are the original programs now."""
+        """Register the original programs in the graph."""
 
     def close(self) -> None:
         """Leave the native network."""
 
 
 class Gateway:
-    """Programs of the original NEP, joined to `outside`. One thread; binds on the loopback address only.
+    """Gateway of original NEP programs to `outside`. One thread; binds to the loopback address only.
 
-    `file` keeps who has which ports, so that a gateway that comes back finds everybody again; `boot` is when
-    this computer was started.
+    `file` stores the ports of programs, so that they keep working after a restart of the gateway; `boot` is
+    the boot time of this computer (s since 1970).
     """
 
     def __init__(
@@ -88,19 +88,19 @@ class Gateway:
         watch(self)
 
     def forked(self) -> None:
-        """In a child: the originals' ports are the parent's. See `nep.system.forks`."""
+        """Release inherited ports in a forked child. See `nep.system.forks`."""
         for port in self._request_server.ports:
             give_up(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):
             give_up(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
 
     def start(self, timeout_s: float = 5.0) -> bool:
-        """Start the thread; whether originals are answered within `timeout_s`."""
+        """Start the thread; return whether requests are served within `timeout_s`."""
         self._thread.start()
         return self._ready.wait(timeout_s)
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """End the thread and give all ports back."""
+        """Stop the thread and release all ports."""
         self._ending.set()
         self._inbox.wake()
         if self._thread.ident is not None:
@@ -124,7 +124,7 @@ class Gateway:
             self._context.term()
 
     def _step_safely(self) -> None:
-        """One step. A mistake of ours in one topic must not end all others: it is logged."""
+        # An error in one topic must not stop the others.
         try:
             self._step()
         except Exception:
@@ -180,7 +180,7 @@ class Gateway:
         self._outside.look()
 
     def _who(self, line: TopicLine, role: Role) -> tuple[str, ...]:
-        return self._programs.names(line, role)  # made after the relay, whose pairs it looks at
+        return self._programs.names(line, role)  # created after the relay, whose pairs it uses
 
     def _unserved(self) -> dict[TopicLine, dict[Role, str]]:
         return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
@@ -192,7 +192,7 @@ class Gateway:
         self._request_server.tell(self._programs.members())
 
     def _restore(self) -> None:
-        """Bind again what programs that are still there were told: they never ask a second time."""
+        # Binds the ports of running programs again: they never ask twice.
         self._programs.forget_the_gone()
         for line in {known.line for known in self._known.registrations if not known.line.is_service}:
             base = self._known.port_of(line)
@@ -206,7 +206,6 @@ class Gateway:
                 )
 
     def _decide(self, request: Request) -> int:
-        """The port for a request, which is noted and kept. Raises `RequestError`."""
         codec = "service" if request.is_service else request.codec
         line = TopicLine(request.topic, request.framing, codec, request.mode)
         if line.is_service:

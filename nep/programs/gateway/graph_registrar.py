@@ -1,4 +1,4 @@
-"""The original programs in the master's graph: as nodes of generation A or B, with rates per topic."""
+"""Registration of original programs in the master's graph, as nodes of generation A or B with rates."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _NAME_MAX = 100
 
 @dataclass
 class _Count:
-    """What original programs have published on one topic."""
+    """Number and size of the messages that original programs published on one topic."""
 
     messages: int = 0
     bytes: int = 0
@@ -50,10 +50,10 @@ class _Count:
 
 
 class GraphRegistrar:
-    """Keeps the graph's picture of the originals. `submit` carries a request out in the master.
+    """Registrar of original programs. `submit` runs a request in the master.
 
-    Nobody can tell which of several originals on a topic a message came from: the first of them carries the
-    topic's statistics.
+    It is unknown which of several original programs on a topic published a message: the first one is assigned
+    the topic's statistics.
     """
 
     def __init__(
@@ -72,14 +72,14 @@ class GraphRegistrar:
         self._carriers: dict[int, Key] = {}
 
     def count(self, key: Key, size_bytes: int) -> None:
-        """An original has published on this topic."""
+        """Count a message that an original program published."""
         counted = self._counts.setdefault(key, _Count())
         counted.messages += 1
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """These originals are there now; what has changed is told to the master."""
+        """Register these programs, and remove the others."""
         wanted = {program.node_id: self._record(program) for program in programs}
         for node_id in [known for known in self._shown if known not in wanted]:
             del self._shown[node_id]
@@ -93,7 +93,7 @@ class GraphRegistrar:
         self._choose_carriers(programs)
 
     def renew(self) -> None:
-        """Tell the master what was counted."""
+        """Send the statistics to the master."""
         for node_id, join in self._shown.items():
             publishers = tuple(self._counted(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
@@ -101,7 +101,7 @@ class GraphRegistrar:
             self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers, load))
 
     def close(self) -> None:
-        """Take them all out."""
+        """Remove all programs."""
         self.show(())
 
     def _load(self, node_id: str, pid: int | None) -> float | None:
@@ -118,7 +118,7 @@ class GraphRegistrar:
             program.node_id,
             shortened(
                 escaped(program.name), _NAME_MAX
-            ),  # cleaned, for an original cannot be told to change it
+            ),  # escaped: an original program can't be made to choose a valid name
             socket.gethostname(),
             program.pid,
             _LANGUAGES.get(language, escaped(language)),
@@ -173,7 +173,7 @@ def _type(link: TopicLink) -> str:
 
 
 def _id(program: OriginalProgram, link: TopicLink) -> int:
-    """A number for a publisher or subscriber that has none of its own; the same after a restart."""
+    # Stable id for a publisher or subscriber that has none.
     text = f"{program.node_id}\0{link.role}\0{link.topic}\0{link.codec}"
     digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()
     return int.from_bytes(digest, "big") >> 1 or 1

@@ -1,4 +1,4 @@
-"""What native threads hand to the gateway's thread: a bounded queue that wakes a poll."""
+"""Bounded queue from native threads to the gateway's thread that wakes a poll."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MAX_BYTES = 64 * 1024 * 1024
 
 
 class NativeInbox:
-    """Any thread posts, one thread takes. When it is full the newest is refused and counted."""
+    """Bounded queue for many writers and one reader; when full, new messages are dropped and counted."""
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
         self._lock = threading.Lock()
@@ -28,16 +28,16 @@ class NativeInbox:
         self._bell.setblocking(False)
 
     def fileno(self) -> int:
-        """What a poll watches: readable when something was posted."""
+        """Return the descriptor that becomes readable when a message is posted."""
         return self._ear.fileno()
 
     @property
     def dropped(self) -> int:
-        """How many were refused because the queue was full."""
+        """Number of messages dropped because the queue was full."""
         return self._dropped
 
     def post(self, message: Message) -> None:
-        """Queue one message and wake the reader."""
+        """Queue a message and wake the reader."""
         size = message.size_bytes
         with self._lock:
             if len(self._waiting) >= self._max_messages or self._size_bytes + size > self._max_bytes:
@@ -50,12 +50,12 @@ class NativeInbox:
             self.wake()
 
     def wake(self) -> None:
-        """Make the reader look, also when nothing was posted."""
-        with contextlib.suppress(OSError):  # a full bell rings already, a closed one has no listener
+        """Wake the reader even if nothing was posted."""
+        with contextlib.suppress(OSError):  # full: the reader is already woken; closed: there is none
             self._bell.send(b"\x00")
 
     def take(self) -> list[Message]:
-        """Everything that was posted, oldest first."""
+        """Remove and return all messages, oldest first."""
         with contextlib.suppress(BlockingIOError):
             self._ear.recv(4096)
         with self._lock:
@@ -65,6 +65,6 @@ class NativeInbox:
         return taken
 
     def close(self) -> None:
-        """Give the two handles back."""
+        """Close the two sockets."""
         self._ear.close()
         self._bell.close()

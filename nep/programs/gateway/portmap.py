@@ -1,4 +1,4 @@
-"""Which topic of the originals has which ports, and who asked; in a file, for originals never ask twice."""
+"""Ports of original topics and their programs, stored in a file, because original programs never ask twice."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _SAME_BOOT_S = 120.0
 
 @dataclass(frozen=True, order=True)
 class TopicLine:
-    """What has a pair of ports of its own: one topic, in one form, joined in one way.
+    """Key of a pair of ports: a topic, its frame format, and its connection mode.
 
-    `codec` is "service" for clients and servers, whose bytes are not translated.
+    `codec` is "service" for clients and servers, whose bytes are not converted.
     """
 
     topic: str
@@ -36,13 +36,13 @@ class TopicLine:
 
     @property
     def is_service(self) -> bool:
-        """Whether the line belongs to clients and servers."""
+        """True if the line belongs to clients and servers."""
         return self.codec == "service"
 
 
 @dataclass(frozen=True)
 class Registration:
-    """One original program asked for one line; `started` is when its process began, if there is one."""
+    """Request of one original program for a line; `started` is the start time of its process, if known."""
 
     line: TopicLine
     node: str
@@ -55,16 +55,15 @@ class Registration:
 
     @property
     def node_id(self) -> str:
-        """Tells nodes apart, also those of one name."""
+        """Unique id of the node; nodes of the same name differ by process id."""
         return f"original:{escaped(self.node)}:{self.pid if self.pid is not None else '-'}"
 
 
 class PortMap:
-    """The lines that have ports and the programs that asked for them.
+    """Ports of lines, and the programs that asked for them.
 
-    `save()` writes the file in one step, so that a killed master leaves either the old one or the new one.
-    Ports of lines that nobody uses any more stay theirs until the range is full. `boot` is when this computer
-    was started: no program that asked before then is still there.
+    `save` replaces the file atomically. Unused lines keep their ports until the range is full. `boot` is the
+    boot time of this computer: registrations from before are invalid.
     """
 
     def __init__(self, file: Path | None, boot: float = 0.0) -> None:
@@ -77,37 +76,37 @@ class PortMap:
 
     @property
     def registrations(self) -> tuple[Registration, ...]:
-        """Everything asked for and not given up, oldest first."""
+        """Current registrations, oldest first."""
         return tuple(self._registrations.values())
 
     @property
     def lines(self) -> Mapping[TopicLine, int]:
-        """The base port of each known line."""
+        """Base port of each known line."""
         return self._ports
 
     def port_of(self, line: TopicLine) -> int | None:
-        """The base port of `line`, if it has one."""
+        """Return the base port of `line`, or None."""
         return self._ports.get(line)
 
     def candidates(self, is_used: Callable[[TopicLine], bool]) -> Iterator[int]:
-        """Base ports for a new line, best first: never given ones, then those whose line nobody uses."""
+        """Yield base ports for a new line: unassigned ones first, then those of unused lines."""
         taken = {port: line for line, port in self._ports.items()}
         yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in taken)
         yield from (port for port, line in taken.items() if not is_used(line))
 
     def give(self, line: TopicLine, port: int) -> None:
-        """Let `line` have `port`; a line that had it before loses it."""
+        """Assign `port` to `line`, taking it from another line."""
         for other in [known for known, used in self._ports.items() if used == port and known != line]:
             del self._ports[other]
         self._ports[line] = port
 
     def add(self, registration: Registration) -> None:
-        """Note who asked for what; asking again replaces."""
+        """Add a registration; it replaces an earlier one for the same line and socket."""
         key = (registration.node_id, registration.line, registration.socket)
         self._registrations[key] = registration
 
     def remove(self, registrations: set[Registration]) -> None:
-        """Forget these registrations; their lines keep their ports."""
+        """Remove these registrations; their lines keep their ports."""
         self._registrations = {
             key: known for key, known in self._registrations.items() if known not in registrations
         }
@@ -152,7 +151,7 @@ class PortMap:
 
 
 def default_file(port: int) -> Path:
-    """Where the master at `port` keeps its map: `NEP_STATE_DIR`, or the system's place for such files."""
+    """Return the state file of the master at `port`, in `NEP_STATE_DIR` or the system's folder."""
     chosen = os.environ.get("NEP_STATE_DIR")
     if chosen:
         folder = Path(chosen)

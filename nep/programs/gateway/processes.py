@@ -1,4 +1,4 @@
-"""What the system knows of the original programs: alive or gone, which language, who is connected."""
+"""Information about processes of original programs: alive or not, language, connections."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ else:
 
 
 class Processes(Protocol):
-    """What the gateway asks about processes of this computer; tests bring their own."""
+    """Interface to the processes of this computer; tests use a fake."""
 
     def started(self, pid: int) -> float | None:
-        """When the process began (seconds since 1970), `None` if there is none."""
+        """Return the start time of a process (s since 1970), or None if it doesn't exist."""
 
     def language(self, pid: int) -> str | None:
-        """The language that the program is written in, as far as its interpreter tells."""
+        """Return the programming language of a process as far as its interpreter shows."""
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Whether the process holds a connection over `port`, bound by itself (`binds`) or by another.
+        """Return whether the process has a connection over `port`, bound by itself (`binds`) or not.
 
-        `None`: the system does not let us know.
+        None if the system doesn't permit to know.
         """
 
 
 def load_of(pid: int) -> CpuLoad:
-    """How much of a core a process of this computer uses, as far as the system tells."""
+    """Return a meter of a process's CPU load."""
 
     def used_s() -> float | None:
         try:
@@ -58,10 +58,10 @@ _INTERPRETERS = {
 
 
 class SystemProcesses:
-    """The processes of this computer."""
+    """Processes of this computer."""
 
     def started(self, pid: int) -> float | None:
-        """See `Processes`."""
+        """Return the start time of a process; None for missing and zombie processes."""
         try:
             process = psutil.Process(pid)
             if process.status() == psutil.STATUS_ZOMBIE:
@@ -73,7 +73,7 @@ class SystemProcesses:
             return 0.0
 
     def language(self, pid: int) -> str | None:
-        """See `Processes`."""
+        """Return the programming language of a process, or None if unknown."""
         try:
             name = PurePath(psutil.Process(pid).name()).stem.lower()
         except psutil.Error:
@@ -81,7 +81,7 @@ class SystemProcesses:
         return next((language for word, language in _INTERPRETERS.items() if name.startswith(word)), None)
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """See `Processes`."""
+        """Return whether the process has an established connection over `port`, None if unknown."""
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")
         except psutil.NoSuchProcess:

@@ -1,4 +1,4 @@
-"""Which original programs are there, and what what each does: from its traffic, not from what it said."""
+"""Original programs and their roles, determined from their connections instead of their requests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from nep.programs.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
 _COMING_S = 10.0
-"""So long after it asked a program may still be about to come: who comes and goes may be somebody else."""
+"""Time after its request in which a program may still connect; short connections until then may be of others.
+"""
 
 
 ServiceRole = Literal["server", "client"]
@@ -22,7 +23,7 @@ ServiceRole = Literal["server", "client"]
 
 @dataclass(frozen=True)
 class TopicLink:
-    """What an original program does: publishes or subscribes a topic; serves or calls a service at `port`."""
+    """Role of an original program: on a topic, or for a service at `port`."""
 
     topic: str
     msg_type: str
@@ -33,9 +34,9 @@ class TopicLink:
 
 @dataclass(frozen=True)
 class OriginalProgram:
-    """One original node, as the graph shows it.
+    """Original node as shown in the graph.
 
-    `generation` is "A" or "B", or the version of a program that can't be served ("0.5.4.6", "0.5.4.7").
+    `generation` is "A" or "B", or the version of an unsupported program ("0.5.4.6", "0.5.4.7").
     """
 
     node_id: str
@@ -47,7 +48,7 @@ class OriginalProgram:
 
 
 class ProgramTable:
-    """Follows the registrations of a port map. Belongs to the gateway's thread."""
+    """Tracker of the programs registered in a port map. Belongs to the gateway's thread."""
 
     def __init__(
         self,
@@ -65,7 +66,7 @@ class ProgramTable:
         self._openings: dict[Registration, tuple[int, float]] = {}
 
     def look(self, lines: Iterable[TopicLine] | None = None) -> None:
-        """Find out who is joined to these lines (all, when none are named)."""
+        """Update the roles of programs on these lines (default: all)."""
         chosen = None if lines is None else set(lines)
         for registration in self._known.registrations:
             if chosen is None or registration.line in chosen:
@@ -75,12 +76,12 @@ class ProgramTable:
                     self._was_joined.add(registration)
 
     def expect(self, registration: Registration) -> None:
-        """A program has asked: it may have left this line a moment ago, and is about to come to it."""
+        """Note a new request: the program may have left this line and will connect again."""
         self._was_joined.discard(registration)
         self._openings.pop(registration, None)
 
     def forget_the_gone(self) -> bool:
-        """Take out who is no more: its process ended, or it was joined and closed its connections."""
+        """Remove programs that ended or closed their connections; return whether any was removed."""
         gone = {registration for registration in self._known.registrations if self._is_gone(registration)}
         self._forget(gone)
         return bool(gone)
@@ -94,7 +95,7 @@ class ProgramTable:
                 self._openings.pop(registration, None)
 
     def make_room(self) -> bool:
-        """Forget the oldest program that asked and never came; whether there was one."""
+        """Remove the oldest program that asked and never connected; return whether there was one."""
         for registration in self._known.registrations:
             if not self._roles.get(registration):
                 self._forget({registration})
@@ -102,14 +103,14 @@ class ProgramTable:
         return False
 
     def programs(self) -> tuple[OriginalProgram, ...]:
-        """The original nodes that are there, each with what it does."""
+        """Return the current original nodes with their roles."""
         grouped: dict[str, list[Registration]] = {}
         for registration in self._known.registrations:
             grouped.setdefault(registration.node_id, []).append(registration)
         return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
 
     def names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
-        """The names of the nodes that publish or subscribe on this line."""
+        """Return the names of the nodes that publish or subscribe on a line."""
         return tuple(
             dict.fromkeys(
                 registration.node
@@ -119,7 +120,7 @@ class ProgramTable:
         )
 
     def languages(self) -> dict[TopicLine, frozenset[str]]:
-        """In which languages the programs on each line are written, as far as it is known."""
+        """Return the known programming languages of the programs on each line."""
         told: dict[TopicLine, frozenset[str]] = {}
         for registration in self._known.registrations:
             if registration.language is not None:
@@ -128,7 +129,7 @@ class ProgramTable:
         return told
 
     def members(self) -> list[Member]:
-        """What the originals' own broadcast tells: who asked for what."""
+        """Return the entries of the original NEP's broadcast."""
         told: list[Member] = []
         for registration in self._known.registrations:
             line = registration.line
@@ -149,7 +150,7 @@ class ProgramTable:
         return told
 
     def is_used(self, line: TopicLine) -> bool:
-        """Whether a program that is there asked for this line, or is still joined to it."""
+        """Return whether a current program asked for this line, or is connected to it."""
         pair = self._pair_of(line)
         if pair is not None and any(pair.connections.values()):
             return True
@@ -198,7 +199,7 @@ class ProgramTable:
         return registration.socket == end.role
 
     def _was_briefly_joined(self, registration: Registration) -> bool:
-        """Whether somebody came to the line since this was asked, and left before we looked."""
+        # True if a program connected to the line after the request and left before it was seen.
         pair = self._pair_of(registration.line)
         if pair is None:
             return False

@@ -1,4 +1,4 @@
-"""The two sockets of one line (a topic in one form): originals publish into one and read from the other."""
+"""Pair of sockets of one line: original programs publish to one and subscribe at the other."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _CLOSED = zmq.EVENT_DISCONNECTED
 _QUEUE = 1000
 _QUEUE_OF_PICTURES = 20
 MOST_KEPT_BYTES = 128 * 2**20
-"""About so much is kept for a subscriber that does not read: libzmq counts messages, however large."""
+"""Approximate buffer limit per slow subscriber: libzmq counts messages, not bytes."""
 _LINGER_MS = 200
 _LARGEST_BYTES = 2**28
 _LARGEST_FILTER_BYTES = 2**16
 _FILTERS_MAX = 1000
-"""An original sets one or two; more than these are not looked at."""
+"""Limit of filters per pair; an original program sets one or two."""
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """One of the two ports of a line: who joins it, and whether the program binds it or we do."""
+    """Port of a line: the role of its programs, and whether the program or the gateway binds it."""
 
     role: Role
     port: int
@@ -38,7 +38,7 @@ class Endpoint:
 
 
 def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
-    """Where publishers and where subscribers of `line` join, its base port being `base`."""
+    """Return the endpoints of publishers and subscribers of `line` with base port `base`."""
     return (
         Endpoint("publisher", base, bound_by_program=line.mode == "one2many"),
         Endpoint("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
@@ -46,16 +46,16 @@ def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
 
 
 def port_to_tell(line: TopicLine, base: int, socket_name: str) -> int:
-    """The port to answer: `many2many` originals add one themselves, others are told their own."""
+    """Return the port of the reply: `many2many` programs add one themselves, others don't."""
     if line.is_service or line.mode == "many2many" or socket_name == "publisher":
         return base
     return base + 1
 
 
 def is_free(port: int) -> bool:
-    """Whether nobody has bound `port` of the loopback address."""
+    """Return whether `port` of the loopback address can be bound."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        if sys.platform != "win32":  # elsewhere a closed connection holds its port for a minute
+        if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((LOOPBACK, port))
@@ -65,10 +65,10 @@ def is_free(port: int) -> bool:
 
 
 class ProxyPair:
-    """An XSUB that takes what originals publish and an XPUB from which they read.
+    """XSUB socket that receives from original publishers, and XPUB socket of original subscribers.
 
-    `unserved` tells on which side a version was seen that no other version understands.
-    Belongs to the gateway's thread. Raises `zmq.ZMQError` when a port is taken.
+    `unserved` holds the incompatible versions seen, by role. Belongs to the gateway's thread. Raises
+    `zmq.ZMQError` if a port is in use.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: TopicLine, base: int) -> None:
@@ -86,7 +86,7 @@ class ProxyPair:
         with contextlib.ExitStack() as undo:
             self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _LARGEST_BYTES)
             self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _LARGEST_FILTER_BYTES)
-            self.incoming.send(b"\x01")  # everything: an original's role shows in its traffic
+            self.incoming.send(b"\x01")  # subscribe to everything
             self._closing = undo.pop_all()
 
     def _open(
@@ -101,7 +101,7 @@ class ProxyPair:
         undo.callback(opened.close, _LINGER_MS)
         opened.setsockopt(zmq.SNDHWM, self._queue)
         opened.setsockopt(zmq.RCVHWM, self._queue)
-        opened.setsockopt(zmq.MAXMSGSIZE, largest_bytes)  # who sends more at once is disconnected
+        opened.setsockopt(zmq.MAXMSGSIZE, largest_bytes)  # larger messages disconnect the sender
         if end.bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
         monitor = opened.get_monitor_socket(_OPENED | _CLOSED)
@@ -117,21 +117,21 @@ class ProxyPair:
 
     @property
     def connections(self) -> Mapping[Role, int]:
-        """How many programs are connected on each side."""
+        """Number of connected programs by role."""
         return {role: len(handles) for role, handles in self._open_handles.items()}
 
     @property
     def wanted(self) -> bool:
-        """Whether an original wants to read this line now."""
+        """True if an original program subscribes to this line."""
         return any(self.shape.wants(filter_) for filter_ in self.filters)
 
     @property
     def has_0546(self) -> bool:
-        """Whether a subscriber is given away as nep 0.5.4.6 by its filter."""
+        """True if a subscriber uses nep 0.5.4.6, as its filter shows."""
         return any(self.shape.is_from_0546(filter_) for filter_ in self.filters)
 
     def frames(self, limit: int) -> Iterator[bytes]:
-        """At most `limit` frames that originals have published."""
+        """Yield at most `limit` frames that original programs have published."""
         for _ in range(limit):
             try:
                 parts = self.incoming.recv_multipart(zmq.NOBLOCK)
@@ -140,7 +140,7 @@ class ProxyPair:
             yield parts[0]
 
     def read_filters(self) -> bool:
-        """Follow who subscribes and unsubscribes; whether anything changed."""
+        """Process subscriptions; return whether the filters changed."""
         before = set(self.filters)
         while True:
             try:
@@ -153,13 +153,13 @@ class ProxyPair:
                 self.filters.discard(note[1:])
 
     def read_connections(self) -> bool:
-        """Follow who connects and leaves; whether anything happened."""
+        """Process connection events; return whether there were any."""
         happened = False
         for role, monitor in self.monitors.items():
             while monitor.poll(0):
                 event = parse_monitor_message(monitor.recv_multipart())
                 handles = self._open_handles[role]
-                # By handle: a visitor that does not speak ZeroMQ is told of when it leaves, too.
+                # By handle: connections that don't speak ZeroMQ also cause disconnect events.
                 if event["event"] & _OPENED:
                     handles.add(event["value"])
                     self.openings += 1
@@ -169,17 +169,17 @@ class ProxyPair:
         return happened
 
     def pass_on(self, frame: bytes, data: bytes) -> None:
-        """Give a frame of this line's own form to its subscribers, untouched where they can bear it."""
+        """Send a frame of this line to its own subscribers, unchanged unless a language needs shielding."""
         if self.wanted:
             self._send(self.shape.write(self._shielded(data)) if self._needs_shield else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
-        """Give a datum (bytes of the native codec) to this line's subscribers, in this line's form."""
+        """Send bytes of the native codec to this line's subscribers in this line's format."""
         if self.wanted:
             self._send(self.shape.write(self._shielded(bytes(data)) if self._needs_shield else data))
 
     def close(self) -> None:
-        """Close both sockets; what is queued is given a moment to leave."""
+        """Close both sockets, with a short linger."""
         self._closing.close()
 
     @property
@@ -195,7 +195,7 @@ class ProxyPair:
 
     def _send(self, frame: bytes) -> None:
         mark = min(self._queue, max(1, MOST_KEPT_BYTES // max(1, len(frame))))
-        if mark != self._mark:  # libzmq takes it over for subscribers that are connected, too
+        if mark != self._mark:  # libzmq applies it to connected subscribers, too
             self.outgoing.setsockopt(zmq.SNDHWM, mark)
             self._mark = mark
         with contextlib.suppress(zmq.Again):

@@ -1,4 +1,4 @@
-"""What enters on one line leaves on the others: re-framed once, to native once, never back again."""
+"""Relay between lines: a frame is converted once per format and once to native, and never sent back."""
 
 from __future__ import annotations
 
@@ -15,49 +15,46 @@ from nep.programs.gateway.proxy_pair import ProxyPair
 from nep.programs.gateway.requests import Role
 
 _BATCH = 200
-"""Frames taken from one line before the others have their turn."""
+"""Maximum number of frames read from one line in a row."""
 
 
 class NativeSide(Protocol):
-    """The native network, as the relay uses it. A topic is carried by one codec at a time."""
+    """Native network as used by the relay. A topic uses one codec at a time."""
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """Give a datum to the native subscribers; the first one makes the publisher."""
+        """Publish data to native subscribers; the first call creates the publisher."""
 
     def stop_publishing(self, topic: str, codec: str) -> None:
-        """No original publishes this topic any more."""
+        """Stop publishing: no original program publishes the topic any more."""
 
     def subscribe(self, topic: str, codec: str) -> bool:
-        """An original wants this topic: what native programs publish comes to `Relay.deliver` from now on.
-
-        False when it could not be done now; it is tried again.
-        """
+        """Subscribe to a topic for `Relay.deliver`; return False if that failed and must be retried."""
 
     def unsubscribe(self, topic: str, codec: str) -> None:
-        """No original wants this topic any more."""
+        """Unsubscribe: no original program subscribes to the topic any more."""
 
 
 class AlertSink(Protocol):
-    """Where present problems are told."""
+    """Receiver of current problems."""
 
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
-        """A problem is there; telling it again changes nothing."""
+        """Report a problem; repeating it has no effect."""
 
     def resolve(self, id: str) -> None:
-        """It is there no more."""
+        """Remove a problem."""
 
 
 Key = tuple[str, str]
-"""A topic and its codec: what is translated into one another."""
+"""Topic and codec: lines with the same key exchange messages."""
 
 
 Who = Callable[[TopicLine, Role], Sequence[str]]
-"""The names of the programs that publish or subscribe on a line, as far as they are known."""
+"""Lookup of the names of programs that publish or subscribe on a line, as far as known."""
 
 
 @dataclass
 class _Refused:
-    """Messages of a topic that can't be read, since the last good one."""
+    """Invalid messages of a topic since the last valid one."""
 
     reason: str
     count: int = 0
@@ -66,7 +63,7 @@ class _Refused:
 
 
 class Relay:
-    """All lines that are open now. Belongs to the gateway's thread. `who` names programs in alerts."""
+    """Open lines. Belongs to the gateway's thread. `who` names programs in alerts."""
 
     def __init__(
         self,
@@ -86,20 +83,20 @@ class Relay:
 
     @property
     def pairs(self) -> Iterable[ProxyPair]:
-        """The open pairs."""
+        """Open pairs."""
         return self._pairs.values()
 
     def pair(self, line: TopicLine) -> ProxyPair | None:
-        """The pair of `line`, if it is open."""
+        """Return the pair of `line`, or None."""
         return self._pairs.get(line)
 
     def open(self, line: TopicLine, base: int) -> ProxyPair:
-        """Open the sockets of `line`. Raises `zmq.ZMQError` when a port is taken."""
+        """Open the sockets of `line`. Raises `zmq.ZMQError` if a port is in use."""
         pair = self._pairs[line] = ProxyPair(self._context, line, base)
         return pair
 
     def close_line(self, line: TopicLine) -> None:
-        """Close the sockets of `line`, and what the native side keeps for it."""
+        """Close the sockets of `line` and its native publisher and subscriber."""
         pair = self._pairs.pop(line, None)
         if pair is not None:
             pair.close()
@@ -108,18 +105,18 @@ class Relay:
                 self._serve_again(pair, role)
 
     def close(self) -> None:
-        """Close everything."""
+        """Close all lines."""
         for line in list(self._pairs):
             self.close_line(line)
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], ProxyPair]]:
-        """All sockets that are to be watched, each with its pair."""
+        """Yield all sockets to poll with their pairs."""
         for pair in self._pairs.values():
             for socket in (pair.incoming, pair.outgoing, *pair.monitors.values()):
                 yield socket, pair
 
     def serve(self, pair: ProxyPair) -> bool:
-        """Do what is waiting on a pair; whether somebody came, left, subscribed or unsubscribed."""
+        """Process the input of a pair; return whether connections or subscriptions changed."""
         changed = pair.read_connections()
         changed |= pair.read_filters()
         if changed:
@@ -129,17 +126,17 @@ class Relay:
         return changed
 
     def know_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
-        """Who is on each line: some languages need their frames written with care."""
+        """Set the programming languages on each line: some need shielded frames."""
         for line, pair in self._pairs.items():
             pair.languages = languages.get(line, frozenset())
 
     def deliver(self, topic: str, codec: str, data: bytes | memoryview) -> None:
-        """A native program has published: to every original that wants it, in its own form."""
+        """Send a native message to all original subscribers, each in its format."""
         for pair in self._of((topic, codec)):
             pair.deliver(data)
 
     def look(self) -> None:
-        """A second has passed: try again what failed, clear away what late frames of the gone have left."""
+        """Retry failed subscriptions and update alerts. Call once a second."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.settle(key)
         for topic, refused in list(self._refused.items()):
@@ -150,7 +147,7 @@ class Relay:
                 self._alerts.resolve(f"message:{topic}")
 
     def settle(self, key: Key) -> None:
-        """Hold native publishers and subscriptions exactly while originals need them."""
+        """Open or close native publishers and subscribers as original programs need them."""
         pairs = self._of(key)
         wanted = any(pair.wanted for pair in pairs)
         if wanted and key not in self._subscribed:
@@ -202,7 +199,7 @@ class Relay:
         refused = self._refused.setdefault(topic, _Refused(str(error)))
         refused.reason, refused.is_cured = str(error), False
         refused.count += 1
-        if refused.count == 1:  # further ones are told once a second
+        if refused.count == 1:  # further ones are reported once a second
             self._tell_refused(topic, refused)
 
     def _tell_refused(self, topic: str, refused: _Refused) -> None:

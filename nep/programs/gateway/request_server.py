@@ -1,4 +1,4 @@
-"""The ports that the originals know by heart: two where they ask for topics, one that tells all topics."""
+"""Fixed ports of the original NEP: two for requests, one for the broadcast of all topics."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from nep.programs.gateway.requests import (
 
 _logger = logging.getLogger("nep.programs.gateway")
 _LARGEST_BYTES = 2**24
-"""ZeroMQ ends a connection that sends more at once. Requests have a few hundred bytes."""
+"""Limit at which ZeroMQ disconnects the sender; requests have a few hundred bytes."""
 
 
 @dataclass(frozen=True)
 class Ports:
-    """The originals' fixed ports. 0 leaves one out."""
+    """Fixed ports of the original NEP. 0 disables one."""
 
     requests_a: int = PORT_A
     requests_b: int = PORT_B
@@ -37,9 +37,9 @@ class Ports:
 
 
 class RequestServer:
-    """Answers every request, also a bad one. A port that is taken is an alert, and is tried again.
+    """Server that replies to every request, also an invalid one. A port in use is an alert and is retried.
 
-    `decide` gives a request its port, or raises `RequestError`. Belongs to the gateway's thread.
+    `decide` returns the port for a request, or raises `RequestError`. Belongs to the gateway's thread.
     """
 
     def __init__(
@@ -58,12 +58,12 @@ class RequestServer:
 
     @property
     def ports(self) -> tuple[int, ...]:
-        """Those that are to be bound."""
+        """Ports to bind."""
         wanted = (self._ports.requests_a, self._ports.requests_b, self._ports.broadcast)
         return tuple(port for port in wanted if port)
 
     def open(self) -> bool:
-        """Bind what is not bound yet; whether anything was."""
+        """Bind the ports that are not bound yet; return whether any was bound."""
         before = len(self._counters)
         for port, who in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
@@ -85,17 +85,17 @@ class RequestServer:
         return len(self._counters) != before
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], int]]:
-        """The sockets where requests come in, each with its port."""
+        """Yield the request sockets with their ports."""
         for port, counter in self._counters.items():
             yield counter, port
 
     def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
-        """Answer the request that is waiting. Nothing that is asked can end this."""
+        """Reply to a waiting request. Never raises because of the request."""
         try:
             parts = counter.recv_multipart(zmq.NOBLOCK)
         except zmq.Again:
             return
-        # Not a REP: when who sent no envelope has gone, libzmq 4.3.5 gives the next answer to nobody.
+        # Not a REP socket: after a request without envelope, libzmq 4.3.5 drops the next reply.
         if b"" not in parts:
             return
         end = parts.index(b"") + 1
@@ -105,18 +105,18 @@ class RequestServer:
             reply = grant(request, self._decide(request))
         except RequestError as error:
             reply = refuse(error)
-        except Exception:  # an answer is owed, or the port would be dead for everybody
+        except Exception:  # a reply must be sent, or the port would hang for everyone
             _logger.exception("the gateway could not carry out a request")
             reply = refuse(RequestError("the gateway could not carry this out; its log says why"))
         counter.send_multipart([*envelope, reply])
 
     def tell(self, members: Iterable[Member]) -> None:
-        """Broadcast all topics to the originals' tools."""
+        """Broadcast all topics to tools of the original NEP."""
         if self._board is not None:
             self._board.send(broadcast(members))
 
     def close(self) -> None:
-        """Give the ports back."""
+        """Release the ports."""
         for socket in (*self._counters.values(), *([self._board] if self._board is not None else [])):
             socket.close(0)
         self._counters.clear()

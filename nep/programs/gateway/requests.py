@@ -1,4 +1,4 @@
-"""What the original NEP asks its master, what it answers, and what it broadcasts. Pure functions."""
+"""Requests to the master of the original NEP, its replies and its broadcast. Pure functions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MODES: Mapping[str, Mode] = {"many2many": "many2many", "one2many": "one2many", 
 
 
 class RequestError(ValueError):
-    """A request that cannot be granted; `topic` is what it asked for, as far as that can be known."""
+    """Request that can't be granted; `topic` is the requested topic, if known."""
 
     def __init__(self, sentence: str, topic: object = None) -> None:
         super().__init__(sentence)
@@ -30,7 +30,7 @@ class RequestError(ValueError):
 
 @dataclass(frozen=True)
 class Request:
-    """A program of the original NEP asks for a topic."""
+    """Request of an original program for a topic."""
 
     node: str
     topic: str
@@ -43,27 +43,27 @@ class Request:
 
     @property
     def generation(self) -> str:
-        """`A` or `B`, the two incompatible wires of the original NEP."""
+        """Wire generation of the original NEP: `A` or `B`, which are incompatible."""
         return "B" if self.asked_port == PORT_B else "A"
 
     @property
     def framing(self) -> Framing:
-        """How this program's frames are written."""
+        """Frame format of this program."""
         return framing_of(self.asked_port, self.msg_type)
 
     @property
     def codec(self) -> str:
-        """The native codec of what this program sends or wants."""
+        """Native codec of the topic for this program."""
         return codec_of(self.msg_type)
 
     @property
     def is_service(self) -> bool:
-        """Whether it wants a port for requests and answers, which are not translated."""
+        """True if it asks for a service port, whose bytes are not converted."""
         return self.socket in _SERVICES
 
 
 def read_request(data: bytes, asked_port: int) -> Request:
-    """The request in `data`, which came in at `asked_port`. Raises `RequestError` with a sentence."""
+    """Parse a request received at `asked_port`. Raises `RequestError`."""
     if len(data) > MAX_REQUEST_BYTES:
         raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")
     try:
@@ -86,7 +86,7 @@ def read_request(data: bytes, asked_port: int) -> Request:
 
 
 def grant(request: Request, port: int) -> bytes:
-    """The answer that gives `request` its port; of the shape that the originals expect."""
+    """Return the reply that assigns `port`, in the format that original programs expect."""
     answer: dict[str, object] = {"topic": request.topic, "port": port}
     if not request.is_service:
         answer["mode"] = request.mode
@@ -94,13 +94,13 @@ def grant(request: Request, port: int) -> bytes:
 
 
 def refuse(error: RequestError) -> bytes:
-    """The answer to a request that cannot be granted. The originals read `state`; people read `error`."""
+    """Return the reply to a rejected request. Original programs read `state`, people read `error`."""
     return _dump({"topic": error.topic, "state": "failure", "error": str(error)})
 
 
 @dataclass(frozen=True)
 class Member:
-    """One program on one topic, as the broadcast tells it."""
+    """Program on a topic, as in the broadcast."""
 
     topic: str
     node: str
@@ -112,7 +112,7 @@ class Member:
 
 
 def broadcast(members: Iterable[Member]) -> bytes:
-    """The frame that the originals' tools expect on port 7777: every topic and its nodes, with the prefix."""
+    """Return the frame for port 7777: every topic and its nodes, with prefix."""
     topics: dict[str, dict[str, object]] = {}
     nodes: dict[str, dict[str, object]] = {}
     for member in members:
@@ -169,7 +169,7 @@ def _pid(value: object) -> int | None:
 
 
 def _language(fields: Mapping[str, object]) -> str | None:
-    """What can be read from the request itself: only C# sends its pid as text, only C++ names itself."""
+    # Only C# sends its pid as text, and only C++ sends its language.
     language = fields.get("language")
     if isinstance(language, str):
         return language[:20].lower()
