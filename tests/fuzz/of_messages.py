@@ -22,7 +22,7 @@ from nep.nodes.log_handler import LogRecord
 from nep.patterns.parameters.parameter import NodeParameter, declared
 from nep.programs.blackboard.board import Blackboard
 from nep.programs.blackboard.keys import key_matches, key_text, parse_key
-from nep.programs.bridges.trail import HOPS_MOST, read_trail
+from nep.programs.bridges.trail import MAX_HOPS, read_trail
 from tests.fuzz.target import SEPARATOR, Targets, is_same, joined, map_of, parts_of, text_of, value_of
 from tests.nep import bad_pictures
 
@@ -230,8 +230,8 @@ def trails() -> Iterator[bytes]:
 @TARGETS.add(seeds=trails, words=(b'"networks":', b'"bridges":'))
 def trails_of_bridges(data: bytes) -> None:
     trail = read_trail(map_of(data))
-    assert len(trail.networks) <= HOPS_MOST + 2
-    assert len(trail.bridges) <= HOPS_MOST + 2
+    assert len(trail.networks) <= MAX_HOPS + 2
+    assert len(trail.bridges) <= MAX_HOPS + 2
     trail.may_go("network", "bridge")
     assert read_trail({"bridge": trail.to_plain()}) == trail
 

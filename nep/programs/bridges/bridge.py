@@ -34,13 +34,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Bridge", "check_installed"]
 
-ROUTES_MOST = 500
+MAX_ROUTES = 500
 """Maximum number of routes, in both directions, that patterns create."""
 IDLE_S = 60.0
 """Time after which a route created by a pattern is removed if its topic has no publisher."""
 _OWN_TOPICS = "/nep/"
-_SLICE_S = 0.05
-_FLUSH_S, _LEAVE_S = 2.0, 0.2
+_WAIT_SLICE_S = 0.05
+_FLUSH_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 0.2
 _logger = logging.getLogger("nep")
 
 
@@ -80,12 +80,12 @@ class Bridge:
                 self.sides[name] = BridgeSide(name, side, configuration.node_name(name), allow_moving)
             _check_types(configuration)
             self.own_nodes = frozenset(side.node.id for side in self.sides.values())
-            self._begin()
+            self._start()
         except BaseException:
             self.close(0.0)
             raise
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         for topic in self.configuration.topics:
             if not topic.is_pattern:
                 for origin in topic.origins:
@@ -114,7 +114,7 @@ class Bridge:
         while not self.is_ready:
             if self._closed.is_set() or (deadline is not None and time.monotonic() >= deadline):
                 return False
-            self._closed.wait(_SLICE_S)
+            self._closed.wait(_WAIT_SLICE_S)
         return True
 
     def refusals(self, timeout_s: float) -> tuple[str, ...]:
@@ -124,7 +124,7 @@ class Bridge:
         """
         deadline = time.monotonic() + timeout_s
         while not all(side.knows_robots for side in self.sides.values()) and time.monotonic() < deadline:
-            self._closed.wait(_SLICE_S)
+            self._closed.wait(_WAIT_SLICE_S)
         refusals = (each.refusal for each in self._routes if not each.is_found)
         return tuple(dict.fromkeys(filter(None, refusals)))
 
@@ -178,32 +178,41 @@ class Bridge:
             self._routes = (*self._routes, route)
 
     def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
-        told, end = self.configuration.side(side), topic.end(side)
+        side_configuration, end = self.configuration.side(side), topic.end(side)
         echoes = self._echoes.setdefault((side, name), Echoes())
         guard = self.sides[side].guard
-        return RouteEnd(side, told.network, told.backend, name, end.msg_type, end.qos, echoes, guard)
+        return RouteEnd(
+            side,
+            side_configuration.network,
+            side_configuration.backend,
+            name,
+            end.msg_type,
+            end.qos,
+            echoes,
+            guard,
+        )
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
         """Create routes for published topics that match a pattern. Runs in the side's thread."""
-        self._heed_others()
-        self._forget_idle(side, view, time.monotonic())
+        self._check_other_bridges()
+        self._close_idle_routes(side, view, time.monotonic())
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
             if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
                 continue
             for topic, a, b in self._matches(side.name, name):
-                if len(self._routes) < ROUTES_MOST:
+                if len(self._routes) < MAX_ROUTES:
                     self._add(topic, side.name, a, b)
                 elif not self._is_full and (side.name, a, b) not in self._known:
                     self._is_full = True
                     _logger.warning(
-                        "'%s' and others are not carried: the patterns match more than %d topics; make them "
-                        "narrower",
+                        "'%s' and others are not forwarded: the patterns match more than %d topics; "
+                        "make them narrower",
                         name,
-                        ROUTES_MOST,
+                        MAX_ROUTES,
                     )
 
-    def _forget_idle(self, side: BridgeSide, view: GraphView, now: float) -> None:
+    def _close_idle_routes(self, side: BridgeSide, view: GraphView, now: float) -> None:
         for route in self._routes:
             if not route.is_found or route.origin.side != side.name:
                 continue
@@ -233,7 +242,7 @@ class Bridge:
         with suppress(DecodeError):
             self._others.heard(side, message.payload, time.monotonic())
 
-    def _heed_others(self) -> None:
+    def _check_other_bridges(self) -> None:
         # Warns of duplicate messages, and stops routes that would loop.
         keeps_trails = any(
             side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
@@ -249,8 +258,8 @@ class Bridge:
                 if {same, back} & each.ways and each.id not in self._warned:
                     self._warned.add(each.id)
                     _logger.warning(
-                        "the bridge '%s' joins '%s' and '%s', too: messages arrive twice, or go round; "
-                        "end one of the two",
+                        "the bridge '%s' also forwards '%s' and '%s': messages arrive twice or loop; "
+                        "stop one of the two",
                         each.name,
                         origin.topic,
                         end.topic,
@@ -272,21 +281,21 @@ class Bridge:
 
     # ---- closing
 
-    def close(self, timeout_s: float = _FLUSH_S) -> None:
+    def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
         """Stop forwarding; received messages are delivered first, within `timeout_s`. Idempotent."""
         deadline = time.monotonic() + timeout_s
         self._closed.set()
         for side in self.sides.values():
             side.begin_close()
         for side in self.sides.values():
-            side.join(_LEAVE_S)  # a thread waiting for a missing master ends later, with its node
+            side.join(_JOIN_TIMEOUT_S)  # a thread waiting for a missing master ends later, with its node
         for route in self._routes:
             route.end_taking()
         self._pacer.close(max(0.1, timeout_s))
         for side in self.sides.values():
             side.node.close(max(0.0, deadline - time.monotonic()))
         for side in self.sides.values():
-            side.join(max(_FLUSH_S, timeout_s))
+            side.join(max(_FLUSH_TIMEOUT_S, timeout_s))
 
     def __enter__(self) -> Self:
         return self

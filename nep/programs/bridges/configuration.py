@@ -43,9 +43,9 @@ DIRECTIONS: dict[str, Direction] = {"a->b": "a->b", "b->a": "b->a", "both": "bot
 NODE_PREFIX = "bridge-"
 """Prefix of the names of a bridge's nodes."""
 _WILDCARD = re.compile(r"\*\*|\*")
-_FAR = re.compile(r"(?:^|[/,])(?!127\.|localhost:)[\w.-]+:\d+", re.ASCII)
+_REACHABLE_ADDRESS = re.compile(r"(?:^|[/,])(?!127\.|localhost:)[\w.-]+:\d+", re.ASCII)
 """Address of another computer, or one of this computer that others can reach."""
-_NAME_MOST = 60
+_MAX_NAME_LENGTH = 60
 
 
 @dataclass(frozen=True)
@@ -142,8 +142,10 @@ class BridgeConfiguration:
 def checked_name(name: str) -> str:
     """Return `name` if it is a valid bridge name, else raise `NepError`."""
     check_node_name(f"{NODE_PREFIX}{name}")
-    if not name or len(name) > _NAME_MOST:
-        raise NepError(_("a bridge's name has 1 to {most} letters; choose another").format(most=_NAME_MOST))
+    if not name or len(name) > _MAX_NAME_LENGTH:
+        raise NepError(
+            _("a bridge's name has 1 to {most} letters; choose another").format(most=_MAX_NAME_LENGTH)
+        )
     return name
 
 
@@ -165,7 +167,7 @@ def _network(backend: Backend, master: str) -> str:
     name = f"{backend.name}:{master}"
     if backend.is_in_process:
         return f"{name}@{platform.node()}/{os.getpid()}"
-    return name if _FAR.search(master) else f"{name}@{platform.node()}"
+    return name if _REACHABLE_ADDRESS.search(master) else f"{name}@{platform.node()}"
 
 
 def checked_topic_names(a: str, b: str) -> None:

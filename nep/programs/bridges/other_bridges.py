@@ -18,10 +18,10 @@ __all__ = ["HEARTBEAT_S", "OtherBridge", "OtherBridges", "Way"]
 
 HEARTBEAT_S = 5.0
 """Maximum interval between two status messages of a bridge."""
-_FORGOTTEN_S = 3 * HEARTBEAT_S
-_MOST = 64
-_ID_MOST = 100
-_ROUTES_MOST = 1000
+_EXPIRY_S = 3 * HEARTBEAT_S
+_MAX_BRIDGES = 64
+_MAX_ID_LENGTH = 100
+_MAX_ROUTES = 1000
 
 Way = tuple[SideName, str, str]
 """Origin side, topic there, topic on the other side."""
@@ -35,7 +35,7 @@ class OtherBridge(NamedTuple):
     ways: frozenset[Way]
 
 
-class _Told(NamedTuple):
+class _Status(NamedTuple):
     """Status of a bridge received on one of our sides.
 
     `on` is the side of that bridge on which it was published.
@@ -53,7 +53,7 @@ class OtherBridges:
     def __init__(self, own: str) -> None:
         self._own = own
         self._lock = threading.Lock()
-        self._told: dict[SideName, OrderedDict[str, _Told]] = {side: OrderedDict() for side in SIDES}
+        self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
     def heard(self, side: SideName, status: object, now: float) -> None:
         """Process a status received on that side of ours; invalid ones are ignored."""
@@ -62,23 +62,25 @@ class OtherBridges:
         id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
         if not (isinstance(id_, str) and isinstance(name, str) and on in SIDES):
             return
-        if id_ == self._own or len(id_) > _ID_MOST:
+        if id_ == self._own or len(id_) > _MAX_ID_LENGTH:
             return
         with self._lock:
-            told = self._told[side]
-            told.pop(id_, None)
-            told[id_] = _Told(now, name[:_ID_MOST], str(on), frozenset(_ways(status.get("routes"))))
-            while len(told) > _MOST:
-                told.popitem(last=False)
+            statuses = self._statuses[side]
+            statuses.pop(id_, None)
+            statuses[id_] = _Status(
+                now, name[:_MAX_ID_LENGTH], str(on), frozenset(_ways(status.get("routes")))
+            )
+            while len(statuses) > _MAX_BRIDGES:
+                statuses.popitem(last=False)
 
     def between(self, now: float) -> list[OtherBridge]:
         """Return the bridges seen on both sides recently."""
         with self._lock:
-            on_a, on_b = ({**self._told[side]} for side in SIDES)
+            on_a, on_b = ({**self._statuses[side]} for side in SIDES)
         found = []
         for id_, a in on_a.items():
             b = on_b.get(id_)
-            if b is None or a.on == b.on or now - min(a.at, b.at) > _FORGOTTEN_S:
+            if b is None or a.on == b.on or now - min(a.at, b.at) > _EXPIRY_S:
                 continue
             sides: dict[str, SideName] = {a.on: "a", b.on: "b"}
             ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.ways)
@@ -87,7 +89,7 @@ class OtherBridges:
 
 
 def _ways(routes: object) -> Iterator[tuple[str, str, str]]:
-    for route in routes[:_ROUTES_MOST] if isinstance(routes, list) else ():
+    for route in routes[:_MAX_ROUTES] if isinstance(routes, list) else ():
         if not isinstance(route, Mapping):
             continue
         origin, end = route.get("from"), route.get("to")

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 __all__ = ["Limit", "Pacer"]
 
-_LATE = 0.1
+_MAX_CATCH_UP = 0.1
 
 
 class Limit:
@@ -28,7 +28,7 @@ class Limit:
         """Take the next slot if it is due; return whether it was."""
         if now < self.next_at:
             return False
-        self.next_at = max(self.next_at, now - _LATE * self._period_s) + self._period_s
+        self.next_at = max(self.next_at, now - _MAX_CATCH_UP * self._period_s) + self._period_s
         return True
 
 

@@ -25,14 +25,14 @@ from nep.text import escaped, shortened
 
 __all__ = ["Route", "RouteCounts", "RouteEnd"]
 
-HELD_MESSAGES = 10_000
+MAX_BACKLOG_MESSAGES = 10_000
 """Messages buffered for the other side, at most 64 MB; then the oldest are dropped and counted."""
-_HELD_BYTES = 64 * 2**20
-_LATCHED_MOST = 256
+_MAX_BACKLOG_BYTES = 64 * 2**20
+_MAX_LATCHED_PUBLISHERS = 256
 """Publishers per topic whose latched message is forwarded by a publisher of its own."""
-_GONE_S = 10.0
+_PUBLISHER_EXPIRY_S = 10.0
 """Absence from the graph after which a publisher counts as gone; a restarted master relearns it sooner."""
-_PROBLEM_MOST = 300
+_MAX_PROBLEM_LENGTH = 300
 
 
 @dataclass(frozen=True)
@@ -80,28 +80,28 @@ class RouteCounts:
     problem: str = ""
 
 
-class _Ear:
+class _BufferedSink:
     """Sink of one subscriber that forwards at once, or buffers until it is opened."""
 
     def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
         self.is_open = is_open
         self.is_muted = False
-        self._take = take
+        self._on_messages = take
         self._kept: list[Message] = []
         self._lock = threading.Lock()
 
-    def hear(self, messages: Sequence[Message]) -> None:
+    def receive(self, messages: Sequence[Message]) -> None:
         with self._lock:
             if self.is_muted:
                 return
             if not self.is_open:
                 self._kept.extend(messages)
                 return
-        self._take(messages)
+        self._on_messages(messages)
 
     def open(self) -> None:
         with self._lock:
-            self._take(self._kept)
+            self._on_messages(self._kept)
             self._kept = []
             self.is_open = True
 
@@ -143,20 +143,20 @@ class Route:
         self._wake = wake
         self._clock = clock
         self._pacer = pacer
-        self._heard: dict[Publisher, int] = {}
+        self._subscriber_counts: dict[Publisher, int] = {}
         self._limit = Limit(max_rate_hz) if max_rate_hz else None
-        self._newest: Message | None = None
+        self._pending: Message | None = None
         self._lock = threading.RLock()
-        self._held = Inbox("all", HELD_MESSAGES, _HELD_BYTES)
+        self._backlog = Inbox("all", MAX_BACKLOG_MESSAGES, _MAX_BACKLOG_BYTES)
         self._subscriber: Subscriber | None = None
-        self._ear: _Ear | None = None
+        self._sink: _BufferedSink | None = None
         self._waits_for_type = False
         self._is_closed = False
-        self._lost_before: int | None = 0
+        self._lost_by_previous: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._gone_since: dict[tuple[bool, int | None], float] = {}
         self._form: Form | None = None
-        self._has_room = end.backend.has_extensions
+        self._supports_extension = end.backend.has_extensions
         self._received = self._sent = self._bytes = 0
         self._thinned = self._failed = self._dropped = self._returned = 0
         self._problem = ""
@@ -173,14 +173,14 @@ class Route:
                 self._thinned,
                 self._failed,
                 self._dropped,
-                len(self._held) + (self._newest is not None),
+                len(self._backlog) + (self._pending is not None),
                 self._returned,
                 self._problem,
             )
 
     def _lost(self) -> int | None:
         now = 0 if self._subscriber is None else self._subscriber.lost
-        return None if now is None or self._lost_before is None else now + self._lost_before
+        return None if now is None or self._lost_by_previous is None else now + self._lost_by_previous
 
     @property
     def trouble(self) -> str:
@@ -200,7 +200,7 @@ class Route:
     @property
     def needs_publisher(self) -> bool:
         """True if messages wait for a publisher on the other side."""
-        return len(self._held) > 0
+        return len(self._backlog) > 0
 
     @property
     def needs_type(self) -> bool:
@@ -228,36 +228,38 @@ class Route:
             self._waits_for_type = not msg_type
             if not msg_type:
                 return
-            ear = _Ear(self._take, is_open=True)
+            ear = _BufferedSink(self._on_messages, is_open=True)
             subscriber = self._new_sub(node, msg_type, ear)
             with self._lock:
-                self._subscriber, self._ear = subscriber, ear
+                self._subscriber, self._sink = subscriber, ear
         elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
             self._subscribe_again(node, known)
 
     def _subscribe_again(self, node: Node, msg_type: str) -> None:
         # Keeps a subscription that receives messages: not every back end insists on the type.
-        old, old_ear = self._subscriber, self._ear
-        if old is None or old_ear is None or _has_heard(old):
+        old, old_sink = self._subscriber, self._sink
+        if old is None or old_sink is None or _has_received(old):
             return
-        ear = _Ear(self._take, is_open=False)
+        ear = _BufferedSink(self._on_messages, is_open=False)
         new = self._new_sub(node, msg_type, ear)
-        if _has_heard(old):  # a message arrived meanwhile
+        if _has_received(old):  # a message arrived meanwhile
             ear.mute()
             new.close()
             return
-        old_ear.mute()
+        old_sink.mute()
         lost = old.lost
         with self._lock:
-            self._lost_before = (
-                None if lost is None or self._lost_before is None else self._lost_before + lost
+            self._lost_by_previous = (
+                None if lost is None or self._lost_by_previous is None else self._lost_by_previous + lost
             )
-            self._subscriber, self._ear = new, ear
+            self._subscriber, self._sink = new, ear
         old.close()
         ear.open()
 
-    def _new_sub(self, node: Node, msg_type: str, ear: _Ear) -> Subscriber:
-        return node.new_sub(self.origin.topic, msg_type, sink=ear.hear, qos=self.origin.qos, wildcards=False)
+    def _new_sub(self, node: Node, msg_type: str, ear: _BufferedSink) -> Subscriber:
+        return node.new_sub(
+            self.origin.topic, msg_type, sink=ear.receive, qos=self.origin.qos, wildcards=False
+        )
 
     def end_taking(self) -> None:
         """Unsubscribe, and forward a rate-limited message at once."""
@@ -265,7 +267,7 @@ class Route:
             subscriber, self._limit = self._subscriber, None
         if subscriber is not None:
             subscriber.close()
-        self._take_newest()
+        self._forward_pending()
 
     def close(self) -> None:
         """Close the route while its bridge continues."""
@@ -278,19 +280,19 @@ class Route:
 
     # ---- receiving
 
-    def _take(self, messages: Sequence[Message]) -> None:
+    def _on_messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
             now = self._clock()
             with self._lock:
                 if message.publisher in self._own:
                     self.origin.echoes.not_needed()
-                elif self._is_back(message, now):
+                elif self._is_returned(message, now):
                     self._returned += 1
                 else:
                     self._received += 1
-                    self._offer(message, now)
+                    self._limit_rate(message, now)
 
-    def _is_back(self, message: Message, now: float) -> bool:
+    def _is_returned(self, message: Message, now: float) -> bool:
         if self.rival:
             return True
         if message.publisher is not None:
@@ -301,43 +303,43 @@ class Route:
         is_nameless = message.publisher is None and not trail.bridges
         return is_nameless and self.origin.echoes.is_echo(message.raw, now)
 
-    def _offer(self, message: Message, now: float) -> None:
+    def _limit_rate(self, message: Message, now: float) -> None:
         if self._limit is None:
-            self._carry(message)
-        elif self._newest is not None:
+            self._forward(message)
+        elif self._pending is not None:
             self._thinned += 1
-            self._newest = message
+            self._pending = message
         elif self._limit.has_room(now):
-            self._carry(message)
+            self._forward(message)
         else:
-            self._newest = message
-            self._pacer.call_at(self._limit.next_at, self._take_newest)
+            self._pending = message
+            self._pacer.call_at(self._limit.next_at, self._forward_pending)
 
-    def _take_newest(self) -> None:
+    def _forward_pending(self) -> None:
         with self._lock:
-            message, self._newest = self._newest, None
+            message, self._pending = self._pending, None
             if message is not None:
                 if self._limit is not None:
                     self._limit.has_room(max(self._clock(), self._limit.next_at))
-                self._carry(message)
+                self._forward(message)
 
-    def _carry(self, message: Message) -> None:
-        if len(self._held):
-            self._send_held()
+    def _forward(self, message: Message) -> None:
+        if len(self._backlog):
+            self._send_backlog()
         publisher = self._publishers.get(self._key(message))
-        if publisher is None or len(self._held):
-            self._dropped += self._held.put(message)
+        if publisher is None or len(self._backlog):
+            self._dropped += self._backlog.put(message)
             self._wake()
         else:
             self._send(publisher, message)
 
-    def _send_held(self) -> Message | None:
-        while self._held.messages:
-            message = self._held.messages[0]
+    def _send_backlog(self) -> Message | None:
+        while self._backlog.messages:
+            message = self._backlog.messages[0]
             publisher = self._publishers.get(self._key(message))
             if publisher is None:
                 return message
-            self._held.take()
+            self._backlog.take()
             self._send(publisher, message)
         return None
 
@@ -345,7 +347,11 @@ class Route:
         if not message.is_latched:
             return False, None
         key = (True, message.publisher)
-        return key if key in self._publishers or len(self._publishers) < _LATCHED_MOST else (True, None)
+        return (
+            key
+            if key in self._publishers or len(self._publishers) < _MAX_LATCHED_PUBLISHERS
+            else (True, None)
+        )
 
     # ---- called in the thread of the end's side
 
@@ -353,7 +359,7 @@ class Route:
         """Create the publishers that messages wait for, and send these messages. Raises `NepError`."""
         while True:
             with self._lock:
-                message = self._send_held()
+                message = self._send_backlog()
                 if message is None:
                     return
                 key = self._key(message)
@@ -385,10 +391,10 @@ class Route:
             for key in list(self._publishers):
                 if not key[0] or key[1] is None or key[1] in ids:
                     self._gone_since.pop(key, None)
-                elif now - self._gone_since.setdefault(key, now) >= _GONE_S:
+                elif now - self._gone_since.setdefault(key, now) >= _PUBLISHER_EXPIRY_S:
                     del self._gone_since[key]
                     ended.append(self._publishers.pop(key))
-                    self._heard.pop(ended[-1], None)
+                    self._subscriber_counts.pop(ended[-1], None)
         for publisher in ended:
             publisher.close()
 
@@ -399,9 +405,9 @@ class Route:
         if form is None:  # set by `open_publishers` before the first publisher
             return
         if self.end.guard is not None:
-            heard = publisher.subscribers
-            if heard != self._heard.get(publisher):  # a robot may have connected
-                self._heard[publisher] = heard
+            subscriber_count = publisher.subscribers
+            if subscriber_count != self._subscriber_counts.get(publisher):  # a robot may have connected
+                self._subscriber_counts[publisher] = subscriber_count
                 self.end.guard.look()
             refusal = self.refusal
             if refusal:
@@ -433,12 +439,12 @@ class Route:
         beside = {key: value for key, value in (made.extension or {}).items() if key != TRAIL_KEY}
         self.end.echoes.sent(made.data, self._clock())
         refused = publisher.refused
-        if self._has_room:
+        if self._supports_extension:
             publisher.publish_bytes(made.data, {**beside, TRAIL_KEY: self._trail(message).to_plain()})
             if publisher.refused == refused:
                 self._count(message)
                 return
-            self._has_room = False  # a back end that wrongly claims to support extensions
+            self._supports_extension = False  # a back end that wrongly claims to support extensions
             refused = publisher.refused
         publisher.publish_bytes(made.data, beside or None)
         if publisher.refused == refused:
@@ -455,8 +461,8 @@ class Route:
 
     def _fail(self, reason: str) -> None:
         self._failed += 1
-        self._problem = escaped(shortened(reason, _PROBLEM_MOST))
+        self._problem = escaped(shortened(reason, _MAX_PROBLEM_LENGTH))
 
 
-def _has_heard(subscriber: Subscriber) -> bool:
+def _has_received(subscriber: Subscriber) -> bool:
     return subscriber.received > 0

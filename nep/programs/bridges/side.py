@@ -25,8 +25,8 @@ __all__ = ["BridgeSide"]
 
 _STATUS_TYPE = "nep/bridge"
 _logger = logging.getLogger("nep")
-_LOOK_S, _SOON_S = 1.0, 0.05
-_ANSWER_S = 1.0
+_GRAPH_POLL_S, _EARLY_POLL_S = 1.0, 0.05
+_REQUEST_TIMEOUT_S = 1.0
 """Timeout of requests to the master."""
 
 
@@ -72,16 +72,18 @@ class BridgeSide:
         """Reason why the network is unavailable, "" if it is available or not queried yet."""
         self.looks = 0
         """Number of successful graph queries."""
-        self.node = Node(node_name, configuration.backend.name, master=configuration.master, wait_s=_ANSWER_S)
+        self.node = Node(
+            node_name, configuration.backend.name, master=configuration.master, wait_s=_REQUEST_TIMEOUT_S
+        )
         self.guard = None if allow_moving is None else MotionGuard(self.node, allow_moving)
-        self._wanted = threading.Event()
+        self._wake_event = threading.Event()
         self._is_closing = False
         self._thread: threading.Thread | None = None
-        self._look_at = 0.0
-        self._told: object = None
-        self._told_at = float("-inf")
-        self._status: Publisher | None = None
-        self._others: Subscriber | None = None
+        self._poll_at = 0.0
+        self._published_status: object = None
+        self._published_at = float("-inf")
+        self._status_publisher: Publisher | None = None
+        self._bridges_subscriber: Subscriber | None = None
 
     @property
     def knows_robots(self) -> bool:
@@ -100,12 +102,12 @@ class BridgeSide:
 
     def wake(self) -> None:
         """Wake the thread because a route needs something."""
-        self._wanted.set()
+        self._wake_event.set()
 
     def begin_close(self) -> None:
         """Create nothing any more."""
         self._is_closing = True
-        self._wanted.set()
+        self._wake_event.set()
 
     def join(self, timeout_s: float) -> None:
         """Wait for the thread to end."""
@@ -116,47 +118,49 @@ class BridgeSide:
 
     def _run(self, owner: BridgeOfSide) -> None:
         while not self._is_closing:
-            self._wanted.clear()
+            self._wake_event.clear()
             now = time.monotonic()
-            deciding = self._deciding(owner)
-            is_due = now >= self._look_at or (bool(deciding) and now >= self._look_at - _LOOK_S + _SOON_S)
+            undecided = self._undecided_routes(owner)
+            is_due = now >= self._poll_at or (
+                bool(undecided) and now >= self._poll_at - _GRAPH_POLL_S + _EARLY_POLL_S
+            )
             if is_due:
-                self._look(owner)
-                self._look_at = time.monotonic() + _LOOK_S
+                self._poll_graph(owner)
+                self._poll_at = time.monotonic() + _GRAPH_POLL_S
             if self.view is not None:
-                self._look_after(owner, self.view, deciding, is_due=is_due)
+                self._update_routes(owner, self.view, undecided, is_due=is_due)
                 if is_due and owner.speaks_on(self, self.view):
-                    self._meet(owner)
-                    self._tell({**owner.status(), "side": self.name})
-            is_soon = self.view is not None and self._deciding(owner)
-            look_at = self._look_at - (_LOOK_S - _SOON_S if is_soon else 0.0)
-            self._wanted.wait(max(0.0, look_at - time.monotonic()))
+                    self._subscribe_to_bridges(owner)
+                    self._publish_status({**owner.status(), "side": self.name})
+            is_soon = self.view is not None and self._undecided_routes(owner)
+            look_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if is_soon else 0.0)
+            self._wake_event.wait(max(0.0, look_at - time.monotonic()))
 
-    def _deciding(self, owner: BridgeOfSide) -> list[Route]:
+    def _undecided_routes(self, owner: BridgeOfSide) -> list[Route]:
         # Their type depends on the current publishers, so the graph is polled first.
         routes = (each for each in owner.routes if each.end.side == self.name)
         return [each for each in routes if each.needs_type and self.name not in each.troubles]
 
-    def _look(self, owner: BridgeOfSide) -> None:
+    def _poll_graph(self, owner: BridgeOfSide) -> None:
         try:
-            view = self.node.graph(_ANSWER_S)
+            view = self.node.graph(_REQUEST_TIMEOUT_S)
         except ClosedError:
             return
         except Exception as error:  # noqa: BLE001 - third-party back ends may raise anything
-            said = _said(error)
-            if said != self.problem:
-                self.problem = said
+            reason = _reason(error)
+            if reason != self.problem:
+                self.problem = reason
                 _logger.warning(
-                    "side %s of the bridge, %s, is waited for: %s",
+                    "waiting for side %s of the bridge, %s: %s",
                     self.name,
                     self.configuration.network,
-                    said,
+                    reason,
                 )
             self.view = None
             return
         if self.problem:
             self.problem = ""
-            _logger.warning("side %s of the bridge, %s, is there", self.name, self.configuration.network)
+            _logger.warning("side %s of the bridge, %s, is connected", self.name, self.configuration.network)
         if self.guard is not None:
             self.guard.see(view)
         self.view = view
@@ -166,10 +170,10 @@ class BridgeSide:
             if route.origin.side == self.name:
                 route.close_gone(view, time.monotonic())
 
-    def _look_after(
-        self, owner: BridgeOfSide, view: GraphView, deciding: Sequence[Route], *, is_due: bool
+    def _update_routes(
+        self, owner: BridgeOfSide, view: GraphView, undecided: Sequence[Route], *, is_due: bool
     ) -> None:
-        # Failed routes are retried with the next poll. `deciding`: routes whose first message arrived before
+        # Failed routes are retried with the next poll. `undecided`: routes whose first message arrived before
         # the last poll; others wait for the next one.
         for route in owner.routes:
             if self._is_closing:
@@ -179,51 +183,51 @@ class BridgeSide:
             if route.origin.side == self.name:
                 self._try(route, partial(route.subscribe, self.node, view, owner.own_nodes))
             elif route.needs_publisher and (
-                not route.needs_type or (is_due and self._may_decide(route, deciding))
+                not route.needs_type or (is_due and self._may_decide(route, undecided))
             ):
                 self._try(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
 
-    def _may_decide(self, route: Route, deciding: Sequence[Route]) -> bool:
-        return route in deciding or self.name in route.troubles
+    def _may_decide(self, route: Route, undecided: Sequence[Route]) -> bool:
+        return route in undecided or self.name in route.troubles
 
     def _try(self, route: Route, make: Callable[[], None]) -> None:
         try:
             make()
         except ClosedError:
             return
-        except Exception as error:  # noqa: BLE001 - see `_look`
-            said = _said(error)
-            if said != route.troubles.get(self.name):
-                route.troubles[self.name] = said
+        except Exception as error:  # noqa: BLE001 - see `_poll_graph`
+            reason = _reason(error)
+            if reason != route.troubles.get(self.name):
+                route.troubles[self.name] = reason
                 _logger.warning(
-                    "'%s' on side %s is not carried to '%s' yet: %s",
+                    "'%s' on side %s is not forwarded to '%s' yet: %s",
                     route.origin.topic,
                     route.origin.side,
                     route.end.topic,
-                    said,
+                    reason,
                 )
             return
         route.troubles.pop(self.name, None)
 
-    def _meet(self, owner: BridgeOfSide) -> None:
+    def _subscribe_to_bridges(self, owner: BridgeOfSide) -> None:
         def hear(messages: Sequence[Message]) -> None:
             for message in messages:
                 owner.heard(self.name, message)
 
-        if self._others is None and not self._is_closing:
+        if self._bridges_subscriber is None and not self._is_closing:
             with suppress(NepError):  # retried with the next poll
-                self._others = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
+                self._bridges_subscriber = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
 
-    def _tell(self, status: dict[str, object]) -> None:
+    def _publish_status(self, status: dict[str, object]) -> None:
         now = time.monotonic()
-        if self._is_closing or (status == self._told and now - self._told_at < HEARTBEAT_S):
+        if self._is_closing or (status == self._published_status and now - self._published_at < HEARTBEAT_S):
             return
-        with suppress(NepError):  # see `_meet`
-            if self._status is None:
-                self._status = self.node.new_pub(BRIDGES_TOPIC, _STATUS_TYPE, latched=True)
-            self._status.publish(status)
-            self._told, self._told_at = status, now
+        with suppress(NepError):  # see `_subscribe_to_bridges`
+            if self._status_publisher is None:
+                self._status_publisher = self.node.new_pub(BRIDGES_TOPIC, _STATUS_TYPE, latched=True)
+            self._status_publisher.publish(status)
+            self._published_status, self._published_at = status, now
 
 
-def _said(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return str(error) if isinstance(error, NepError | ValueError) else f"{type(error).__name__}: {error}"

@@ -35,37 +35,37 @@ else:
 __all__ = ["EXAMPLE", "read_configuration", "read_text"]
 
 EXAMPLE = """\
-# A bridge of nep: which topics of two networks are one. Start it with: nep bridge FILE.toml
-# Every key is told of in docs/bridges.md; those with a # in front show what may be there.
+# Configuration of a bridge, which forwards topics between two networks. Start: nep bridge FILE.toml
+# docs/bridges.md describes all keys; commented lines show optional ones.
 
-# name = "lab"                    # of its nodes; without it the file's
+# name = "lab"                    # name of the bridge (default: the file's name)
 
 [a]
 backend = "zeromq"                # as in nep.node(name, "zeromq")
 # master = "127.0.0.1:7780"       # as in nep.node(..., master=...)
-# network = "lab"                 # its name for all bridges, where two of them know it by two addresses
+# network = "lab"                 # for bridges that reach this network by different addresses
 
 [b]
 backend = "ros"
 
-[[topics]]                        # one topic, both ways
+[[topics]]                        # one topic, both directions
 a = "/chatter"
-# b = "/chatter"                  # what it is called on the other side; without it the same
+# b = "/chatter"                  # name on the other side (default: the same)
 
-[[topics]]                        # commands to the robot, as the type that it takes
+[[topics]]                        # commands to the robot, with the type it expects
 a = "/cmd_vel"
 direction = "a->b"                # or "b->a", or "both"
 b_type = "geometry_msgs/Twist"
 
-[[topics]]                        # what the robot sees, ten times a second at most, the newest each time
+[[topics]]                        # camera images, at most 10 per second
 a = "/camera"
 b = "/usb_cam/image_raw/compressed"
 direction = "b->a"
 max_rate_hz = 10
-# a_type = "image"                # without types: the one that it has there, or else on the other side
-# b_qos = "sensor"                # a quality of service, where the back end has words for it
+# a_type = "image"                # default: the type of the topic there, else on the other side
+# b_qos = "sensor"                # QoS profile, if the back end has any
 
-[[topics]]                        # a pattern: * is what stands between slashes, ** takes slashes, too
+[[topics]]                        # a pattern: * matches between slashes, ** also matches slashes
 a = "/robot/*"
 b = "/r2d2/*"
 direction = "b->a"
@@ -75,12 +75,12 @@ direction = "b->a"
 _KEYS = ("name", *SIDES, "topics")
 _SIDE_KEYS = ("backend", "master", "network")
 _TOPIC_KEYS = (*SIDES, "direction", "max_rate_hz", "type", "a_type", "b_type", "a_qos", "b_qos")
-_MOST_BYTES = 10**6
-_MOST_TOPICS = 1000
-_NETWORK_MOST = 200
-_HEAD = re.compile(r"\s*\[\[?\s*([^\[\]#]+?)\s*\]")
-_AT = re.compile(r"\s*\((?:at line (\d+), column \d+|at end of document)\)")
-_SAID_MOST = 200
+_MAX_BYTES = 10**6
+_MAX_TOPICS = 1000
+_MAX_NETWORK_LENGTH = 200
+_TABLE_HEADER = re.compile(r"\s*\[\[?\s*([^\[\]#]+?)\s*\]")
+_TOML_POSITION = re.compile(r"\s*\((?:at line (\d+), column \d+|at end of document)\)")
+_MAX_REASON_LENGTH = 200
 _CHECKED = TypeVar("_CHECKED")
 
 
@@ -89,7 +89,7 @@ def read_configuration(path: Path) -> BridgeConfiguration:
     shown = escaped(str(path))
     try:
         with path.open("rb") as file:
-            data = file.read(_MOST_BYTES + 1)
+            data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise NepError(
@@ -97,10 +97,10 @@ def read_configuration(path: Path) -> BridgeConfiguration:
                 "'{path}' cannot be read: {reason}; 'nep bridge --example' shows what a file looks like"
             ).format(path=shown, reason=reason[:1].lower() + reason[1:])
         ) from error
-    if len(data) > _MOST_BYTES:
+    if len(data) > _MAX_BYTES:
         raise NepError(
             _("'{path}' is larger than {most} bytes, so it is no file of a bridge; give another").format(
-                path=shown, most=_MOST_BYTES
+                path=shown, most=_MAX_BYTES
             )
         )
     try:
@@ -126,9 +126,9 @@ def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
 
 
 def _toml_sentence(path: str, text: str, said: str) -> str:
-    at = _AT.search(said)
+    at = _TOML_POSITION.search(said)
     line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
-    reason = escaped(shortened(_AT.sub("", said).strip(), _SAID_MOST))
+    reason = escaped(shortened(_TOML_POSITION.sub("", said).strip(), _MAX_REASON_LENGTH))
     return _(
         "line {line} of '{path}' is no TOML: {reason}; 'nep bridge --example' shows what a file looks like"
     ).format(line=line, path=path, reason=reason[:1].lower() + reason[1:])
@@ -153,8 +153,8 @@ class _Reader:
         topics = table.get("topics")
         if not isinstance(topics, list) or not topics or not all(isinstance(each, dict) for each in topics):
             self._fail("topics", "", _('no topic is named; write [[topics]] and a = "/a/topic" below it'))
-        if len(topics) > _MOST_TOPICS:
-            self._fail("topics", "", _("there are more than {most}; use patterns").format(most=_MOST_TOPICS))
+        if len(topics) > _MAX_TOPICS:
+            self._fail("topics", "", _("there are more than {most}; use patterns").format(most=_MAX_TOPICS))
         found = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
         self._check_once(found)
         return BridgeConfiguration(name, a, b, found)
@@ -175,9 +175,11 @@ class _Reader:
             self._fail("backend", side, _('no back end is named; write backend = "zeromq"'))
         self._checked(lambda: backend_named(backend), "backend", side)
         master, network = (self._text(told, key, side) for key in ("master", "network"))
-        if len(network) > _NETWORK_MOST:
+        if len(network) > _MAX_NETWORK_LENGTH:
             self._fail(
-                "network", side, _("it has more than {most} letters; shorten it").format(most=_NETWORK_MOST)
+                "network",
+                side,
+                _("it has more than {most} letters; shorten it").format(most=_MAX_NETWORK_LENGTH),
             )
         return self._checked(lambda: side_of(backend, master, network), "master", side)
 
@@ -224,7 +226,7 @@ class _Reader:
                 key,
                 "topics",
                 _("there is no quality '{word}'; {did_you_mean}").format(
-                    word=_said(word), did_you_mean=did_you_mean(word, backend.qos)
+                    word=_shown(word), did_you_mean=did_you_mean(word, backend.qos)
                 ),
                 number,
             )
@@ -255,7 +257,7 @@ class _Reader:
                         "a",
                         "topics",
                         _("'{topic}' goes that way already; leave one of the two out").format(
-                            topic=_said(topic.end(side).name)
+                            topic=_shown(topic.end(side).name)
                         ),
                         number,
                     )
@@ -286,7 +288,7 @@ class _Reader:
             self._fail(key, where, str(error), number)
 
     def _fail(self, key: str, where: str, reason: str, number: int = 0) -> NoReturn:
-        shown = _said(key)
+        shown = _shown(key)
         if where:
             shown = f"{where}[{number + 1}].{shown}" if where == "topics" else f"{where}.{shown}"
         line = self._line_of(key, where, number)
@@ -299,7 +301,7 @@ class _Reader:
         assigned = re.compile(rf"\s*[\"']?{name}[\"']?\s*[=.]")
         dotted = re.compile(rf"\s*{re.escape(where or key)}\s*[.=]")
         for at, line in enumerate(self._lines, 1):
-            head = _HEAD.match(line)
+            head = _TABLE_HEADER.match(line)
             if head is not None:
                 table = head.group(1).strip("\"' ")
                 seen += table == "topics"
@@ -319,5 +321,5 @@ def _plain(stem: str) -> str:
     return escaped(stem)[:40] or "bridge"
 
 
-def _said(word: str) -> str:
+def _shown(word: str) -> str:
     return escaped(shortened(word, 80))

@@ -16,12 +16,12 @@ from typing import NamedTuple
 __all__ = ["TRAIL_KEY", "Echoes", "Trail", "read_trail"]
 
 TRAIL_KEY = "bridge"
-HOPS_MOST = 16
+MAX_HOPS = 16
 """Maximum number of bridges that a message passes; longer chains are loops."""
 ECHO_S = 5.0
 """Time after which an echo is no longer expected."""
-_WORD_MOST = 400
-_ECHOES_MOST = 4096
+_MAX_WORD_LENGTH = 400
+_MAX_ECHOES = 4096
 
 
 class Trail(NamedTuple):
@@ -32,7 +32,7 @@ class Trail(NamedTuple):
 
     def may_go(self, network: str, bridge: str) -> bool:
         """Return whether this bridge may forward it into this network."""
-        return network not in self.networks and bridge not in self.bridges and len(self.bridges) < HOPS_MOST
+        return network not in self.networks and bridge not in self.bridges and len(self.bridges) < MAX_HOPS
 
     def carried(self, origin: str, network: str, bridge: str) -> Trail:
         """Return the trail after this bridge forwards the message from `origin` into `network`."""
@@ -55,7 +55,9 @@ def read_trail(extension: Mapping[str, object]) -> Trail:
 def _words(found: object) -> tuple[str, ...]:
     if not isinstance(found, list | tuple):
         return ()
-    return tuple(each for each in found[: HOPS_MOST + 2] if isinstance(each, str) and len(each) <= _WORD_MOST)
+    return tuple(
+        each for each in found[: MAX_HOPS + 2] if isinstance(each, str) and len(each) <= _MAX_WORD_LENGTH
+    )
 
 
 class Echoes:
@@ -85,7 +87,7 @@ class Echoes:
             with self._lock:
                 count, _at = self._sent.pop(key, (0, 0.0))
                 self._sent[key] = count + 1, now
-                while len(self._sent) > _ECHOES_MOST:
+                while len(self._sent) > _MAX_ECHOES:
                     self._sent.popitem(last=False)
 
     def is_echo(self, data: bytes | memoryview, now: float) -> bool:

@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-_WAIT_S = 3.0
+_JOIN_TIMEOUT_S = 3.0
 """A master that has just started delays new nodes by a second."""
 
-_AGAIN_S = 1.0
+_RETRY_S = 1.0
 """Pause before a failed topic is retried; each attempt blocks the gateway's thread."""
-_ALERTS_MAX = 200
-_Made = TypeVar("_Made", Publisher, Subscriber)
+_MAX_ALERTS = 200
+_SocketT = TypeVar("_SocketT", Publisher, Subscriber)
 
 
 class GatewayAttachment:
@@ -64,7 +64,7 @@ class GatewayAttachment:
         address = master.address
 
         def make_node() -> Node:
-            return Node("gateway", master=address, generation="gateway", wait_s=_WAIT_S)
+            return Node("gateway", master=address, generation="gateway", wait_s=_JOIN_TIMEOUT_S)
 
         def submit(request: Request) -> Reply | None:
             try:
@@ -104,7 +104,7 @@ class NativeNetwork:
         report: Callable[[tuple[Alert, ...]], None],
     ) -> None:
         self._make_node = make_node
-        self._listing = listing
+        self._registrar = listing
         self._report = report
         self._node: Node | None = None
         self._inbox: NativeInbox | None = None
@@ -112,7 +112,7 @@ class NativeNetwork:
         self._subscribers: dict[Key, Subscriber] = {}
         self._own: frozenset[int] = frozenset()
         self._alerts: dict[str, Alert] = {}
-        self._again_at: dict[str, float] = {}
+        self._retry_at: dict[str, float] = {}
         self._dropped = 0
 
     # ---- messages
@@ -123,10 +123,10 @@ class NativeNetwork:
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
         """Publish data of an original program, creating the publisher if needed."""
-        self._listing.count((topic, codec), len(data))
+        self._registrar.count((topic, codec), len(data))
         publisher = self._publishers.get((topic, codec))
         if publisher is None:
-            publisher = self._try(topic, lambda node: node.new_pub(topic, codec))
+            publisher = self._open(topic, lambda node: node.new_pub(topic, codec))
             if publisher is None:
                 return
             self._publishers[topic, codec] = publisher
@@ -141,8 +141,8 @@ class NativeNetwork:
 
     def subscribe(self, topic: str, codec: str) -> bool:
         """Subscribe to a topic; return False if that failed."""
-        subscriber = self._try(
-            topic, lambda node: node.new_sub(topic, codec, sink=self._arrived, wildcards=False)
+        subscriber = self._open(
+            topic, lambda node: node.new_sub(topic, codec, sink=self._on_messages, wildcards=False)
         )
         if subscriber is None:
             return False
@@ -176,16 +176,16 @@ class NativeNetwork:
             )
             return None
 
-    def _arrived(self, messages: Sequence[Message]) -> None:
+    def _on_messages(self, messages: Sequence[Message]) -> None:
         # Runs in the node's thread: posts messages of other publishers to the gateway's thread.
         if self._inbox is not None:
             for message in messages:
                 if message.publisher not in self._own:
                     self._inbox.post(message)
 
-    def _try(self, topic: str, make: Callable[[Node], _Made]) -> _Made | None:
+    def _open(self, topic: str, make: Callable[[Node], _SocketT]) -> _SocketT | None:
         id = f"topic:{topic}"
-        if time.monotonic() < self._again_at.get(topic, 0.0):
+        if time.monotonic() < self._retry_at.get(topic, 0.0):
             return None
         try:
             if self._node is None:
@@ -193,8 +193,8 @@ class NativeNetwork:
             made = make(self._node)
         except NepError as error:
             now = time.monotonic()
-            self._again_at = {each: at for each, at in self._again_at.items() if at > now}
-            self._again_at[topic] = now + _AGAIN_S
+            self._retry_at = {each: at for each, at in self._retry_at.items() if at > now}
+            self._retry_at[topic] = now + _RETRY_S
             why, hint = str(error), ""
             if isinstance(error, BadTopicError):
                 why, hint = error.reason, _("Give the topic another name.")
@@ -204,7 +204,7 @@ class NativeNetwork:
                 hint,
             )
             return None
-        self._again_at.pop(topic, None)
+        self._retry_at.pop(topic, None)
         self.resolve(id)
         return made
 
@@ -212,11 +212,11 @@ class NativeNetwork:
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
         """Register these original programs in the graph."""
-        self._listing.show(programs)
+        self._registrar.show(programs)
 
     def look(self) -> None:
         """Send statistics to the master and report dropped messages. Call once a second."""
-        self._listing.renew()
+        self._registrar.renew()
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
             self._dropped = self._inbox.dropped
@@ -234,7 +234,7 @@ class NativeNetwork:
     def tell(self, id: str, sentence: str, hint: str = "") -> None:
         """Report a problem as an alert; repeating it has no effect."""
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
-        if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _ALERTS_MAX):
+        if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _MAX_ALERTS):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 
@@ -245,6 +245,6 @@ class NativeNetwork:
 
     def close(self) -> None:
         """Remove the original programs from the graph and close the node."""
-        self._listing.close()
+        self._registrar.close()
         if self._node is not None:
             self._node.close()

@@ -34,7 +34,7 @@ _CODECS = {
     "image": "image",
     "images": "image",
 }
-_NOT_A_NUMBER = re.compile(rb"\b(?:NaN|Infinity)\b")
+_NON_FINITE = re.compile(rb"\b(?:NaN|Infinity)\b")
 _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
 
 
@@ -74,7 +74,7 @@ class Shape:
         data = self._strip(frame)
         if self.codec == "image":
             return _from_base64(data)
-        if self.codec == "json" and _NOT_A_NUMBER.search(data):
+        if self.codec == "json" and _NON_FINITE.search(data):
             return _without_nan(data)
         return data
 
@@ -107,10 +107,10 @@ class Shape:
                 _("A message on “{topic}” does not begin with the topic").format(topic=self.topic)
             )
         if self.codec == "json":
-            self._refuse_unserved(frame, own)
+            self._check_version(frame, own)
         return frame
 
-    def _refuse_unserved(self, frame: bytes, own: bytes) -> None:
+    def _check_version(self, frame: bytes, own: bytes) -> None:
         if frame.startswith(own):
             raise FrameError(
                 _("A message on “{topic}” begins with the topic").format(topic=self.topic), version="0.5.4.6"
@@ -123,7 +123,7 @@ class Shape:
 
 def lost_numbers(frame: bytes, data: bytes) -> bool:
     """Return whether NaN or infinity in `frame` became `null` in `data`."""
-    return _NOT_A_NUMBER.search(frame) is not None and data.count(b"null") > frame.count(b"null")
+    return _NON_FINITE.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
 
 def shield_javascript(data: bytes, topic: str) -> bytes:

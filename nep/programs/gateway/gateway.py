@@ -23,12 +23,12 @@ from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
 from nep.system.descriptors import SPARE, has_room
 from nep.system.forks import give_up, watch
 
-_LOOK_S = 1.0
+_MAINTENANCE_S = 1.0
 """Interval at which ended programs are removed and ports in use are retried."""
 _MAX_SOCKETS = 8192
-_PAIR_FILES = 20
-_PAUSE_S = 0.2
-_PROGRAMS_MAX = 2000
+_FILES_PER_PAIR = 20
+_ERROR_PAUSE_S = 0.2
+_MAX_REGISTRATIONS = 2000
 """Limit of registrations: each request rewrites the file with all of them."""
 _logger = logging.getLogger("nep.programs.gateway")
 
@@ -70,19 +70,19 @@ class Gateway:
     ) -> None:
         self._outside = outside
         self._processes = processes
-        self._known = PortMap(file, boot)
+        self._port_map = PortMap(file, boot)
         self._inbox = NativeInbox()
         self._ready = threading.Event()
         self._ending = threading.Event()
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._context.set(zmq.MAX_SOCKETS, _MAX_SOCKETS)
-        self._relay = Relay(self._context, outside, outside, self._who)
-        self._request_server = RequestServer(self._context, ports or Ports(), outside, self._decide)
-        self._programs = ProgramTable(self._known, processes, self._relay.pair)
+        self._relay = Relay(self._context, outside, outside, self._program_names)
+        self._request_server = RequestServer(self._context, ports or Ports(), outside, self._assign_port)
+        self._programs = ProgramTable(self._port_map, processes, self._relay.pair)
         self._poller: zmq.Poller | None = None
-        self._counters: dict[zmq.Socket[bytes], int] = {}
+        self._request_sockets: dict[zmq.Socket[bytes], int] = {}
         self._pairs: dict[zmq.Socket[bytes], ProxyPair] = {}
-        self._look_at = 0.0
+        self._maintain_at = 0.0
         self._shown_unserved: dict[TopicLine, dict[Role, str]] = {}
         self._thread = threading.Thread(target=self._run, name="nep-gateway", daemon=True)
         watch(self)
@@ -128,22 +128,22 @@ class Gateway:
         try:
             self._step()
         except Exception:
-            _logger.exception("the gateway made a mistake")
+            _logger.exception("unexpected error in the gateway")
             self._poller = None
-            self._ending.wait(_PAUSE_S)
+            self._ending.wait(_ERROR_PAUSE_S)
 
     def _step(self) -> None:
         if self._poller is None:
-            self._poller = self._watch()
-        wait_s = max(0.0, self._look_at - time.monotonic())
+            self._poller = self._new_poller()
+        wait_s = max(0.0, self._maintain_at - time.monotonic())
         ready = [socket for socket, _ in self._poller.poll(int(wait_s * 1000) + 1)]
         changed: set[TopicLine] = set()
         for pair in {id(pair): pair for pair in map(self._pairs.get, ready) if pair is not None}.values():
             if self._relay.serve(pair):
                 changed.add(pair.line)
         for socket in ready:
-            if socket in self._counters:
-                self._request_server.answer(socket, self._counters[socket])
+            if socket in self._request_sockets:
+                self._request_server.answer(socket, self._request_sockets[socket])
         for message in self._inbox.take():
             data = self._outside.data_of(message)
             if data is not None:
@@ -151,20 +151,20 @@ class Gateway:
         if changed:
             self._programs.look(changed)
             self._show()
-        if time.monotonic() >= self._look_at:
-            self._look()
+        if time.monotonic() >= self._maintain_at:
+            self._maintain()
 
-    def _watch(self) -> zmq.Poller:
+    def _new_poller(self) -> zmq.Poller:
         poller = zmq.Poller()
-        self._counters = dict(self._request_server.sockets())
+        self._request_sockets = dict(self._request_server.sockets())
         self._pairs = dict(self._relay.sockets())
-        for socket in (*self._counters, *self._pairs):
+        for socket in (*self._request_sockets, *self._pairs):
             poller.register(socket, zmq.POLLIN)
         poller.register(self._inbox.fileno(), zmq.POLLIN)
         return poller
 
-    def _look(self) -> None:
-        self._look_at = time.monotonic() + _LOOK_S
+    def _maintain(self) -> None:
+        self._maintain_at = time.monotonic() + _MAINTENANCE_S
         self._relay.look()
         self._programs.look()
         if self._programs.forget_the_gone():
@@ -179,7 +179,7 @@ class Gateway:
             self._show()
         self._outside.look()
 
-    def _who(self, line: TopicLine, role: Role) -> tuple[str, ...]:
+    def _program_names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         return self._programs.names(line, role)  # created after the relay, whose pairs it uses
 
     def _unserved(self) -> dict[TopicLine, dict[Role, str]]:
@@ -194,8 +194,8 @@ class Gateway:
     def _restore(self) -> None:
         # Binds the ports of running programs again: they never ask twice.
         self._programs.forget_the_gone()
-        for line in {known.line for known in self._known.registrations if not known.line.is_service}:
-            base = self._known.port_of(line)
+        for line in {known.line for known in self._port_map.registrations if not known.line.is_service}:
+            base = self._port_map.port_of(line)
             if base is not None and not self._open(line, base):
                 self._outside.tell(
                     f"port:{base}",
@@ -205,18 +205,18 @@ class Gateway:
                     _("Close that program, then restart the programs of the original NEP on this topic."),
                 )
 
-    def _decide(self, request: Request) -> int:
+    def _assign_port(self, request: Request) -> int:
         codec = "service" if request.is_service else request.codec
         line = TopicLine(request.topic, request.framing, codec, request.mode)
         if line.is_service:
             line = TopicLine(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
-        if len(self._known.registrations) >= _PROGRAMS_MAX and not self._programs.make_room():
+        if len(self._port_map.registrations) >= _MAX_REGISTRATIONS and not self._programs.make_room():
             raise RequestError(
-                _("{count} programs have asked already").format(count=_PROGRAMS_MAX), line.topic
+                _("{count} programs have asked already").format(count=_MAX_REGISTRATIONS), line.topic
             )
         registration = self._registration(request, line)
-        self._known.add(registration)
+        self._port_map.add(registration)
         self._programs.expect(registration)
         self._save()
         self._programs.look([line])
@@ -224,23 +224,23 @@ class Gateway:
         return port_to_tell(line, base, request.socket)
 
     def _port_for(self, line: TopicLine) -> int:
-        known = self._known.port_of(line)
+        known = self._port_map.port_of(line)
         if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
             return known
-        if not has_room(_PAIR_FILES + SPARE):
+        if not has_room(_FILES_PER_PAIR + SPARE):
             raise RequestError(
                 _("the master has too many files open; end programs, or restart it"), line.topic
             )
-        for base in self._known.candidates(self._programs.is_used):
+        for base in self._port_map.candidates(self._programs.is_used):
             if self._open(line, base):
-                self._known.give(line, base)
+                self._port_map.give(line, base)
                 return base
         raise RequestError(_("no ports are left between 9000 and 9999"), line.topic)
 
     def _open(self, line: TopicLine, base: int) -> bool:
         if line.is_service:
             return is_free(base)
-        if not has_room(_PAIR_FILES + SPARE):
+        if not has_room(_FILES_PER_PAIR + SPARE):
             return False
         try:
             self._relay.open(line, base)
@@ -259,7 +259,7 @@ class Gateway:
 
     def _save(self) -> None:
         try:
-            self._known.save()
+            self._port_map.save()
         except OSError as error:
             self._outside.tell(
                 "gateway:file",

@@ -37,7 +37,7 @@ _LANGUAGES = {
     "java": "Java",
     "matlab": "MATLAB",
 }
-_NAME_MAX = 100
+_MAX_NAME_LENGTH = 100
 
 
 @dataclass
@@ -69,7 +69,7 @@ class GraphRegistrar:
         self._shown: dict[str, Join] = {}
         self._since: dict[str, int] = {}
         self._counts: dict[Key, _Count] = {}
-        self._carriers: dict[int, Key] = {}
+        self._stat_keys: dict[int, Key] = {}
 
     def count(self, key: Key, size_bytes: int) -> None:
         """Count a message that an original program published."""
@@ -90,12 +90,12 @@ class GraphRegistrar:
             if self._shown.get(node_id) != join:
                 self._shown[node_id] = join
                 self._submit(join)
-        self._choose_carriers(programs)
+        self._assign_stats(programs)
 
     def renew(self) -> None:
         """Send the statistics to the master."""
         for node_id, join in self._shown.items():
-            publishers = tuple(self._counted(record) for record in join.publishers)
+            publishers = tuple(self._publisher_count(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
             load = self._load(node_id, join.node.pid)
             self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers, load))
@@ -117,7 +117,7 @@ class GraphRegistrar:
         node = NodeRecord(
             program.node_id,
             shortened(
-                escaped(program.name), _NAME_MAX
+                escaped(program.name), _MAX_NAME_LENGTH
             ),  # escaped: an original program can't be made to choose a valid name
             socket.gethostname(),
             program.pid,
@@ -125,32 +125,34 @@ class GraphRegistrar:
             program.generation,
             since_ns,
         )
-        links = [link for link in program.links if _can_be_listed(link)]
+        links = [link for link in program.links if _is_valid_link(link)]
         return Join(
             node,
             self._epoch,
             tuple(
-                _publisher(_id(program, link), link) for link in links if link.role in {"publisher", "server"}
+                _publisher(_stable_id(program, link), link)
+                for link in links
+                if link.role in {"publisher", "server"}
             ),
             tuple(
-                _subscriber(_id(program, link), link)
+                _subscriber(_stable_id(program, link), link)
                 for link in links
                 if link.role in {"subscriber", "client"}
             ),
             managed=True,
         )
 
-    def _choose_carriers(self, programs: tuple[OriginalProgram, ...]) -> None:
+    def _assign_stats(self, programs: tuple[OriginalProgram, ...]) -> None:
         chosen: dict[Key, int] = {}
         for program in programs:
             for link in program.links:
                 if link.role == "publisher":
-                    chosen.setdefault((link.topic, link.codec), _id(program, link))
-        self._carriers = {carrier: key for key, carrier in chosen.items()}
+                    chosen.setdefault((link.topic, link.codec), _stable_id(program, link))
+        self._stat_keys = {carrier: key for key, carrier in chosen.items()}
         self._counts = {key: counted for key, counted in self._counts.items() if key in chosen}
 
-    def _counted(self, record: PublisherRecord) -> PublisherCount:
-        key = self._carriers.get(record.id)
+    def _publisher_count(self, record: PublisherRecord) -> PublisherCount:
+        key = self._stat_keys.get(record.id)
         counted = self._counts.get(key, _Count()) if key is not None else _Count()
         return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
 
@@ -172,14 +174,14 @@ def _type(link: TopicLink) -> str:
     return link.codec
 
 
-def _id(program: OriginalProgram, link: TopicLink) -> int:
+def _stable_id(program: OriginalProgram, link: TopicLink) -> int:
     # Stable id for a publisher or subscriber that has none.
     text = f"{program.node_id}\0{link.role}\0{link.topic}\0{link.codec}"
     digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()
     return int.from_bytes(digest, "big") >> 1 or 1
 
 
-def _can_be_listed(link: TopicLink) -> bool:
+def _is_valid_link(link: TopicLink) -> bool:
     if link.role == "server" and link.port is None:
         return False
     try:

@@ -18,18 +18,18 @@ class NativeInbox:
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
         self._lock = threading.Lock()
-        self._waiting: deque[Message] = deque()
+        self._messages: deque[Message] = deque()
         self._size_bytes = 0
         self._max_messages = max_messages
         self._max_bytes = max_bytes
         self._dropped = 0
-        self._ear, self._bell = socket.socketpair()
-        self._ear.setblocking(False)
-        self._bell.setblocking(False)
+        self._reader, self._writer = socket.socketpair()
+        self._reader.setblocking(False)
+        self._writer.setblocking(False)
 
     def fileno(self) -> int:
         """Return the descriptor that becomes readable when a message is posted."""
-        return self._ear.fileno()
+        return self._reader.fileno()
 
     @property
     def dropped(self) -> int:
@@ -40,11 +40,11 @@ class NativeInbox:
         """Queue a message and wake the reader."""
         size = message.size_bytes
         with self._lock:
-            if len(self._waiting) >= self._max_messages or self._size_bytes + size > self._max_bytes:
+            if len(self._messages) >= self._max_messages or self._size_bytes + size > self._max_bytes:
                 self._dropped += 1
                 return
-            was_empty = not self._waiting
-            self._waiting.append(message)
+            was_empty = not self._messages
+            self._messages.append(message)
             self._size_bytes += size
         if was_empty:
             self.wake()
@@ -52,19 +52,19 @@ class NativeInbox:
     def wake(self) -> None:
         """Wake the reader even if nothing was posted."""
         with contextlib.suppress(OSError):  # full: the reader is already woken; closed: there is none
-            self._bell.send(b"\x00")
+            self._writer.send(b"\x00")
 
     def take(self) -> list[Message]:
         """Remove and return all messages, oldest first."""
         with contextlib.suppress(BlockingIOError):
-            self._ear.recv(4096)
+            self._reader.recv(4096)
         with self._lock:
-            taken = list(self._waiting)
-            self._waiting.clear()
+            taken = list(self._messages)
+            self._messages.clear()
             self._size_bytes = 0
         return taken
 
     def close(self) -> None:
         """Close the two sockets."""
-        self._ear.close()
-        self._bell.close()
+        self._reader.close()
+        self._writer.close()

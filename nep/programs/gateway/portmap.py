@@ -1,4 +1,4 @@
-"""Ports of original topics and their programs, stored in a file, because original programs never ask twice."""
+"""Ports of original topics and their programs, kept in a file: original programs never ask twice."""
 
 from __future__ import annotations
 

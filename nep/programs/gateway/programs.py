@@ -13,7 +13,7 @@ from nep.programs.gateway.proxy_pair import Endpoint, ProxyPair
 from nep.programs.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
-_COMING_S = 10.0
+_CONNECT_GRACE_S = 10.0
 """Time after its request in which a program may still connect; short connections until then may be of others.
 """
 
@@ -58,7 +58,7 @@ class ProgramTable:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
-        self._known = known
+        self._port_map = known
         self._processes = processes
         self._pair_of = pair_of
         self._roles: dict[Registration, frozenset[Role]] = {}
@@ -68,7 +68,7 @@ class ProgramTable:
     def look(self, lines: Iterable[TopicLine] | None = None) -> None:
         """Update the roles of programs on these lines (default: all)."""
         chosen = None if lines is None else set(lines)
-        for registration in self._known.registrations:
+        for registration in self._port_map.registrations:
             if chosen is None or registration.line in chosen:
                 roles = frozenset(self._roles_of(registration))
                 self._roles[registration] = roles
@@ -82,13 +82,13 @@ class ProgramTable:
 
     def forget_the_gone(self) -> bool:
         """Remove programs that ended or closed their connections; return whether any was removed."""
-        gone = {registration for registration in self._known.registrations if self._is_gone(registration)}
+        gone = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
         self._forget(gone)
         return bool(gone)
 
     def _forget(self, gone: set[Registration]) -> None:
         if gone:
-            self._known.remove(gone)
+            self._port_map.remove(gone)
             self._was_joined -= gone
             for registration in gone:
                 self._roles.pop(registration, None)
@@ -96,7 +96,7 @@ class ProgramTable:
 
     def make_room(self) -> bool:
         """Remove the oldest program that asked and never connected; return whether there was one."""
-        for registration in self._known.registrations:
+        for registration in self._port_map.registrations:
             if not self._roles.get(registration):
                 self._forget({registration})
                 return True
@@ -105,7 +105,7 @@ class ProgramTable:
     def programs(self) -> tuple[OriginalProgram, ...]:
         """Return the current original nodes with their roles."""
         grouped: dict[str, list[Registration]] = {}
-        for registration in self._known.registrations:
+        for registration in self._port_map.registrations:
             grouped.setdefault(registration.node_id, []).append(registration)
         return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
 
@@ -114,29 +114,29 @@ class ProgramTable:
         return tuple(
             dict.fromkeys(
                 registration.node
-                for registration in self._known.registrations
+                for registration in self._port_map.registrations
                 if registration.line == line and role in self._roles.get(registration, ())
             )
         )
 
     def languages(self) -> dict[TopicLine, frozenset[str]]:
         """Return the known programming languages of the programs on each line."""
-        told: dict[TopicLine, frozenset[str]] = {}
-        for registration in self._known.registrations:
+        members: dict[TopicLine, frozenset[str]] = {}
+        for registration in self._port_map.registrations:
             if registration.language is not None:
-                known = told.get(registration.line, frozenset())
-                told[registration.line] = known | {registration.language}
-        return told
+                known = members.get(registration.line, frozenset())
+                members[registration.line] = known | {registration.language}
+        return members
 
     def members(self) -> list[Member]:
         """Return the entries of the original NEP's broadcast."""
-        told: list[Member] = []
-        for registration in self._known.registrations:
+        members: list[Member] = []
+        for registration in self._port_map.registrations:
             line = registration.line
-            port = self._known.port_of(line)
+            port = self._port_map.port_of(line)
             if port is not None:
                 mode = None if line.is_service else line.mode
-                told.append(
+                members.append(
                     Member(
                         line.topic,
                         registration.node,
@@ -147,14 +147,14 @@ class ProgramTable:
                         registration.pid,
                     )
                 )
-        return told
+        return members
 
     def is_used(self, line: TopicLine) -> bool:
         """Return whether a current program asked for this line, or is connected to it."""
         pair = self._pair_of(line)
         if pair is not None and any(pair.connections.values()):
             return True
-        return any(registration.line == line for registration in self._known.registrations)
+        return any(registration.line == line for registration in self._port_map.registrations)
 
     def _program(self, node_id: str, asked: list[Registration]) -> OriginalProgram:
         links = {
@@ -171,7 +171,7 @@ class ProgramTable:
         for each in asked:
             if each.line.is_service and each.started is not None and each.socket in get_args(ServiceRole):
                 role = cast("ServiceRole", each.socket)
-                port = self._known.port_of(each.line)
+                port = self._port_map.port_of(each.line)
                 yield TopicLink(each.line.topic, each.msg_type, each.line.codec, role, port)
 
     def _unserved(self, asked: list[Registration]) -> str | None:
@@ -206,7 +206,7 @@ class ProgramTable:
         now = self._clock()
         before, asked_at = self._openings.setdefault(registration, (pair.openings, now))
         came = pair.openings > before and not any(pair.connections.values())
-        return came and now - asked_at >= _COMING_S
+        return came and now - asked_at >= _CONNECT_GRACE_S
 
     def _is_gone(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:

@@ -17,14 +17,14 @@ from nep.programs.gateway.requests import LOOPBACK, Role
 
 _OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
 _CLOSED = zmq.EVENT_DISCONNECTED
-_QUEUE = 1000
-_QUEUE_OF_PICTURES = 20
-MOST_KEPT_BYTES = 128 * 2**20
+_QUEUE_LENGTH = 1000
+_IMAGE_QUEUE_LENGTH = 20
+MAX_BUFFERED_BYTES = 128 * 2**20
 """Approximate buffer limit per slow subscriber: libzmq counts messages, not bytes."""
 _LINGER_MS = 200
-_LARGEST_BYTES = 2**28
-_LARGEST_FILTER_BYTES = 2**16
-_FILTERS_MAX = 1000
+_MAX_FRAME_BYTES = 2**28
+_MAX_FILTER_BYTES = 2**16
+_MAX_FILTERS = 1000
 """Limit of filters per pair; an original program sets one or two."""
 
 
@@ -82,10 +82,10 @@ class ProxyPair:
         self._open_handles: dict[Role, set[int]] = {"publisher": set(), "subscriber": set()}
         self.monitors: dict[Role, zmq.Socket[bytes]] = {}
         self.languages: frozenset[str] = frozenset()
-        self._mark = self._queue = _QUEUE_OF_PICTURES if line.codec == "image" else _QUEUE
+        self._high_water_mark = self._queue = _IMAGE_QUEUE_LENGTH if line.codec == "image" else _QUEUE_LENGTH
         with contextlib.ExitStack() as undo:
-            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _LARGEST_BYTES)
-            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _LARGEST_FILTER_BYTES)
+            self.incoming = self._open(context, zmq.XSUB, self.ends[0], undo, _MAX_FRAME_BYTES)
+            self.outgoing = self._open(context, zmq.XPUB, self.ends[1], undo, _MAX_FILTER_BYTES)
             self.incoming.send(b"\x01")  # subscribe to everything
             self._closing = undo.pop_all()
 
@@ -147,7 +147,7 @@ class ProxyPair:
                 note = self.outgoing.recv(zmq.NOBLOCK)
             except zmq.Again:
                 return before != self.filters
-            if note[:1] == b"\x01" and len(self.filters) < _FILTERS_MAX:
+            if note[:1] == b"\x01" and len(self.filters) < _MAX_FILTERS:
                 self.filters.add(note[1:])
             elif note[:1] == b"\x00":
                 self.filters.discard(note[1:])
@@ -194,9 +194,9 @@ class ProxyPair:
         return data
 
     def _send(self, frame: bytes) -> None:
-        mark = min(self._queue, max(1, MOST_KEPT_BYTES // max(1, len(frame))))
-        if mark != self._mark:  # libzmq applies it to connected subscribers, too
+        mark = min(self._queue, max(1, MAX_BUFFERED_BYTES // max(1, len(frame))))
+        if mark != self._high_water_mark:  # libzmq applies it to connected subscribers, too
             self.outgoing.setsockopt(zmq.SNDHWM, mark)
-            self._mark = mark
+            self._high_water_mark = mark
         with contextlib.suppress(zmq.Again):
             self.outgoing.send(frame, zmq.NOBLOCK)

@@ -14,7 +14,7 @@ from nep.programs.gateway.portmap import TopicLine
 from nep.programs.gateway.proxy_pair import ProxyPair
 from nep.programs.gateway.requests import Role
 
-_BATCH = 200
+_MAX_BATCH = 200
 """Maximum number of frames read from one line in a row."""
 
 
@@ -53,13 +53,13 @@ Who = Callable[[TopicLine, Role], Sequence[str]]
 
 
 @dataclass
-class _Refused:
+class _RejectedMessages:
     """Invalid messages of a topic since the last valid one."""
 
     reason: str
     count: int = 0
-    told: int = 0
-    is_cured: bool = False
+    reported: int = 0
+    is_resolved: bool = False
 
 
 class Relay:
@@ -79,7 +79,7 @@ class Relay:
         self._pairs: dict[TopicLine, ProxyPair] = {}
         self._subscribed: set[Key] = set()
         self._publishing: set[Key] = set()
-        self._refused: dict[str, _Refused] = {}
+        self._rejected: dict[str, _RejectedMessages] = {}
 
     @property
     def pairs(self) -> Iterable[ProxyPair]:
@@ -102,7 +102,7 @@ class Relay:
             pair.close()
             self.settle((line.topic, line.codec))
             for role in tuple(pair.unserved):
-                self._serve_again(pair, role)
+                self._clear_version(pair, role)
 
     def close(self) -> None:
         """Close all lines."""
@@ -121,8 +121,8 @@ class Relay:
         changed |= pair.read_filters()
         if changed:
             self.settle((pair.line.topic, pair.line.codec))
-        for frame in pair.frames(_BATCH):
-            self._enter(pair, frame)
+        for frame in pair.frames(_MAX_BATCH):
+            self._relay_frame(pair, frame)
         return changed
 
     def know_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
@@ -132,23 +132,23 @@ class Relay:
 
     def deliver(self, topic: str, codec: str, data: bytes | memoryview) -> None:
         """Send a native message to all original subscribers, each in its format."""
-        for pair in self._of((topic, codec)):
+        for pair in self._pairs_of((topic, codec)):
             pair.deliver(data)
 
     def look(self) -> None:
         """Retry failed subscriptions and update alerts. Call once a second."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.settle(key)
-        for topic, refused in list(self._refused.items()):
-            if refused.count != refused.told:
-                self._tell_refused(topic, refused)
-            elif refused.is_cured:
-                del self._refused[topic]
+        for topic, rejected in list(self._rejected.items()):
+            if rejected.count != rejected.reported:
+                self._report_rejected(topic, rejected)
+            elif rejected.is_resolved:
+                del self._rejected[topic]
                 self._alerts.resolve(f"message:{topic}")
 
     def settle(self, key: Key) -> None:
         """Open or close native publishers and subscribers as original programs need them."""
-        pairs = self._of(key)
+        pairs = self._pairs_of(key)
         wanted = any(pair.wanted for pair in pairs)
         if wanted and key not in self._subscribed:
             if self._native.subscribe(*key):
@@ -161,20 +161,20 @@ class Relay:
             self._native.stop_publishing(*key)
             self._alerts.resolve(f"nan:{key[0]}")
         for pair in pairs:
-            self._judge(pair)
+            self._check_versions(pair)
 
-    def _of(self, key: Key) -> list[ProxyPair]:
+    def _pairs_of(self, key: Key) -> list[ProxyPair]:
         return [pair for pair in self._pairs.values() if (pair.line.topic, pair.line.codec) == key]
 
-    def _enter(self, pair: ProxyPair, frame: bytes) -> None:
+    def _relay_frame(self, pair: ProxyPair, frame: bytes) -> None:
         key = (pair.line.topic, pair.line.codec)
         try:
             data = pair.shape.read(frame)
         except FrameError as error:
-            self._refuse(pair, error)
+            self._reject(pair, error)
             return
-        if pair.line.topic in self._refused:
-            self._refused[pair.line.topic].is_cured = True
+        if pair.line.topic in self._rejected:
+            self._rejected[pair.line.topic].is_resolved = True
         if pair.line.codec == "json" and lost_numbers(frame, data):
             self._alerts.tell(
                 f"nan:{pair.line.topic}",
@@ -183,7 +183,7 @@ class Relay:
                 ),
                 _("Let the program that publishes it send null where it has no value."),
             )
-        for other in self._of(key):
+        for other in self._pairs_of(key):
             if other is pair:
                 other.pass_on(frame, data)
             else:
@@ -191,34 +191,34 @@ class Relay:
         self._publishing.add(key)
         self._native.publish(*key, data)
 
-    def _refuse(self, pair: ProxyPair, error: FrameError) -> None:
+    def _reject(self, pair: ProxyPair, error: FrameError) -> None:
         if error.version is not None:
-            self._tell_version("publisher", pair, error.version)
+            self._report_version("publisher", pair, error.version)
             return
         topic = pair.line.topic
-        refused = self._refused.setdefault(topic, _Refused(str(error)))
-        refused.reason, refused.is_cured = str(error), False
-        refused.count += 1
-        if refused.count == 1:  # further ones are reported once a second
-            self._tell_refused(topic, refused)
+        rejected = self._rejected.setdefault(topic, _RejectedMessages(str(error)))
+        rejected.reason, rejected.is_resolved = str(error), False
+        rejected.count += 1
+        if rejected.count == 1:  # further ones are reported once a second
+            self._report_rejected(topic, rejected)
 
-    def _tell_refused(self, topic: str, refused: _Refused) -> None:
-        refused.told = refused.count
-        words = ngettext("{reason}", "{reason} ({count} messages)", refused.count)
-        self._alerts.tell(f"message:{topic}", words.format(reason=refused.reason, count=refused.count))
+    def _report_rejected(self, topic: str, rejected: _RejectedMessages) -> None:
+        rejected.reported = rejected.count
+        words = ngettext("{reason}", "{reason} ({count} messages)", rejected.count)
+        self._alerts.tell(f"message:{topic}", words.format(reason=rejected.reason, count=rejected.count))
 
-    def _judge(self, pair: ProxyPair) -> None:
+    def _check_versions(self, pair: ProxyPair) -> None:
         if pair.has_0546:
-            self._tell_version("subscriber", pair, "0.5.4.6")
+            self._report_version("subscriber", pair, "0.5.4.6")
         else:
-            self._serve_again(pair, "subscriber")
+            self._clear_version(pair, "subscriber")
         version = pair.unserved.get("publisher")
         if version is not None and pair.connections["publisher"]:
-            self._tell_version("publisher", pair, version)
+            self._report_version("publisher", pair, version)
         else:
-            self._serve_again(pair, "publisher")
+            self._clear_version(pair, "publisher")
 
-    def _tell_version(self, role: Role, pair: ProxyPair, version: str) -> None:
+    def _report_version(self, role: Role, pair: ProxyPair, version: str) -> None:
         pair.unserved[role] = version
         names = [f"“{name}”" for name in self._who(pair.line, role)]
         if not names:
@@ -233,6 +233,6 @@ class Relay:
             _("Install nep 0.5.4.8 or 0.5.4.5 for that program."),
         )
 
-    def _serve_again(self, pair: ProxyPair, role: Role) -> None:
+    def _clear_version(self, pair: ProxyPair, role: Role) -> None:
         if pair.unserved.pop(role, None) is not None:
             self._alerts.resolve(f"version:{pair.line.topic}:{role}")

@@ -23,7 +23,7 @@ from nep.programs.gateway.requests import (
 )
 
 _logger = logging.getLogger("nep.programs.gateway")
-_LARGEST_BYTES = 2**24
+_MAX_REQUEST_BYTES = 2**24
 """Limit at which ZeroMQ disconnects the sender; requests have a few hundred bytes."""
 
 
@@ -52,9 +52,9 @@ class RequestServer:
         self._context = context
         self._ports = ports
         self._alerts = alerts
-        self._decide = decide
-        self._counters: dict[int, zmq.Socket[bytes]] = {}
-        self._board: zmq.Socket[bytes] | None = None
+        self._assign_port = decide
+        self._request_sockets: dict[int, zmq.Socket[bytes]] = {}
+        self._broadcast_socket: zmq.Socket[bytes] | None = None
 
     @property
     def ports(self) -> tuple[int, ...]:
@@ -64,29 +64,29 @@ class RequestServer:
 
     def open(self) -> bool:
         """Bind the ports that are not bound yet; return whether any was bound."""
-        before = len(self._counters)
+        before = len(self._request_sockets)
         for port, who in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
-            if port and port not in self._counters:
+            if port and port not in self._request_sockets:
                 words = _("Port {port} is taken by another program; programs of {version} cannot join")
                 bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=who))
                 if bound is not None:
-                    self._counters[port] = bound
-        if self._ports.broadcast and self._board is None:
-            self._board = self._bind(
+                    self._request_sockets[port] = bound
+        if self._ports.broadcast and self._broadcast_socket is None:
+            self._broadcast_socket = self._bind(
                 zmq.PUB,
                 self._ports.broadcast,
                 _("Port {port} is taken by another program; tools of the original NEP show no topics").format(
                     port=self._ports.broadcast
                 ),
             )
-        return len(self._counters) != before
+        return len(self._request_sockets) != before
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], int]]:
         """Yield the request sockets with their ports."""
-        for port, counter in self._counters.items():
+        for port, counter in self._request_sockets.items():
             yield counter, port
 
     def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
@@ -102,7 +102,7 @@ class RequestServer:
         envelope, asked = parts[:end], b"".join(parts[end:])
         try:
             request = read_request(asked, port)
-            reply = grant(request, self._decide(request))
+            reply = grant(request, self._assign_port(request))
         except RequestError as error:
             reply = refuse(error)
         except Exception:  # a reply must be sent, or the port would hang for everyone
@@ -112,19 +112,22 @@ class RequestServer:
 
     def tell(self, members: Iterable[Member]) -> None:
         """Broadcast all topics to tools of the original NEP."""
-        if self._board is not None:
-            self._board.send(broadcast(members))
+        if self._broadcast_socket is not None:
+            self._broadcast_socket.send(broadcast(members))
 
     def close(self) -> None:
         """Release the ports."""
-        for socket in (*self._counters.values(), *([self._board] if self._board is not None else [])):
+        for socket in (
+            *self._request_sockets.values(),
+            *([self._broadcast_socket] if self._broadcast_socket is not None else []),
+        ):
             socket.close(0)
-        self._counters.clear()
-        self._board = None
+        self._request_sockets.clear()
+        self._broadcast_socket = None
 
     def _bind(self, kind: int, port: int, taken: str) -> zmq.Socket[bytes] | None:
         socket = self._context.socket(kind)
-        socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST_BYTES)
+        socket.setsockopt(zmq.MAXMSGSIZE, _MAX_REQUEST_BYTES)
         try:
             socket.bind(f"tcp://{LOOPBACK}:{port}")
         except zmq.ZMQError:

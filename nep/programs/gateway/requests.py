@@ -15,8 +15,8 @@ Role = Literal["publisher", "subscriber"]
 LOOPBACK = "127.0.0.1"
 MAX_REQUEST_BYTES = 64 * 1024
 MAX_NAME_BYTES = 200
-_DATA = frozenset({"publisher", "subscriber"})
-_SERVICES = frozenset({"client", "server", "surveyor", "respondent"})
+_TOPIC_SOCKETS = frozenset({"publisher", "subscriber"})
+_SERVICE_SOCKETS = frozenset({"client", "server", "surveyor", "respondent"})
 _MODES: Mapping[str, Mode] = {"many2many": "many2many", "one2many": "one2many", "many2one": "many2one"}
 
 
@@ -59,7 +59,7 @@ class Request:
     @property
     def is_service(self) -> bool:
         """True if it asks for a service port, whose bytes are not converted."""
-        return self.socket in _SERVICES
+        return self.socket in _SERVICE_SOCKETS
 
 
 def read_request(data: bytes, asked_port: int) -> Request:
@@ -76,7 +76,7 @@ def read_request(data: bytes, asked_port: int) -> Request:
     return Request(
         node=_name(fields, "node", topic),
         topic=_name(fields, "topic", topic),
-        socket=_choice(fields, "socket", _DATA | _SERVICES, topic),
+        socket=_choice(fields, "socket", _TOPIC_SOCKETS | _SERVICE_SOCKETS, topic),
         mode=_MODES[_choice(fields, "mode", frozenset(_MODES), topic, default="many2many")],
         msg_type=_choice(fields, "msg_type", None, topic, default="json"),
         pid=_pid(fields.get("pid")),

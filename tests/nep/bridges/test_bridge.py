@@ -117,7 +117,7 @@ def test_a_type_of_its_own_stays_that_type():
 @pytest.mark.parametrize("soon_s", [0.05, 0.5])
 def test_a_topic_that_others_publish_there_keeps_its_one_type(monkeypatch, soon_s):
     """However lately the bridge has looked who is there: the type is decided by a look after the message."""
-    monkeypatch.setattr("nep.programs.bridges.side._SOON_S", soon_s)
+    monkeypatch.setattr("nep.programs.bridges.side._EARLY_POLL_S", soon_s)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/t")) as bridge:
         on_b = b.node("b")
         own, sub = on_b.new_pub("/t", "robot/state"), on_b.new_sub("/t", "robot/state")
@@ -345,7 +345,7 @@ def test_what_is_latched_stays_latched_for_who_comes_later(pair):
 
 
 def test_each_publisher_s_latched_message_is_kept_and_goes_with_it(monkeypatch):
-    monkeypatch.setattr("nep.programs.bridges.route._GONE_S", 0.0)
+    monkeypatch.setattr("nep.programs.bridges.route._PUBLISHER_EXPIRY_S", 0.0)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/robots")) as bridge:
         pubs = [a.node(f"robot{n}").new_pub("/robots", latched=True) for n in range(3)]
         for number, pub in enumerate(pubs):
@@ -447,7 +447,7 @@ def test_what_a_pattern_found_is_let_go_when_nobody_publishes_it_and_found_again
 
 
 def test_patterns_have_a_bound(monkeypatch, caplog):
-    monkeypatch.setattr("nep.programs.bridges.bridge.ROUTES_MOST", 2)
+    monkeypatch.setattr("nep.programs.bridges.bridge.MAX_ROUTES", 2)
     with nets("memory", "memory") as (a, b), bridged(a, b, topic("/**", "/all/**")) as bridge:
         node = a.node("a")
         for number in range(4):
@@ -473,8 +473,8 @@ def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(c
             eventually(lambda: route(bridge, "a", "/t").counts().waiting == 5)
             eventually(lambda: "no master answers at" in bridge.sides["b"].problem)
             # It is known before it is written to the log.
-            eventually(lambda: "is waited for: no master answers at" in caplog.text)
-            assert caplog.text.count("is waited for: no master answers at") == 1
+            eventually(lambda: "waiting for side" in caplog.text)
+            assert caplog.text.count("waiting for side") == 1
             assert not bridge.is_ready
             with Master(address, learn_s=0.0), away:
                 assert bridge.wait_until_ready(30.0)
@@ -488,7 +488,7 @@ def test_a_network_that_is_not_there_is_waited_for_and_said_and_the_rest_works(c
 
 
 def test_more_than_there_is_room_for_is_dropped_and_counted(monkeypatch):
-    monkeypatch.setattr("nep.programs.bridges.route.HELD_MESSAGES", 10)
+    monkeypatch.setattr("nep.programs.bridges.route.MAX_BACKLOG_MESSAGES", 10)
     with Master("127.0.0.1:0", learn_s=0.0) as first:
         address = first.address
     with nets("memory") as (a,):
@@ -527,7 +527,7 @@ def test_a_route_that_cannot_be_served_does_not_stop_the_others(caplog):
             bridge._add(topic("/late"), "a", "/late", "/late")
             eventually(lambda: route(bridge, "a", "/late").is_subscribed)
             eventually(lambda: route(bridge, "a", "/bad").trouble == "RuntimeError: no such type")
-            assert "'/bad' on side a is not carried to '/bad' yet: RuntimeError" in caplog.text
+            assert "'/bad' on side a is not forwarded to '/bad' yet: RuntimeError" in caplog.text
             sub = b.node("b").new_sub("/good")
             a.node("a").new_pub("/good").publish(1)
             assert sub.listen(timeout_s=30.0) == (True, 1)

@@ -171,8 +171,8 @@ def test_a_master_that_is_not_there_yet_is_waited_for(file, place):
         lines = err.splitlines()
         assert len(lines) == 2
         assert "side a of the bridge" in lines[0]
-        assert "is waited for: no master answers at" in lines[0]
-        assert lines[1].endswith("is there")
+        assert "waiting for side" in lines[0]
+        assert lines[1].endswith("is connected")
 
 
 class OnTerminal:

@@ -13,7 +13,7 @@ from nep.errors import WireError
 from nep.messages.message import arrived
 from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
 from nep.programs.bridges.other_bridges import OtherBridge, OtherBridges
-from nep.programs.bridges.trail import ECHO_S, HOPS_MOST, TRAIL_KEY, Echoes, Trail, read_trail
+from nep.programs.bridges.trail import ECHO_S, MAX_HOPS, TRAIL_KEY, Echoes, Trail, read_trail
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -242,7 +242,7 @@ def test_two_bridges_over_a_network_without_signs_end_too(nameless_side):
 def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_has_ended(monkeypatch, caplog):
     import nep
 
-    monkeypatch.setattr("nep.programs.bridges.other_bridges._FORGOTTEN_S", 3.0)
+    monkeypatch.setattr("nep.programs.bridges.other_bridges._EXPIRY_S", 3.0)
     monkeypatch.setattr("nep.programs.bridges.side.HEARTBEAT_S", 0.5)
     backend = replace(memory.BACKEND, name="nameless", open=Nameless, has_extensions=False)
     monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
@@ -260,7 +260,7 @@ def test_where_nothing_keeps_trails_one_of_two_bridges_lets_go_until_the_other_h
         strong = min(pair, key=lambda bridge: bridge.id)
         eventually(lambda: all(each.rival == strong.configuration.name for each in weak.routes))
         assert not any(each.rival for each in strong.routes)
-        assert f"the bridge '{strong.configuration.name}' joins '/t' and '/t', too" in caplog.text
+        assert f"the bridge '{strong.configuration.name}' also forwards '/t' and '/t'" in caplog.text
         here, there = (opened.enter_context(nep.node(at, "nameless", master=at)) for at in ("here", "there"))
         hears_here, hears_there, says = here.new_sub("/t"), there.new_sub("/t"), here.new_pub("/t")
         for number in range(20):
@@ -282,8 +282,8 @@ def test_a_second_bridge_between_the_same_networks_is_said_once(caplog):
         bridged(a, b, topic("/t"), topic("/u"), name="one"),
         bridged(b, a, topic("/u"), name="two"),
     ):
-        eventually(lambda: caplog.text.count("the bridge 'one' joins '/u' and '/u', too") == 1)
-        eventually(lambda: caplog.text.count("the bridge 'two' joins '/u' and '/u', too") == 1)
+        eventually(lambda: caplog.text.count("the bridge 'one' also forwards '/u' and '/u'") == 1)
+        eventually(lambda: caplog.text.count("the bridge 'two' also forwards '/u' and '/u'") == 1)
         assert "'/t' and" not in caplog.text
 
 
@@ -374,7 +374,7 @@ def test_a_trail_says_where_a_message_may_go():
 
 def test_a_trail_has_an_end():
     trail = Trail()
-    for number in range(HOPS_MOST):
+    for number in range(MAX_HOPS):
         assert trail.may_go(f"n{number + 1}", f"b{number}")
         trail = trail.carried(f"n{number}", f"n{number + 1}", f"b{number}")
     assert not read_trail({TRAIL_KEY: trail.to_plain()}).may_go("new", "new")
@@ -389,8 +389,8 @@ def test_a_trail_has_an_end():
 )  # fmt: skip
 def test_whatever_somebody_else_writes_there_is_read_without_harm(found):
     trail = read_trail({TRAIL_KEY: found})
-    assert len(trail.networks) <= HOPS_MOST + 2
-    assert len(trail.bridges) <= HOPS_MOST + 2
+    assert len(trail.networks) <= MAX_HOPS + 2
+    assert len(trail.bridges) <= MAX_HOPS + 2
 
 
 def test_a_message_with_a_strange_trail_passes():

@@ -10,7 +10,7 @@ import pytest
 import zmq
 
 from nep.programs.gateway.portmap import TopicLine
-from nep.programs.gateway.proxy_pair import MOST_KEPT_BYTES, ProxyPair
+from nep.programs.gateway.proxy_pair import MAX_BUFFERED_BYTES, ProxyPair
 
 LONG_MS = 30_000
 Socket: TypeAlias = zmq.Socket[bytes]
@@ -78,11 +78,11 @@ def rest(of: Socket) -> list[bytes]:
 @pytest.mark.parametrize("size", [200_000, 4_000_000, 60_000_000])
 def test_what_is_kept_for_who_does_not_read_is_bounded_in_bytes(pair, subscriber, size: int) -> None:
     stuck = subscriber(keep=1)
-    for number in range(5 * MOST_KEPT_BYTES // size):
+    for number in range(5 * MAX_BUFFERED_BYTES // size):
         pair.deliver(numbered(number, size))
     kept = rest(stuck)
     assert kept[0].startswith(b't {"n":0')
-    assert sum(map(len, kept)) < MOST_KEPT_BYTES + 3 * size + 20_000_000  # and what was under way, or with it
+    assert sum(map(len, kept)) < MAX_BUFFERED_BYTES + 3 * size + 20_000_000  # plus messages in flight
 
 
 def test_who_reads_gets_everything_beside_one_that_does_not(pair, subscriber) -> None:
