@@ -1,5 +1,5 @@
-"""Robots: their descriptions, and the kit that makes a driver from functions.
+"""Robots: descriptions, and the driver kit that creates a driver from functions.
 
-Drivers import `app.robots.kit`. The robots of Studio are one module each: `simulated` is Pepper, `turtle` the
-robot on two wheels, `rize` what speaks only RIZE's dialect.
+Drivers import `app.robots.kit`. Studio's own robots are one module each: `simulated` (Pepper), `turtle`
+(two-wheeled robot), `rize` (robots that only use RIZE's dialect).
 """

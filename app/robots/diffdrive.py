@@ -1,7 +1,7 @@
-"""A robot on two wheels with a camera: what it can do, and how it does it with any base that has a speed.
+"""Two-wheeled robot with a camera: its declaration and its actions for any base with speed control.
 
-A driver gives it its wheels (:class:`Wheels`): a real base over its own line, or the virtual one of
-:mod:`app.robots.turtle`. Distances are measured with the base's own place (odometry).
+A driver supplies the base (:class:`Wheels`): a real one over its own connection, or the virtual one of
+:mod:`app.robots.turtle`. Distances are measured by the base's odometry.
 """
 
 from __future__ import annotations
@@ -38,29 +38,29 @@ Distance = Annotated[float, Range(-REACH_M, REACH_M, 0.05, "m")]
 
 
 class Wheels(Protocol):
-    """What the robot needs of its base. Each may be called from any thread."""
+    """Base of the robot. All methods must be thread-safe."""
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Go at this speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
+        """Move at this speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
 
     def pose(self) -> tuple[float, float, float]:
-        """Where it is: metres, metres, degrees."""
+        """Return the position in metres and the orientation in degrees: x, y, theta."""
 
     def still(self) -> bool:
-        """Whether it stands still."""
+        """Return whether the base stands still."""
 
     def bumped(self) -> str:
-        """The side that touches something, or "" for none."""
+        """Return the side that touches something, or ""."""
 
     def light(self, colour: str) -> None:
-        """Give its light a colour, ``#rrggbb``."""
+        """Set the colour of the light, ``#rrggbb``."""
 
     def close(self) -> None:
-        """Let go of the base."""
+        """Disconnect from the base."""
 
 
 class DiffDrive:
-    """Declares the robot and drives its wheels."""
+    """Declaration and actions of the robot."""
 
     pose = position_sensor(rate_hz=30)
     distance = distance_sensor(most_m=4)
@@ -87,12 +87,11 @@ class DiffDrive:
     )
 
     def __init__(self, link: Link, wheels: Wheels) -> None:
-        """`wheels` are its base; it is closed with the robot."""
         self.link, self.wheels = link, wheels
         self._steering = threading.Lock()
 
     def close(self) -> None:
-        """Let go of the base."""
+        """Disconnect from the base."""
         self.wheels.close()
 
     # ---- actions ----------------------------------------------------------------------------------
@@ -156,7 +155,7 @@ class DiffDrive:
     @safe_stop(watchdog_s=0.5, within_s=0.1)
     def stop(self) -> None:
         """Brake; returns when it stands still."""
-        with self._steering:  # what was being done has been canceled: it does not steer any more
+        with self._steering:  # running actions are canceled and don't steer any more
             self.wheels.drive(0.0, 0.0)
         waited = threading.Event()
         for _turn in range(round(STAND_STILL_S / 0.005)):
@@ -178,7 +177,7 @@ class DiffDrive:
             self.wheels.drive(0.0, 0.0)
 
     def odometer(self) -> Callable[[], float]:
-        """What tells how many metres straight were made since now; by its place, unless it knows better."""
+        """Return a function that gives the metres driven straight since now, by default from the position."""
         start_x, start_y, _ = self.wheels.pose()
 
         def made() -> float:
@@ -188,7 +187,6 @@ class DiffDrive:
         return made
 
     def _roll(self, call: Call, distance: float, told: Callable[[float], dict[str, object]]) -> float:
-        """Go straight; the metres that were made. Failed when something is in the way."""
         made = self.odometer()
 
         def steer(left: float) -> None:
@@ -202,7 +200,6 @@ class DiffDrive:
         return made()
 
     def _spin(self, call: Call, angle: float, told: Callable[[float], dict[str, object]]) -> None:
-        """Turn on the spot by an angle, whole turns included."""
         last = [self.wheels.pose()[2]]
         turned = [0.0]
 
@@ -249,7 +246,7 @@ def _left(amount: float, done: float) -> float:
 
 
 class Pattern(DiffDrive):
-    """The description without a base: a driver puts its own class in this one's place."""
+    """Description without a base: a driver replaces it by its own class."""
 
     def __init__(self, link: Link) -> None:
         raise Failed(

@@ -1,4 +1,4 @@
-"""Tells robots that the program which moves them lives; a robot that hears nothing stops by itself."""
+"""Heartbeat to robots: a robot that receives none stops by itself."""
 
 from __future__ import annotations
 
@@ -17,10 +17,14 @@ Publish = Callable[[Mapping[str, object]], object]
 
 
 class Heartbeat:
-    """Sends ``alive`` five times a second to each robot that is to go on, in a thread of its own."""
+    """Thread that sends ``alive`` five times a second to each robot in motion.
+
+    Args:
+        sender: Program id of the commands.
+        thread: Name of the thread.
+    """
 
     def __init__(self, sender: str, thread: str) -> None:
-        """``sender`` is the program id of the commands, ``thread`` the thread's name."""
         self._sender, self._name = sender, thread
         self._lock = threading.Lock()
         self._robots: dict[str, Publish] = {}
@@ -30,7 +34,7 @@ class Heartbeat:
         self._errors = SurvivedErrors(_log, thread)
 
     def beat(self, robot: str, publish: Publish) -> None:
-        """Keep this robot going until `rest`; ``publish`` sends on its command topic."""
+        """Send heartbeats to this robot until `rest`; ``publish`` publishes on its command topic."""
         with self._lock:
             self._robots[robot] = publish
             if self._thread is None and not self._closing:
@@ -39,12 +43,12 @@ class Heartbeat:
         self._changed.set()
 
     def rest(self, robot: str) -> None:
-        """This robot is not kept going any more."""
+        """Stop sending heartbeats to this robot."""
         with self._lock:
             self._robots.pop(robot, None)
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._closing = True
         self._changed.set()
         if self._thread is not None:
@@ -58,7 +62,7 @@ class Heartbeat:
             with self._lock:
                 robots = list(self._robots.values())
             for publish in robots:
-                with self._errors:  # the other robots are told all the same
+                with self._errors:  # the other robots must still get theirs
                     self._tell(publish)
             self._changed.wait(ALIVE_S if robots else None)
 
@@ -67,4 +71,4 @@ class Heartbeat:
         try:
             publish(alive)
         except NepError:
-            return  # it has gone, or this node has; the robot's watchdog does the rest
+            return  # the robot or this node is gone; the robot's watchdog stops it

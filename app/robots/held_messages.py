@@ -1,4 +1,4 @@
-"""Messages of publishers that no master has told of yet: a few of each, of a bounded number of publishers."""
+"""Messages of publishers unknown to the master so far, bounded per publisher and in publishers."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ MAX_PER_PUBLISHER = 4
 
 
 class HeldMessages:
-    """A publisher that floods displaces its own messages only, and no new publisher those of another."""
+    """Bounded store of messages of unknown publishers.
+
+    A flooding publisher only evicts its own messages, and a new publisher none of another.
+    """
 
     def __init__(self, *, per_publisher: int = MAX_PER_PUBLISHER, publishers: int = MAX_PUBLISHERS) -> None:
-        """Keep the newest ``per_publisher`` messages of each of the first ``publishers`` that come."""
         self._per_publisher, self._publishers = per_publisher, publishers
         self._messages: dict[int | None, deque[Message]] = {}
 
@@ -26,7 +28,7 @@ class HeldMessages:
         return publisher in self._messages
 
     def put(self, message: Message) -> None:
-        """Hold a message."""
+        """Store a message."""
         held = self._messages.get(message.publisher)
         if held is None:
             if len(self._messages) >= self._publishers:
@@ -35,7 +37,7 @@ class HeldMessages:
         held.append(message)
 
     def take(self) -> list[Message]:
-        """Return what is held, in order within each publisher, and hold nothing more."""
+        """Remove and return all messages, in order within each publisher."""
         taken = [message for held in self._messages.values() for message in held]
         self._messages.clear()
         return taken

@@ -1,8 +1,8 @@
-"""Whose words count: which node a robot is, who else says so, who hears its commands. No sockets.
+"""Identity of robots: which node is a robot, and which claims and subscribers are valid. Pure.
 
-A robot is its name, its topics and the node that announced it first. What the master knows decides: it lists
-each publisher's node, and every native message carries its publisher's id. This holds against programs that
-do not lie to the master (docs/trust.md).
+A robot is its name, its topics and the node that announced it first. The master's graph decides: it lists
+each publisher's node, and every native message carries its publisher's id. This protects against programs
+that don't lie to the master (docs/trust.md).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from nep.text import bounded_str, harmless
 
 GATEWAY = "gateway"
 SHARED = frozenset({RIZE_COMMANDS, "action_state"})
-"""Topics of all robots of RIZE together (`app.robots.rize`)."""
+"""Topics shared by all RIZE robots (`app.robots.rize`)."""
 MOST_SENDERS = 20_000
 WORDS_MOST = 200
 MAY_MOVE = lazy("{robot} may still move: {why}")
@@ -34,7 +34,7 @@ _NATIVE = frozenset({"native", GATEWAY})
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The program that is a robot, as the master knows its node. ``pid`` is a process on ``host``."""
+    """Program of a robot, as the master knows its node. ``pid`` is a process on ``host``."""
 
     node_id: str
     node: str = ""
@@ -43,21 +43,21 @@ class Identity:
 
     @property
     def words(self) -> str:
-        """For people: "“rover driver” on lab-2"."""
+        """Text for people: "“rover driver” on lab-2"."""
         name = f"“{self.node or self.node_id}”"
         return _("{program} on {host}").format(program=name, host=self.host) if self.host else name
 
 
 def identity_of(view: GraphView, node_id: str) -> Identity:
-    """What the master knows about this node; only its id when it is not there."""
+    """Return what the master knows about a node; only its id if it is not in the graph."""
     node = view.nodes.get(node_id)
     return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
 
 
 def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
-    """The ids of the nodes that publish a topic, whoever came first at the front.
+    """Return the ids of the nodes that publish a topic, in order of registration.
 
-    For programs of the original NEP their gateway stands: its node is whom their messages come from.
+    Programs of the original NEP are represented by the gateway, whose node publishes their messages.
     """
     info = view.topics.get(topic)
     found = (each.node_id for each in info.publishers) if info is not None else ()
@@ -65,7 +65,7 @@ def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
 
 
 def hearing(view: GraphView, topic: str) -> tuple[str, ...]:
-    """The ids of the nodes that subscribe a topic; programs of the original NEP, but not their gateway."""
+    """Return the ids of the nodes that subscribe to a topic, original programs instead of their gateway."""
     info = view.topics.get(topic)
     found = (each.node_id for each in info.subscribers) if info is not None else ()
     nodes = view.nodes
@@ -78,16 +78,16 @@ def _is_native(view: GraphView, node_id: str) -> bool:
 
 
 def first_to_announce(view: GraphView, topic: str) -> Identity | None:
-    """The node that announced a robot on its description topic first; None when nobody does."""
+    """Return the node that announced a robot on its description topic first, or None."""
     found = publishing(view, topic)
     return identity_of(view, found[0]) if found else None
 
 
 def wrong_topic(robot: Robot, topic: str) -> str | None:
-    """Why a description that came on this topic is nobody's; None when it is at home there.
+    """Return why a description is invalid on this topic, or None if it belongs there.
 
-    A robot is announced on ``/NAME/description`` of its own name and nowhere else, or one program could
-    speak for another's robot.
+    A robot is announced on ``/NAME/description`` of its own name only; otherwise one program could speak for
+    another's robot.
     """
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
@@ -98,39 +98,39 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
 
 
 def reserved(robot: Robot) -> tuple[str, ...]:
-    """The topics with which a robot is moved, or answers: no other robot may have them, too."""
+    """Return the topics that move a robot or carry its answers; no other robot may use them."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
 
 
 def controls_of(robot: Robot, earlier: Iterable[RobotTopics] = ()) -> RobotControls:
-    """Return the topics that move a robot or change its world; ``earlier`` ones may still do so."""
+    """Return the topics that move a robot or change its world, including its ``earlier`` topics."""
     topics = {topic for each in (robot.topics, *earlier) for topic in (each.command, each.world)}
     topics.update(action.topic for action in robot.actions)
     return RobotControls(robot.name, frozenset(filter(None, topics)))
 
 
 def program_of(key: str) -> str:
-    """The name that a program has in ``from`` when it is to be ended by nobody but who knows its key.
+    """Derive a program's name in ``from`` from its secret key.
 
-    A stop whose ``ends`` is that key makes robots refuse what comes under this name from then on. Everybody
-    can read names: if a name were enough, one message of a stranger would lock a program out for good.
+    A stop whose ``ends`` is the key makes robots reject later commands under this name. Names are public: if
+    the name were enough, any program could lock another one out.
     """
     return f"program-{hashlib.sha256(key.encode('utf-8', 'replace')).hexdigest()[:16]}"
 
 
 def is_home(robot_name: str, topic: str) -> bool:
-    """Whether a topic lies among those that belong to a robot of this name: ``/NAME/...``."""
+    """Return whether a topic belongs to a robot of this name: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
 
 
 def said(error: object) -> str:
-    """The words of a robot's error, as a person may read them between our own: no more than they need be."""
+    """Return a robot's error as safe, bounded text for people."""
     return harmless(bounded_str(error or "", ERROR_MOST), lines=True)
 
 
 def said_of_stop(name: str, error: object) -> str:
-    """What a robot said that has not stopped, in its own words: "Arm may still move: the brake is stuck"."""
+    """Return the error of a failed stop in the robot's words: "Arm may still move: the brake is stuck"."""
     words = "".join(
         sign if sign.isprintable() else " " for sign in bounded_str(error or _("its stop failed"), ERROR_MOST)
     )
@@ -139,7 +139,7 @@ def said_of_stop(name: str, error: object) -> str:
 
 
 def may_move(name: str, words: str) -> bool:
-    """Whether these words say that this robot may still move: in our language, or in English as its own."""
+    """Return whether an error says that the robot may still move, in our language or in English."""
     return any(
         words.startswith(sentence.partition("{why}")[0].rstrip(": ").format(robot=name))
         for sentence in (MAY_MOVE, _(MAY_MOVE))
@@ -147,9 +147,9 @@ def may_move(name: str, words: str) -> bool:
 
 
 def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
-    """Why a robot can't have the topics that it names; None when it can. They are another robot's.
+    """Return why a robot can't use the topics that it names, because they are another robot's; else None.
 
-    ``/NAME/...`` belongs to the robot of that name, whoever comes first; other topics to who is there first.
+    ``/NAME/...`` belongs to the robot of that name; other topics belong to the first robot that uses them.
     """
     known = [other for other in others if other.name != robot.name]
     for topic in set(reserved(robot)) - SHARED:
@@ -164,19 +164,18 @@ def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
 
 
 class Senders:
-    """Which node sent a message: the nodes of publishers' ids, as masters told them. Works in any thread.
+    """Map from publisher ids to nodes, as the master reported them. Thread-safe.
 
-    What was learnt once stays, the last 20 000 of them: who takes another's id while that one is there, is
+    The last 20 000 entries are kept: a node that reuses another's publisher id while that one is present is
     not believed.
     """
 
     def __init__(self) -> None:
-        """Know nobody yet."""
         self._lock = threading.Lock()
         self._nodes: dict[int, str] = {}
 
     def learn(self, view: GraphView, topics: Iterable[str]) -> None:
-        """Take over who publishes these topics."""
+        """Add the publishers of these topics."""
         with self._lock:
             for topic in topics:
                 info = view.topics.get(topic)
@@ -187,28 +186,28 @@ class Senders:
                 del self._nodes[next(iter(self._nodes))]
 
     def node_of(self, message: Message) -> str | None:
-        """The id of the node that sent it; None while no master has told of its publisher."""
+        """Return the id of the sending node; None while its publisher is unknown."""
         with self._lock:
             return None if message.publisher is None else self._nodes.get(message.publisher)
 
 
 class RobotProcesses(Protocol):
-    """What is needed to know about the processes of robots."""
+    """Interface to the processes of robots."""
 
     def is_ours(self, identity: Identity) -> bool:
-        """Whether this program is a virtual robot of this person."""
+        """Return whether this program is a virtual robot started here."""
 
     def has_ended(self, identity: Identity) -> bool:
-        """Whether it is sure that this program runs no more."""
+        """Return whether this program has certainly ended."""
 
 
 class AllVirtual:
-    """Believes every robot that says that it is virtual (what tests need)."""
+    """Fake that accepts every robot's claim to be virtual, for tests."""
 
     def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
-        """All are."""
+        """Return True."""
         return True
 
     def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
-        """Nobody knows."""
+        """Return False."""
         return False

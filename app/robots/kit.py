@@ -1,7 +1,31 @@
-"""The driver kit: all that a module needs to drive a robot (docs/robots.md shows a whole one).
+"""Driver kit: everything a module needs to drive a robot (docs/robots.md has a complete example).
 
-The description, the blocks, the forms and the checks come from the typed methods; cancel, time-out, busy
-policy, heartbeat watchdog, proven stop and RIZE's dialect come with the :class:`Driver`.
+A robot is declared as a class; its description, blocks, forms and input checks are generated from the typed
+methods. The :class:`Driver` adds cancel, time-outs, busy policies, the heartbeat watchdog, the confirmed stop
+and RIZE's dialect.
+
+Example:
+    ::
+
+        from typing import Annotated
+
+        from app.robots import kit
+
+
+        class Table:
+            @kit.action("turn by %angle °", "Movement", "rotate-ccw", uses=("motor",), risk="moves")
+            def turn(self, call: kit.Call, angle: Annotated[float, kit.Range(-180, 180, unit="deg")] = 90.0):
+                ...
+
+            @kit.safe_stop(watchdog_s=0.5, within_s=0.2)
+            def stop(self): ...
+
+            def __init__(self, link: kit.Link):
+                self.link = link
+
+
+        if __name__ == "__main__":
+            raise SystemExit(kit.main(kit.Kind("table", "Table", Table)))
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Robots of RIZE: what a driver that speaks only ``robot_action`` can do, and its messages, both ways.
+"""RIZE robots: their primitives, and conversion of ``robot_action`` messages in both directions.
 
-Such a robot tells nothing about itself, so everybody gets the primitives that RIZE's drivers have. It has no
-stop and never answers one: ``safe_stop.confirmed`` is False, and people read "stop sent; this robot cannot
-confirm".
+RIZE robots don't describe themselves, so all are assumed to have the primitives of RIZE's drivers. They don't
+answer a stop: ``safe_stop.confirmed`` is False, and people read "stop sent; this robot cannot confirm".
 """
 
 from __future__ import annotations
@@ -28,27 +27,27 @@ _FAILED = lazy("{robot} could not {action}")
 
 @lru_cache(maxsize=1)
 def thing_model() -> Mapping[str, object]:
-    """The Thing Model of every robot of RIZE."""
+    """Return the Thing Model of all RIZE robots."""
     found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
     return as_part(found)
 
 
 def robot(name: str) -> Robot:
-    """A robot of RIZE under the name that its driver was given; commands go to ``robot_action``."""
+    """Return a RIZE robot with the name of its driver; its commands use ``robot_action``."""
     return parse({**thing_model(), "title": name})
 
 
 def ready(message: object) -> str | None:
-    """The robot's name when a message of ``rize_event`` says that one is ready, else None."""
+    """Return the robot's name if a message of ``rize_event`` announces a robot, else None."""
     said = as_part(message)
     return text(said.get("name")) if said.get("robot") == "ready" else None
 
 
 def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
-    """The message for ``robot_action``; RobotInputError when the robot would refuse the input.
+    """Return the message for ``robot_action``. Raises RobotInputError for invalid input.
 
-    The stop is the cancel that RIZE's older drivers know. It has every key of an action, because drivers that
-    do not know it read them: to those it is a primitive that they have not, which fails and does no harm.
+    The stop is the cancel of RIZE's older drivers. It has all keys of an action, because drivers that don't
+    know cancel read them: for those it is an unknown primitive, which fails harmlessly.
     """
     if action == robot.safe_stop.action:
         return {
@@ -86,14 +85,13 @@ def _primitive(robot: Robot, action: str, given: Mapping[str, object]) -> dict[s
 
 
 def _as_text(value: object) -> str:
-    """RIZE's input is always text, numbers too."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return pretty_number(value)
     return str(value)
 
 
 def from_answer(message: object) -> dict[str, object] | None:
-    """A message of ``action_state`` in the shape of ``robot/answer``; None while it tells no end."""
+    """Convert a message of ``action_state`` to the form of ``robot/answer``; None unless it is final."""
     said = as_part(message)
     state = _STATES.get(bounded_str(said.get("state")))
     wanted = text(said.get("id"))

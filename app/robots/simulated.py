@@ -1,4 +1,4 @@
-"""The virtual robot: ``python -m app.robots.simulated --name Pepper`` drives it in a process of its own.
+"""Virtual Pepper: ``python -m app.robots.simulated --name Pepper`` runs it as a process.
 
 It lives in a small room (:mod:`app.robots.virtual`). Studio draws it from ``/<name>/state``; people act on
 its world through ``/<name>/world``.
@@ -39,27 +39,24 @@ Target: TypeAlias = Annotated[
 
 
 def _rize_turn(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    """RIZE says ``left`` or ``right`` and the option ``degrees``."""
     degrees = number_of(options.get("degrees"))
     return {"direction": given} | ({} if degrees is None else {"angle": degrees})
 
 
 def _rize_walk(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    """RIZE says ``forwards`` or ``backwards`` and the option ``meters``."""
     metres = number_of(options.get("meters"))
     sign = {"forwards": 1.0, "backwards": -1.0}[given]
     return {"distance": sign * (0.5 if metres is None else metres)}
 
 
 def _rize_light(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    """RIZE says ``eyes`` or ``all`` and the options ``R``, ``G``, ``B``, 0 to 255."""
     parts = [number_of(options.get(name)) for name in "RGB"]
     colour = "".join(f"{min(255, max(0, int(part or 0))):02x}" for part in parts)
     return {"where": "eyes" if given == "eyes" else "both", "colour": f"#{colour}"}
 
 
 class VirtualPepper(Acting):
-    """A friendly robot on wheels with a head, two arms, a voice and lights."""
+    """Virtual humanoid on wheels with head, arms, voice and lights."""
 
     # ---- speech -----------------------------------------------------------------------------------
 
@@ -295,7 +292,7 @@ ROBOT = Kind(
 
 
 def room_of(seed: int | None) -> Room:
-    """The room with its things in their usual places, or, with a seed, elsewhere: the same each time."""
+    """Return the default room, or with a seed a room with ball and person at reproducible random places."""
     if seed is None:
         return Room()
     places = random.Random(seed)  # noqa: S311 - furniture, not secrets
@@ -304,7 +301,7 @@ def room_of(seed: int | None) -> Room:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Drive the virtual robot; ``--seed`` puts ball and person elsewhere, the rest is the kit's."""
+    """Run the virtual robot; ``--seed`` places ball and person elsewhere, other arguments are the kit's."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
     chosen, others = parser.parse_known_args(arguments)

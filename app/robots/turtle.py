@@ -1,6 +1,6 @@
-"""The virtual robot on two wheels: ``python -m app.robots.turtle --name Turtle`` is its process.
+"""Virtual two-wheeled robot: ``python -m app.robots.turtle --name Turtle`` runs it as a process.
 
-It lives in the same kind of room as the virtual Pepper and is drawn in it from ``/<name>/state``.
+It lives in the same kind of room as the virtual Pepper, and is drawn from ``/<name>/state``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _JOIN_S = 2.0
 
 
 class VirtualWheels:
-    """The body, the thread that moves it 60 times a second, and the one that looks 15 times."""
+    """Simulated base: a body thread at 60 Hz and a camera thread at 15 Hz. Thread-safe."""
 
     def __init__(self, link: Link, clock: Clock) -> None:
         self.body = WheelBody()
@@ -52,51 +52,51 @@ class VirtualWheels:
         link.on_world(self.act)
 
     def start(self) -> None:
-        """Begin to live."""
+        """Start both threads."""
         cv2.setNumThreads(1)
         for thread in self._threads:
             thread.start()
 
-    # ---- Wheels -----------------------------------------------------------------------------------
+    # ---- Wheels interface --------------------------------------------------------------------------------
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Ask for speeds."""
+        """Set the target speeds (m/s, °/s)."""
         with self._lock:
             self.body.drive(speed, turn_speed)
 
     def pose(self) -> tuple[float, float, float]:
-        """Where it is."""
+        """Return the pose: x, y in metres, theta in degrees."""
         with self._lock:
             return self.body.x, self.body.y, self.body.theta_deg
 
     def driven(self) -> float:
-        """The metres that its wheels have rolled so far; where a person carries it they do not roll."""
+        """Return the metres rolled so far; being carried by a person doesn't count."""
         with self._lock:
             return self.body.driven
 
     def still(self) -> bool:
-        """Whether it stands still."""
+        """Return whether it stands still."""
         with self._lock:
-            self._advance()  # who waits for it need not wait for the next beat
+            self._advance()  # don't wait for the next step of the body thread
             return self.body.still
 
     def bumped(self) -> str:
-        """The side that touches something."""
+        """Return the side that touches something, or ""."""
         return self.body.bumped
 
     def light(self, colour: str) -> None:
-        """The colour of its light."""
+        """Set the colour of the light."""
         with self._lock:
             self.body.light = colour
 
     def close(self) -> None:
-        """End both threads."""
+        """Stop both threads."""
         self._ended.set()
         for thread in self._threads:
             if thread.is_alive():
                 thread.join(_JOIN_S)
 
-    # ---- living -----------------------------------------------------------------------------------
+    # ---- threads ----------------------------------------------------------------------------------
 
     def _move(self) -> None:
         with self._lock:
@@ -120,7 +120,7 @@ class VirtualWheels:
                 self._link.sense("battery", int(self.body.battery))
 
     def _advance(self) -> None:
-        """Let the body come to the present; the lock is held."""
+        # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.take_over()
         self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
@@ -159,7 +159,7 @@ class VirtualWheels:
             self._seen = set(found)
 
     def act(self, change: Mapping[str, object]) -> None:
-        """A person moves things of its room, or puts all back."""
+        """Apply a person's change of the world: move, hold, reset, start, or simulate an event."""
         moved, x, y = change.get("move"), finite(change.get("x")), finite(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
@@ -186,7 +186,7 @@ class VirtualWheels:
 
 
 class VirtualTurtle(DiffDrive):
-    """The robot on two wheels, in its room."""
+    """Two-wheeled robot in its room."""
 
     def __init__(self, link: Link) -> None:
         wheels = VirtualWheels(link, MonotonicClock())
@@ -195,7 +195,7 @@ class VirtualTurtle(DiffDrive):
         wheels.start()
 
     def odometer(self) -> Callable[[], float]:
-        """What its wheels roll counts: a person who carries it does not move it on."""
+        """Return a function that gives the metres rolled since now; being carried doesn't count."""
         began = self._rolled.driven()
         return lambda: self._rolled.driven() - began
 
@@ -211,7 +211,7 @@ ROBOT = replace(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Drive the virtual robot; the arguments are the kit's."""
+    """Run the virtual robot with the kit's arguments."""
     return drive(ROBOT, arguments)
 
 

@@ -1,4 +1,4 @@
-"""What a robot can do and tell: its W3C Thing Model, parsed once into typed values, and inputs checked.
+"""Robot descriptions: W3C Thing Models parsed into typed values, and validation of inputs.
 
-`description.parse` is the way in, `validate` the sentences about what is wrong with a document.
+`description.parse` is the entry point; `validate` lists the problems of a document.
 """

@@ -1,7 +1,7 @@
-"""What a robot can do and tell: typed values parsed from its W3C Thing Model or Thing Description.
+"""Robot descriptions parsed from W3C Thing Models or Thing Descriptions.
 
-The document is parsed once, at the edge, by :func:`parse`; Studio itself works with :class:`Robot`.
-The ``rb:`` terms are explained in ``resources/robots/README.md``.
+The document is parsed once by :func:`parse`; Studio works with :class:`Robot`. The ``rb:`` terms are
+documented in ``resources/robots/README.md``.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ __all__ = [
 ]  # fmt: skip
 
 LARGEST_BYTES = 1_000_000
-"""A description that is larger is refused before it is decoded."""
+"""Size limit of a description; larger ones are rejected before decoding."""
 _NOT_IN_TOPICS = re.compile(r"[^\w.-]")
 
 
 def topic_of(name: str, leaf: str) -> str:
-    """The topic of a robot's part: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
+    """Return the topic of a robot's part: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
     return f"/{_NOT_IN_TOPICS.sub('_', name)}/{leaf}"
 
 
 def parse(document: Mapping[str, object]) -> Robot:
-    """The robot that a Thing Model or Thing Description describes; DescriptionError says what is wrong."""
+    """Parse a Thing Model or Thing Description. Raises DescriptionError with all problems."""
     problems = validate(document)
     if problems:
         title = as_part(document).get("title")
@@ -45,9 +45,11 @@ def parse(document: Mapping[str, object]) -> Robot:
 
 
 def announced(message: Message) -> Robot:
-    """The robot of a message on its description topic; what is larger than 1 MB is not even decoded.
+    """Parse the robot description in a message; messages above 1 MB are not decoded.
 
-    Raises DescriptionError with what is wrong, NepError when it can't be decoded.
+    Raises:
+        DescriptionError: The description is invalid.
+        NepError: The message can't be decoded.
     """
     size = len(message.data)
     if size > LARGEST_BYTES:
@@ -62,7 +64,7 @@ def announced(message: Message) -> Robot:
 
 
 def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
-    """The topics of a robot of that name, as the kit uses them."""
+    """Return the default topics of a robot of that name, as the driver kit uses them."""
     return RobotTopics(
         description=topic_of(name, "description"),
         command=topic_of(name, "command"),
@@ -73,9 +75,9 @@ def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
 
 
 def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
-    """The Thing Description that a robot of this model announces under its name: its id and all its forms.
+    """Return the Thing Description of a robot of this model and name, with its id and forms.
 
-    The model is one that :func:`validate` finds good; it is not changed.
+    The model must be valid (see :func:`validate`); it is not modified.
     """
     described = copy.deepcopy(dict(model))
     kind = part(described, "rb:robot")

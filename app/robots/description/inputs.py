@@ -1,4 +1,4 @@
-"""Is this input good for that action? Sentences that a person can act on.
+"""Validation of action inputs, with sentences for people.
 
 ``turn: angle must be between -360 and 360 °``
 """
@@ -22,14 +22,14 @@ _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
 _DEEPEST = 40
 _MAX_WORD_LENGTH = 100
-_MAX_UNKNOWN_NAMED = 5  # looking for a similar name takes 20 µs, and a stranger may send any number of names
+_MAX_UNKNOWN_NAMED = 5  # a similarity search takes 20 µs, and untrusted input may have any number of names
 NUMBER_KINDS = frozenset({"number", "integer", "angle"})
 _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One of the values that a parameter allows, and the word that people see for it."""
+    """Allowed value of a parameter, and the word shown for it."""
 
     value: str | int | float
     title: str
@@ -37,13 +37,29 @@ class Choice:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One input of an action, or one datum of an event.
+    """Input of an action, or field of an event.
 
-    ``kind`` is text, number, integer, choice, colour, boolean, angle (a number in degrees), image, list or
-    object. A list holds ``each`` any number of times, or ``places`` in their order; an object holds
-    ``fields`` and, under any other name, ``each``. ``min_length`` and ``max_length`` also count its values.
-    ``step`` is a hint for editors, never a reason to refuse. ``advanced`` ones are folded in forms. ``bare``
-    is for an image that is sent as base64 text without ``data:`` before it. ``nullable`` ones may be None.
+    Attributes:
+        name: Name in messages.
+        title: Name for people.
+        kind: text, number, integer, choice, colour, boolean, angle (degrees), image, list or object.
+        minimum: Smallest number.
+        maximum: Largest number.
+        step: Hint for editors, never a reason to reject.
+        unit: Unit as people write it.
+        default: Default value.
+        choices: Allowed values of a choice.
+        required: True if the value must be given.
+        advanced: True if forms collapse it.
+        options_from: Sensor that lists possible values.
+        min_length: Minimum length of a text, or number of values.
+        max_length: Maximum length of a text, or number of values.
+        widget: Hint for editors.
+        bare: True for an image sent as base64 without a ``data:`` prefix.
+        nullable: True if the value may be None.
+        each: Schema of the values of a list or map.
+        places: Schemas of a list's values by position.
+        fields: Schemas of an object's named values.
     """
 
     name: str
@@ -69,24 +85,24 @@ class Parameter:
 
 
 def pretty_unit(unit: str | None) -> str | None:
-    """The unit as people write it: "deg" is "°"; None stays None."""
+    """Return the unit as people write it: "deg" is "°"; None stays None."""
     return None if unit is None else _UNITS.get(unit, unit)
 
 
 def pretty_number(value: float) -> str:
-    """The number without a needless fraction: 360, -0.05."""
+    """Format a number without trailing zeros: 360, -0.05."""
     return f"{value:.10g}"
 
 
 def near_miss(wrong: str, known: Iterable[str]) -> str:
-    """The known word that is close to a wrong one; "" when none is."""
+    """Return the known word similar to a wrong one, or ""."""
     if len(wrong) > _MAX_WORD_LENGTH:
         return ""
     return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
 
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
-    """The parameter that a data schema describes."""
+    """Convert a data schema to a parameter."""
     is_list = data.get("type") == "array"
     shortest, longest = (number(data.get(rule)) for rule in (_ITEMS if is_list else _LENGTH))
     held = data.get("items") if is_list else data.get("additionalProperties")
@@ -116,7 +132,7 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
 
 
 def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
-    """The named values of an object that a data schema describes."""
+    """Return the named values of an object schema."""
     required = names(data.get("required"))
     return tuple(
         parameter_of(name, as_part(each), required=name in required)
@@ -125,7 +141,7 @@ def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
 
 
 def kind_of(data: Mapping[str, object]) -> str:
-    """The kind of value that a data schema describes, as :class:`Parameter` names it, or "object"."""
+    """Return the kind of a data schema as in :class:`Parameter`, or "object"."""
     widget, kind = data.get("rb:widget"), data.get("type")
     if choices_of(data):
         return "choice"
@@ -139,7 +155,7 @@ def kind_of(data: Mapping[str, object]) -> str:
 
 
 def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
-    """The values that a data schema lists, with their words; empty when it lists none."""
+    """Return the choices of a data schema with their words; empty if it has none."""
     enum = data.get("enum")
     pairs: list[tuple[object, str | None]] = []
     if isinstance(enum, (list, tuple)):
@@ -155,10 +171,10 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
 
 
 def from_words(parameter: Parameter, words: str) -> object:
-    """The list or object that a person typed: ``1, 2.5`` or JSON; what it can't be stays for the check.
+    """Parse a list or object that a person typed: ``1, 2.5`` or JSON; return invalid text unchanged.
 
-    Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. In ``0,2, 0,5`` it can't be told
-    which commas separate numbers, so it stays for the check.
+    Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. ``0,2, 0,5`` is ambiguous and
+    returned unchanged for the validation.
     """
     if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
         try:
@@ -181,7 +197,7 @@ def from_words(parameter: Parameter, words: str) -> object:
 
 
 def to_words(value: object) -> str:
-    """A list or object as people type it; :func:`from_words` reads it again."""
+    """Format a list or object as people type it; the inverse of :func:`from_words`."""
     if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
         words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
         if not any("," in word or not word.strip() or word.startswith(("[", "{")) for word in words):
@@ -190,7 +206,6 @@ def to_words(value: object) -> str:
 
 
 def _of_word(parameter: Parameter, word: str) -> object:
-    """One value of a list that a person typed."""
     known = [choice.value for choice in parameter.choices if word in {str(choice.value), choice.title}]
     if known:
         return known[0]
@@ -205,12 +220,12 @@ def _of_word(parameter: Parameter, word: str) -> object:
 
 
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
-    """One sentence for each thing wrong with the input; empty when the robot may be asked."""
+    """Return a sentence for each problem of an input; empty if it is valid."""
     return tuple(f"{action}: {problem.sentence}" for problem in problems_of(parameters, given))
 
 
 def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
-    """What is wrong with each value of an input, in the order of the parameters; strange values first."""
+    """Return the problems of an input in the order of the parameters; unknown names come first."""
     if not isinstance(given, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
     known = {parameter.name: parameter for parameter in parameters}
@@ -237,9 +252,9 @@ def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[Input
 
 
 def wrong_value(parameter: Parameter, value: object, place: str = "") -> str | None:
-    """What a value must be instead ("speed must be a number"); None when it is good.
+    """Return what a value must be instead ("speed must be a number"), or None if it is valid.
 
-    ``place`` is what the sentence calls it, the parameter's title when nothing is said.
+    ``place`` names the value in the sentence (default: the parameter's title).
     """
     place = place or parameter.title
     if parameter.choices:
@@ -310,7 +325,6 @@ def _wrong_object(parameter: Parameter, value: object, place: str) -> str | None
 
 
 def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str) -> str | None:
-    """The same of what an object holds besides its fields."""
     known = [field.name for field in parameter.fields]
     for name, item in others.items():
         if parameter.each is not None:
@@ -339,7 +353,7 @@ def _is_json(value: object, depth: int = 0) -> bool:
 
 
 def _same(allowed: object, given: object) -> bool:
-    # 1 == True in Python, but a robot that knows 1 does not know "yes".
+    # 1 == True in Python, but they are different choices.
     return allowed == given and isinstance(allowed, bool) == isinstance(given, bool)
 
 
@@ -365,7 +379,7 @@ def _wrong_number(parameter: Parameter, value: object, place: str) -> str | None
 def _is_finite(value: float) -> bool:
     try:
         return math.isfinite(value)
-    except OverflowError:  # a whole number beyond all floats
+    except OverflowError:  # an integer too large for a float
         return False
 
 

@@ -1,4 +1,4 @@
-"""Reading the members of a JSON document that may hold anything."""
+"""Access to members of untrusted JSON documents."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from nep.text import bounded_str
 
 
 def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
-    """The object of that name inside another; empty when it is missing or something else."""
+    """Return the object of that name; empty if it is missing or of another type."""
     return as_part(mapping.get(name))
 
 
 def as_part(value: object) -> Mapping[str, object]:
-    """The value when it is an object, else an empty one."""
+    """Return the value if it is an object, else an empty one."""
     return value if isinstance(value, Mapping) else {}
 
 
 def names(value: object) -> tuple[str, ...]:
-    """The words of a list; none when it is something else."""
+    """Return the strings of a list; empty if it is of another type."""
     return (
         tuple(item if isinstance(item, str) else bounded_str(item) for item in value)
         if isinstance(value, (list, tuple))
@@ -29,14 +29,14 @@ def names(value: object) -> tuple[str, ...]:
 
 
 def text(value: object) -> str | None:
-    """The text, or None when it is something else or empty."""
+    """Return a non-empty string, or None."""
     return value if isinstance(value, str) and value else None
 
 
 def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
-    """A member for people in the language of now: `titles` and `descriptions` have it by language.
+    """Return a text for people in the current language: `titles` and `descriptions` hold translations.
 
-    What a robot does not say in this language may be known to our own translators.
+    Without a translation in the description, our own catalogue is tried.
     """
     words = part(owner, f"{member}s")
     own = text(owner.get(member))
@@ -44,12 +44,12 @@ def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
 
 
 def number(value: object) -> float | None:
-    """The number as it is (a whole one stays whole), or None; yes and no are no numbers."""
+    """Return a number as it is (integers stay integers), or None; booleans are not numbers."""
     return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
 
 
 def number_of(value: object) -> float | None:
-    """The number that RIZE may have sent as text; None when it is none."""
+    """Return a number that may be sent as text, as RIZE does, or None."""
     if isinstance(value, bool):
         return None
     try:
@@ -59,7 +59,7 @@ def number_of(value: object) -> float | None:
 
 
 def finite(value: object) -> float | None:
-    """Return a number as a float; None for anything else, NaN, infinity and integers beyond all floats."""
+    """Return a number as a float; None for other types, NaN, infinity and integers too large for a float."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     try:

@@ -1,4 +1,4 @@
-"""The typed parts of a robot: what it can do, what it tells, what happens to it, how it is stopped."""
+"""Typed parts of a robot description: actions, sensors, events, safe stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.robots.description.inputs import Choice, Parameter, check_input, proble
 
 @dataclass(frozen=True)
 class DataField:
-    """One value inside a sensor's object or an action's output; the unit is as people write it."""
+    """Value in a sensor's object or an action's output; the unit is as people write it."""
 
     name: str
     title: str
@@ -21,9 +21,9 @@ class DataField:
 
 @dataclass(frozen=True)
 class Action:
-    """Something the robot can do; ``text`` is its block: ``%robot`` once, then words and ``%parameter``.
+    """Action of a robot; ``text`` is its block text, with ``%robot`` once, words and ``%parameter``.
 
-    One with ``repeat_s`` goes on when it has succeeded (a speed), until a stop or the next one.
+    An action with ``repeat_s`` (a speed) continues after it succeeded, until a stop or the next one.
     """
 
     name: str
@@ -46,29 +46,29 @@ class Action:
     repeat_s: float | None = None
 
     def parameter(self, name: str) -> Parameter | None:
-        """The parameter of that name, or None."""
+        """Return the parameter of that name, or None."""
         return next((found for found in self.parameters if found.name == name), None)
 
     def check(self, given: object) -> tuple[str, ...]:
-        """One sentence for each thing wrong with an input; empty when the robot may be asked."""
+        """Return a sentence for each problem of an input; empty if it is valid."""
         return check_input(self.name, self.parameters, given)
 
     def problems(self, given: object) -> tuple[InputProblem, ...]:
-        """The same, each with the parameter that it is about, and without the action's name."""
+        """Return the problems of an input with their parameters, without the action's name."""
         return problems_of(self.parameters, given)
 
     def complete(self, given: Mapping[str, object]) -> dict[str, object]:
-        """The input with the defaults of everything it leaves out."""
+        """Return the input completed with default values."""
         defaults = {found.name: found.default for found in self.parameters if found.default is not None}
         return {**defaults, **given}
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """Something the robot tells all the time.
+    """Value that the robot publishes continuously.
 
     ``kind`` is boolean, number, integer, text, choice, object, list, image or detections (boxes in pixels of
-    the picture of ``camera``). ``text`` is its block with ``%robot`` once; empty when it makes no block.
+    the image of ``camera``). ``text`` is its block text with ``%robot`` once; empty if it has no block.
     """
 
     name: str
@@ -88,13 +88,13 @@ class Sensor:
 
     @property
     def is_image(self) -> bool:
-        """True for pictures, which travel with the codec ``image``."""
+        """True for images, which use the codec ``image``."""
         return self.kind == "image"
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happens; ``filters`` are the fields a block offers as a choice."""
+    """Event of a robot; ``filters`` are the fields that its block offers as choices."""
 
     name: str
     title: str
@@ -108,7 +108,7 @@ class Event:
 
 @dataclass(frozen=True)
 class SafeStop:
-    """How the robot is stopped; ``confirmed`` is False for robots that never answer a stop."""
+    """How the robot is stopped; ``confirmed`` is False for robots that never reply to a stop."""
 
     action: str
     watchdog_s: float | None
@@ -120,7 +120,7 @@ class SafeStop:
 
 @dataclass(frozen=True)
 class RobotTopics:
-    """Where a robot is talked to; ``state`` and ``world`` exist for virtual robots."""
+    """Topics of a robot; ``state`` and ``world`` exist for virtual robots."""
 
     description: str
     command: str
@@ -131,9 +131,10 @@ class RobotTopics:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot as its description tells it; ``source`` is that document, unchanged.
+    """Parsed description of a robot; ``source`` is the unchanged document.
 
-    ``beat_s`` is how often it says on its answer topic that it lives while it does something; None: never.
+    ``beat_s`` is the interval at which it reports on its answer topic that it is alive while it acts; None:
+    never.
     """
 
     name: str
@@ -151,13 +152,13 @@ class Robot:
     beat_s: float | None = None
 
     def action(self, name: str) -> Action | None:
-        """The action of that name, or None."""
+        """Return the action of that name, or None."""
         return next((found for found in self.actions if found.name == name), None)
 
     def sensor(self, name: str) -> Sensor | None:
-        """The sensor of that name, or None."""
+        """Return the sensor of that name, or None."""
         return next((found for found in self.sensors if found.name == name), None)
 
     def event(self, name: str) -> Event | None:
-        """The event of that name, or None."""
+        """Return the event of that name, or None."""
         return next((found for found in self.events if found.name == name), None)

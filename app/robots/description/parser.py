@@ -1,4 +1,4 @@
-"""From a checked description document to typed parts; the way in is `description.parse`."""
+"""Conversion of validated descriptions to typed parts; `description.parse` is the entry point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
 def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
-    """The robot of a document that has no problems; `topics` serve where the document names none."""
+    """Convert a valid document; `topics` are used where the document names none."""
     own = part(document, "rb:topics")
     topics = RobotTopics(
         description=text(own.get("description")) or topics.description,
@@ -147,7 +147,6 @@ def _title(name: str, owner: Mapping[str, object]) -> str:
 
 
 def _category(block: Mapping[str, object], otherwise: str) -> str:
-    """The heading in the toolbox: a sentence's capital, whatever the document has."""
     found = (text(block.get("category")) or otherwise).strip()
     return found[:1].upper() + found[1:]
 
@@ -161,14 +160,12 @@ def _words(block: Mapping[str, object], kind: str) -> str:
 
 
 def _spelled(title: str, parameters: tuple[Parameter, ...]) -> str:
-    """A block text for an action that brings none: its title, then each value with its name and unit."""
     shown = [parameter for parameter in parameters if not parameter.advanced]
     values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in shown]
     return " ".join([title, *values])
 
 
 def _with_robot(words: str) -> str:
-    """The text with ``%robot`` in it: at the front, or behind the "when" of an event."""
     if not words or "%robot" in words:
         return words
     if words.startswith("when "):

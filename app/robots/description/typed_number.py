@@ -1,6 +1,6 @@
-"""Numbers as people type them: comma and point are both decimal separators.
+"""Parsing of numbers that people type: comma and point are both decimal separators.
 
-``editor/src/typed_number.ts`` reads the number fields of blocks by the same rules; both are tested with
+``editor/src/typed_number.ts`` uses the same rules for number fields of blocks; both are tested with
 ``tests/data/typed_numbers.json``.
 """
 
@@ -19,7 +19,10 @@ _GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re
 
 
 class TypedNumberError(ValueError):
-    """A text is no number; ``has_separators`` when only its separators are wrong. Its text is a sentence."""
+    """Text that is not a number; ``has_separators`` if only its separators are ambiguous.
+
+    The message is a sentence for people.
+    """
 
     def __init__(self, *, has_separators: bool) -> None:
         super().__init__(_(SEPARATORS if has_separators else NOT_A_NUMBER))
@@ -33,7 +36,7 @@ def parse_number(text: str) -> float:
     moves a thousand times too far can't be undone.
 
     Raises:
-        TypedNumberError: The text is no finite number.
+        TypedNumberError: The text is not a finite number.
     """
     typed = unicodedata.normalize("NFKC", text).strip().replace("\N{MINUS SIGN}", "-")
     if _NUMBER.fullmatch(typed):

@@ -1,6 +1,7 @@
-"""Is this a robot's description? The profile's JSON Schema, and what a schema can't say, in sentences.
+"""Validation of robot descriptions: the profile's JSON Schema, and rules that a schema can't express.
 
-The schema is ``resources/robots/robot-profile.schema.json``; the terms are explained in the README beside it.
+The schema is ``resources/robots/robot-profile.schema.json``; its terms are documented in the README next to
+it.
 """
 
 from __future__ import annotations
@@ -27,20 +28,20 @@ PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MOST_PROBLEMS = 20
 _DEEPEST = 40
 MOST_VALUES = 20_000
-"""A description with more values is not looked at further: each takes some 0.05 ms. Pepper has 900."""
+"""Limit of values in a description; each takes some 0.05 ms to check. Pepper has 900."""
 _BLOCK = "rb:block"
 _WORDS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
-"""Members of a description that are shown, or hold what is."""
+"""Members of a description that are shown to people or contain shown text."""
 _VALUES = frozenset({"default", "enum", "const"})
 _LARGEST = 1e15
 _accepted: deque[str] = deque(maxlen=8)
-"""What the schema had nothing to say to: a robot tells the same description again and again."""
+"""Recently accepted descriptions: a robot publishes the same one again and again."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
 
 @lru_cache(maxsize=1)
 def _validator() -> Draft7Validator:
-    # A tenth of what Studio imports: only when the first robot is there.
+    # jsonschema is slow to import: only for the first robot.
     from jsonschema import Draft7Validator  # noqa: PLC0415
 
     schema = json.loads(resources.path("robots", "robot-profile.schema.json").read_text(encoding="utf-8"))
@@ -48,7 +49,7 @@ def _validator() -> Draft7Validator:
 
 
 def validate(model: object) -> tuple[str, ...]:
-    """What is wrong with a Thing Model or Thing Description, one sentence each; empty when it can be used."""
+    """Return the problems of a Thing Model or Thing Description, one sentence each; empty if it is valid."""
     if not isinstance(model, Mapping):
         return (_("a description must be a JSON object"),)
     model = dict(model)
@@ -68,15 +69,15 @@ def validate(model: object) -> tuple[str, ...]:
     if not problems:
         problems = list(_contradictions(model))
     if not problems and (harmless_model := cleaned(model)) != model:
-        return validate(harmless_model)  # a word may be nothing without what must not be in it
+        return validate(harmless_model)  # removing control characters may leave an empty text
     return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
 
 
 def cleaned(document: Mapping[str, object]) -> dict[str, object]:
-    """The document with words that do nothing but say something; the name is right already.
+    """Return the document without control characters in texts for people; names are validated instead.
 
-    One letter that turns the direction of writing, in an action's title, would turn ours behind it as well:
-    the question whether the robot may move, say.
+    A bidirectional control character in an action's title would also reorder the text after it, such as the
+    question whether the robot may move.
     """
 
     def clean(value: object, place: str) -> object:
@@ -92,10 +93,7 @@ def cleaned(document: Mapping[str, object]) -> dict[str, object]:
 
 
 def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
-    """The first thing in it that JSON does not have, that never ends, or that points elsewhere.
-
-    `seen` counts the values.
-    """
+    # Also rejects `$ref`, unusable numbers, and more than `MOST_VALUES` values, counted by `seen`.
     if next(seen) > MOST_VALUES or depth > _DEEPEST:
         if depth > _DEEPEST:
             return _("{place} is nested too deeply").format(place=path)
@@ -130,7 +128,7 @@ def _bad_key(key: object, place: str) -> str | None:
     return None
 
 
-# ---- sentences for what the schema finds ----------------------------------------------------------
+# ---- sentences for schema errors ----------------------------------------------------------
 
 _TYPE_WORDS = {
     "string": lazy("text"),
@@ -165,7 +163,7 @@ def _sentence(error: ValidationError) -> str:
     place = ".".join(str(part) for part in error.absolute_path) or _(WHOLE)
     rule = str(error.validator)
     limit: object = error.validator_value
-    if rule == "required":  # one error for each missing name, which only its message tells
+    if rule == "required":  # jsonschema names the missing property only in its message
         return _("{place} has no '{name}'").format(place=place, name=error.message.split("'")[1])
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
@@ -188,7 +186,7 @@ def _shortened(value: object) -> str:
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
 
-# ---- what a schema can't say ----------------------------------------------------------------------
+# ---- rules beyond the schema ----------------------------------------------------------------------
 
 
 def _contradictions(model: Mapping[str, object]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The driver of a robot: declared as a Python class, its topics, tasks, stop and watchdog, its process.
+"""Driver of a robot: declared as a Python class; its topics, tasks, stop, watchdog and process.
 
-What drivers may use of it is exported by `app.robots.kit`; `tasks` decides which action runs, waits or ends.
+`app.robots.kit` exports the public part; `tasks` decides which action runs, waits or ends.
 """

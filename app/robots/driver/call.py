@@ -1,4 +1,4 @@
-"""What a driver's function is given: the call it serves, and the link to the people who watch."""
+"""Arguments of driver functions: the running call, and the link to the network."""
 
 from __future__ import annotations
 
@@ -14,33 +14,44 @@ _log = logging.getLogger(__name__)
 
 
 class Clock(Protocol):
-    """Time, so that tests can bring their own."""
+    """Source of time, replaceable in tests."""
 
     def now(self) -> float:
-        """Seconds that never run backwards."""
+        """Return monotonic time in seconds."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait until the event is set (True) or the time is over (False); None waits for ever."""
+        """Wait until the event is set (return True) or the timeout has passed (False).
+
+        Args:
+            event: Event to wait for.
+            timeout_s: Timeout in seconds; None waits forever.
+        """
 
 
 class MonotonicClock:
-    """The computer's own clock."""
+    """Clock of the computer."""
 
     def now(self) -> float:
-        """Seconds since some start."""
+        """Return monotonic time in seconds."""
         return time.monotonic()
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait on the event."""
+        """Wait until the event is set (return True) or the timeout has passed (False)."""
         return event.wait(timeout_s)
 
 
 class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer's state
-    """The action is to end now; drivers let it pass, after putting away what they hold."""
+    """Raised in an action that must end now. Drivers clean up and let it propagate."""
 
 
 class Failed(Exception):  # noqa: N818 - the word of the answer's state
-    """The action can't be done; its sentence is shown to people: ``Failed("no ball in sight")``."""
+    """Raised by an action that can't be done; the sentence is shown to people.
+
+    Example:
+        ::
+
+            raise Failed("no ball in sight")
+    """
 
 
 def _call_each(callbacks: Sequence[Callable[[], object]]) -> None:
@@ -52,7 +63,7 @@ def _call_each(callbacks: Sequence[Callable[[], object]]) -> None:
 
 
 def _in_event_loop() -> bool:
-    asyncio = sys.modules.get("asyncio")  # who has not imported it runs no loop
+    asyncio = sys.modules.get("asyncio")  # without the import no loop is running
     if asyncio is None:
         return False
     try:
@@ -63,39 +74,67 @@ def _in_event_loop() -> bool:
 
 
 class Link(Protocol):
-    """How a robot tells what it senses and what happens to it; works in any thread."""
+    """Connection of a robot's class to the network. Thread-safe.
+
+    Attributes:
+        name: Name of the robot.
+    """
 
     name: str
 
     def sense(self, sensor: str, value: object) -> None:
-        """Publish a sensor's new value; an object sensor takes a mapping, a camera a picture or JPEG."""
+        """Publish a sensor's value.
+
+        Args:
+            sensor: Name of the sensor.
+            value: Its value: a mapping for an object, an array or JPEG bytes for a camera.
+        """
 
     def happen(self, event: str, **data: object) -> None:
-        """Publish an event."""
+        """Publish an event.
+
+        Args:
+            event: Name of the event.
+            data: Its fields.
+        """
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """A sentence for each thing in which an event is not as the description says; empty when it is."""
+        """Return a sentence for each way in which an event differs from the description; empty if valid."""
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish something that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
+        """Publish a value that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
 
     def watchers(self, leaf: str) -> int:
-        """How many subscribers the topic of a sensor has: nobody needs a picture that nobody sees."""
+        """Return the number of subscribers of a sensor's topic, to skip expensive work without any."""
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Let people act on a virtual robot's world: `changed` gets each message, in a thread of its own."""
+        """Call `changed` with each message that changes a virtual robot's world, in a thread of its own."""
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic that several robots share: `changed` gets each message; what is returned publishes."""
+        """Join a topic shared by several robots.
+
+        Args:
+            topic: Name of the topic.
+            changed: Called with each message, in the same thread as for `on_world`.
+            latched: Keep the last message for later subscribers.
+
+        Returns:
+            A function that publishes a message.
+        """
 
     def run(self, work: Awaitable[object]) -> object:
         """Run a coroutine in the robot's event loop, where its ``async def`` actions run, and wait for it."""
 
 
 class Call:
-    """One run of an action. Everything here may be used from the function's thread."""
+    """Running action. Its methods may be called from the action's thread.
+
+    Attributes:
+        action: Name of the action.
+        clock: Clock used by `wait`.
+    """
 
     def __init__(self, action: str, clock: Clock, report: Callable[[Mapping[str, object]], None]) -> None:
         self.action = action
@@ -108,11 +147,11 @@ class Call:
 
     @property
     def canceled(self) -> bool:
-        """True once the action is to end."""
+        """True once the action must end."""
         return self._ended.is_set()
 
     def cancel(self) -> None:
-        """End the action: the function's next wait raises Canceled. Waits for nothing."""
+        """Ask the action to end: its next wait raises Canceled. Does not block."""
         with self._lock:
             self._ended.set()
             callbacks, self._on_cancel = self._on_cancel, []
@@ -122,19 +161,19 @@ class Call:
             )
             try:
                 self._canceling.start()
-            except (RuntimeError, MemoryError):  # no room for a thread
+            except (RuntimeError, MemoryError):  # out of threads
                 self._canceling = None
                 _call_each(callbacks)
 
     def close(self) -> None:
-        """Wait until the callbacks of `on_cancel` have returned, 2 s at most."""
+        """Wait up to 2 s until the callbacks of `on_cancel` have returned."""
         if self._canceling is not None:
             self._canceling.join(_JOIN_S)
 
     def on_cancel(self, tell: Callable[[], object]) -> None:
-        """Call `tell` once, in another thread, as soon as the action is to end; at once when it is already.
+        """Call `tell` once, in another thread, when the action must end; at once if it must already.
 
-        For what waits in its own way, such as a library's own blocking call that has an abort.
+        For blocking calls of a library that can be aborted.
         """
         with self._lock:
             if not self._ended.is_set():
@@ -143,9 +182,14 @@ class Call:
         tell()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; raises Canceled as soon as the action is to end.
+        """Sleep, and raise Canceled as soon as the action must end.
 
-        Not in an ``async def``, which it would hold up with all others: RuntimeError says what to use there.
+        Args:
+            seconds: Time to sleep.
+
+        Raises:
+            Canceled: The action must end.
+            RuntimeError: Called in an ``async def`` action, whose event loop it would block.
         """
         if _in_event_loop():
             raise RuntimeError("call.wait holds an async function up; use `await asyncio.sleep` there")
@@ -153,9 +197,18 @@ class Call:
             raise Canceled
 
     def until(self, done: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30) -> bool:
-        """Wait until `done` is true (True) or the time is over (False), looking every so often.
+        """Poll `done` until it returns True.
 
-        Raises Canceled.
+        Args:
+            done: Condition.
+            for_s: Timeout in seconds; None waits forever.
+            every_s: Interval between two polls in seconds.
+
+        Returns:
+            True, or False if the timeout passed first.
+
+        Raises:
+            Canceled: The action must end.
         """
         limit = None if for_s is None else self.clock.now() + for_s
         while not done():
@@ -165,11 +218,14 @@ class Call:
         return True
 
     def feedback(self, **values: object) -> None:
-        """Tell how far it is; also a good place to notice a cancel."""
+        """Publish progress; raises Canceled if the action must end."""
         if self.canceled:
             raise Canceled
         self._report(values)
 
     def last(self, **values: object) -> None:
-        """Tell how far it came, also when it is canceled: a pause does the rest of it later."""
+        """Publish the final progress even if the action is canceled.
+
+        A resumed program uses it to do the rest.
+        """
         self._report(values)

@@ -1,4 +1,4 @@
-"""Commands of a robot: ``robot/command`` messages become tasks, answers ``robot/answer`` messages."""
+"""Handling of a robot's commands: ``robot/command`` messages become tasks, answered by ``robot/answer``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ENDED_KEPT = 100
 
 
 class CommandHandler:
-    """Takes the commands for one robot, in the deciding thread of its tasks; `stop` and `is_stop` in any."""
+    """Command handler of one robot. Runs in the deciding thread of its tasks; `stop` and `is_stop` in any."""
 
     def __init__(
         self,
@@ -38,7 +38,6 @@ class CommandHandler:
         publish: Publish,
         done: Done,
     ) -> None:
-        """`specs` declare the actions; `done` is given what a function returned, and runs a coroutine."""
         self._robot, self._body, self._specs = robot, body, specs
         self._tasks, self._publish, self._done = tasks, publish, done
         self._open: set[str] = set()
@@ -53,7 +52,7 @@ class CommandHandler:
         )
 
     def stop(self, command: object) -> None:
-        """Carry out a command for which `is_stop` is true. Thread-safe, and waits for nothing queued."""
+        """Execute a command for which `is_stop` is true. Thread-safe; does not wait for queued commands."""
         message = as_part(command)
         ended = text(message.get("ends"))
         if ended is not None:
@@ -68,9 +67,9 @@ class CommandHandler:
         """Handle one message of the command topic.
 
         Args:
-            command: The payload, of any type. It is answered if it has an id.
-            publisher: Id of the publisher that sent it: signs of life and cancels count only from the one
-                that asked for the action.
+            command: Payload of any type. It is answered if it has an id.
+            publisher: Id of its publisher: signs of life and cancels count only from the publisher that
+                requested the action.
             epoch: `Tasks.epoch` when it was received.
         """
         message = as_part(command)
@@ -89,7 +88,7 @@ class CommandHandler:
             raise
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Answer a command that is not decoded; an id that is in use belongs to another command."""
+        """Reply to a command that was not decoded, unless its id belongs to another command."""
         if wanted not in self._open:
             self._answering(wanted, operation, "")(Answer("failed", error=error))
 
@@ -125,11 +124,11 @@ class CommandHandler:
             self._answering(wanted, quotable(operation), "")(Answer("failed", error=error))
 
     def beat(self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0) -> None:
-        """Tell that the robot lives while it does something: programs notice when it no longer does.
+        """Publish that the robot is alive while it acts; programs notice its absence.
 
         Args:
-            not_ended: Actions whose functions go on although they were told to end.
-            error: The sentence for it.
+            not_ended: Actions whose functions keep running although they were asked to end.
+            error: Sentence about them.
             rejected: Number of messages to the robot that were not handled.
         """
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
@@ -148,7 +147,7 @@ class CommandHandler:
         publisher: int | None = None,
         epoch: int | None = None,
     ) -> Task:
-        """The task that runs an action of the body with an input that has been checked."""
+        """Create the task that runs an action with a validated input."""
         spec = self._specs[action.name]
         complete = action.complete(given)
         function: Callable[..., object] = getattr(self._body, action.name)
@@ -181,7 +180,7 @@ class CommandHandler:
         )
 
     def unknown(self, name: str) -> str:
-        """The sentence for an action that the robot has not."""
+        """Return the sentence for an unknown action."""
         close = near_miss(name, [each.name for each in self._robot.actions])
         words = (
             _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")
@@ -197,11 +196,11 @@ class CommandHandler:
         epoch: int | None,
     ) -> None:
         if wanted in self._open:
-            return  # the same command a second time
+            return  # duplicate command
         name, given = message.get("action"), message.get("input")
         answer = self._answering(wanted, "invoke", quotable(name or ""))
         if program is not None and program.name in self._ended:
-            # sent before its program was ended, come after the stop: it must not move the robot again
+            # sent before its program was ended, received after the stop: must not move the robot
             answer(Answer("canceled", error=_("its program was stopped")))
             return
         action = self._robot.action(name) if isinstance(name, str) else None
@@ -253,7 +252,6 @@ class CommandHandler:
 
 
 def _id_of(message: Mapping[str, object]) -> str | None:
-    """The id that answers to a message have; None when it has none that can be sent back."""
     wanted = text(message.get("id"))
     if wanted is None or len(wanted) > _MAX_ID_LENGTH or bounded_str(wanted) != wanted:
         return None
@@ -261,14 +259,12 @@ def _id_of(message: Mapping[str, object]) -> str | None:
 
 
 def _sendable(error: str | None) -> str | None:
-    """The sentence without halves of letters (of a file's name, say), which no message can hold."""
     return None if error is None else error.encode("utf-8", "replace").decode("utf-8")
 
 
 def _typed(
     spec: ActionSpec, function: Callable[..., object], inputs: Mapping[str, object]
 ) -> dict[str, object]:
-    """The values as the function's types have them; Failed when a type of the driver's own refuses one."""
     typed: dict[str, object] = {}
     for name, value in inputs.items():
         try:
@@ -277,5 +273,5 @@ def _typed(
             raise Failed(f"{name}: {error}") from error
     for name, parameter in inspect.signature(function).parameters.items():
         if name in spec.inputs and name not in typed and parameter.default is parameter.empty:
-            typed[name] = None  # an Optional that was left out
+            typed[name] = None  # an omitted Optional
     return typed

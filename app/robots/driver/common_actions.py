@@ -1,4 +1,4 @@
-"""Declarations that robots share: how they drive and move their parts, where they are, their battery."""
+"""Declarations shared by robots: driving, moving parts, position, battery, distance."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def drives(
     rize: str | None = None,
     from_rize: FromRize | None = None,
 ) -> action:
-    """An action that brings the robot to another place: another one replaces it, and it can be taken back.
+    """Declare an action that moves the robot to another place; a newer one replaces it.
 
-    It tells in ``unit`` how much is left (``to_go``), so that a pause can do the rest afterwards; with
-    ``moved`` also how much was made.
+    Its feedback has the remaining amount ``to_go`` in ``unit``, so that a resumed program can do the rest;
+    with ``moved`` also the amount done.
     """
     made: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
     return action(
@@ -55,7 +55,7 @@ def moves(
     title: str | None = None,
     rize: str | None = None,
 ) -> action:
-    """An action that moves ``parts`` of the robot, which stays where it is; another one replaces it."""
+    """Declare an action that moves ``parts`` of the robot without driving; a newer one replaces it."""
     return action(
         text,
         MOVEMENT,
@@ -71,7 +71,7 @@ def moves(
 
 
 def position_sensor(rate_hz: float) -> SensorSpec:
-    """Where the robot is and where it faces."""
+    """Declare the sensor of position and orientation."""
     return sensor(
         {
             "x": Annotated[float, Range(unit="m")],
@@ -85,12 +85,12 @@ def position_sensor(rate_hz: float) -> SensorSpec:
 
 
 def battery_sensor() -> SensorSpec:
-    """How full the battery is."""
+    """Declare the sensor of the battery level in percent."""
     full = Annotated[int, Range(0, 100, unit="%")]
     return sensor(full, title="battery", text="battery", icon="battery-medium")
 
 
 def distance_sensor(most_m: float) -> SensorSpec:
-    """How far it is to what stands ahead."""
+    """Declare the sensor of the distance ahead, up to ``most_m`` metres."""
     ahead = Annotated[float, Range(0, most_m, unit="m")]
     return sensor(ahead, title="distance", text="distance", icon="ruler", rate_hz=10)

@@ -1,8 +1,8 @@
-"""Declaring a robot in Python: its actions, sensors, events and safe stop; its Thing Model is made from them.
+"""Declaration of a robot in Python: actions, sensors, events and safe stop, converted to a Thing Model.
 
-A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`; methods marked with
+A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`; methods decorated with
 :class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` are
-class attributes; exactly one method is marked with :func:`safe_stop`.
+class attributes; exactly one method is decorated with :func:`safe_stop`.
 """
 
 from __future__ import annotations
@@ -45,12 +45,33 @@ _STOP_MARK = "__robot_stop__"
 
 @dataclass(frozen=True)
 class action:  # noqa: N801 - used as a decorator
-    """Make a method an action: ``def walk(self, call: Call, distance: Annotated[float, Range(...)])``.
+    """Decorator that declares a method as an action.
 
-    `text` is its block with ``%parameter`` in it, `says` the same in the third person. `rize` names RIZE's
-    primitive; `from_rize` turns RIZE's input and options into the action's input where names alone don't.
-    `repeat_s` is for actions that go on when their function has returned (a speed): the program that asked
-    must stay alive, and `repeat_s` is how often other tools may send it again.
+    The parameters' type annotations define the input; see `app.robots.driver.schema`.
+
+    Attributes:
+        text: Block text with ``%parameter`` in it.
+        category: Category of the block.
+        icon: Icon of the block.
+        says: The text in the third person, for messages.
+        title: Name for people (default: the method's name).
+        uses: Resources, such as "base": actions that share one don't run at the same time.
+        on_busy: "queue", "replace" or "reject" when a resource is in use.
+        timeout_s: Maximum duration in seconds.
+        risk: "moves" or "locomotes".
+        cancellable: False if it can't be canceled.
+        repeat_s: For actions that continue after their function returned (a speed): the interval at which
+            other tools may send them again. The requesting program must stay alive.
+        output: Fields of the result (default: the return type).
+        feedback: Fields of the progress.
+        rize: Name of RIZE's primitive.
+        from_rize: Converts RIZE's input and options to the action's input, if names alone don't.
+
+    Example:
+        ::
+
+            @action("walk %distance m", "Movement", "footprints", uses=("base",), risk="locomotes")
+            def walk(self, call: Call, distance: Annotated[float, Range(-2, 2, unit="m")] = 0.5) -> None: ...
     """
 
     text: str
@@ -70,7 +91,7 @@ class action:  # noqa: N801 - used as a decorator
     from_rize: FromRize | None = None
 
     def __call__(self, function: Function) -> Function:
-        """Mark the function and check its types at once; DeclarationError says what is wrong, and where."""
+        """Mark the function and check its types. Raises DeclarationError with the problem and its line."""
         try:
             _check_function(function)
             returns = Returned(self.output, returned_type(function))
@@ -103,13 +124,13 @@ class action:  # noqa: N801 - used as a decorator
 
 @dataclass(frozen=True)
 class Returned:
-    """What an action answers with: the fields of ``output=``, else what its function returns."""
+    """Result of an action: the fields of ``output=``, else the return type of its function."""
 
     fields: Mapping[str, object] | None = None
     kind: object = None
 
     def schema(self) -> Schema | None:
-        """Of the answer's output, which is an object: one value is its field ``value``."""
+        """Return the schema of the output, an object; a single value is its field ``value``."""
         if self.fields:
             return fields_schema(self.fields)
         if self.kind is None:
@@ -120,7 +141,7 @@ class Returned:
         return {"type": "object", "properties": {"value": {"title": "value", **schema}}}
 
     def told(self, value: object) -> Mapping[str, object]:
-        """The answer's output for what the function returned; RobotValueError when it is of another type."""
+        """Convert a function's return value to the output. Raises RobotValueError if the type is wrong."""
         made = self._told(value)
         check_sendable(made)
         return made
@@ -141,7 +162,7 @@ class Returned:
 
 @dataclass(frozen=True)
 class ActionSpec:
-    """What the decorator :class:`action` was told."""
+    """Declaration of an action, as given to the decorator :class:`action`."""
 
     part: Schema
     primitive: str | None
@@ -152,7 +173,7 @@ class ActionSpec:
 
 @dataclass(frozen=True)
 class StopSpec:
-    """What the decorator :func:`safe_stop` was told."""
+    """Declaration of the stop, as given to :func:`safe_stop`."""
 
     watchdog_s: float
     within_s: float
@@ -160,7 +181,7 @@ class StopSpec:
 
 @dataclass(frozen=True)
 class SensorSpec:
-    """A sensor's part of the description."""
+    """Declaration of a sensor, with its part of the description."""
 
     part: Schema
     is_image: bool = False
@@ -168,7 +189,7 @@ class SensorSpec:
     kind: object = None
 
     def told(self, value: object) -> object:
-        """What is published of a value; RobotValueError when it is not of the sensor's type."""
+        """Convert a value for publishing. Raises RobotValueError if the type is wrong."""
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):
@@ -178,7 +199,7 @@ class SensorSpec:
 
 @dataclass(frozen=True)
 class EventSpec:
-    """An event's part of the description, and how RIZE's blackboard calls it."""
+    """Declaration of an event, with its part of the description and its form on RIZE's blackboard."""
 
     part: Schema
     to_rize: ToRize | None = None
@@ -186,7 +207,14 @@ class EventSpec:
 
 
 def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Function], Function]:
-    """Make a method the robot's stop: it takes nothing and returns when the robot stands still."""
+    """Declare a method as the robot's stop.
+
+    The method takes no arguments and returns when the robot stands still; it raises Failed if it can't.
+
+    Args:
+        watchdog_s: Silence of the moving program (s) after which the robot stops by itself.
+        within_s: Time in which the robot stops (s).
+    """
 
     def mark(function: Function) -> Function:
         setattr(function, _STOP_MARK, StopSpec(watchdog_s, within_s))
@@ -198,7 +226,15 @@ def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Fu
 def sensor(
     kind: object, *, title: str, text: str = "", icon: str = "activity", rate_hz: float | None = None
 ) -> SensorSpec:
-    """A sensor of a type, or of an object when `kind` is a mapping of named types; `text` is its block."""
+    """Declare a sensor as a class attribute.
+
+    Args:
+        kind: Type of the value, or a mapping of field names to types.
+        title: Name for people.
+        text: Block text; "" for no block.
+        icon: Icon of the block.
+        rate_hz: Publishing rate, as a hint.
+    """
     schema = _described(fields_schema, kind) if isinstance(kind, Mapping) else _described(schema_of, kind)
     is_object = schema.get("type") == "object"
     part: Schema = {**schema, "title": title, "readOnly": True, "observable": True}
@@ -208,7 +244,15 @@ def sensor(
 
 
 def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: float) -> SensorSpec:
-    """A camera: pictures with the codec ``image``."""
+    """Declare a camera, which publishes images with the codec ``image``.
+
+    Args:
+        title: Name for people.
+        width: Width in pixels.
+        height: Height in pixels.
+        rate_hz: Frame rate.
+        hfov_deg: Horizontal field of view in degrees.
+    """
     part: Schema = {"title": title, "type": "string", "readOnly": True, "observable": True}
     part |= {"contentEncoding": "base64", "contentMediaType": "image/jpeg", "rb:widget": "image"}
     part |= {"rb:rate": rate_hz, "rb:image": {"width": width, "height": height, "hfov": hfov_deg}}
@@ -217,7 +261,14 @@ def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: fl
 
 
 def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = None) -> SensorSpec:
-    """Boxes with names in the pixels of a camera's picture."""
+    """Declare a sensor of named boxes in pixels of a camera's image.
+
+    Args:
+        title: Name for people.
+        camera: Name of the camera's sensor.
+        icon: Icon of the block.
+        rate_hz: Publishing rate, as a hint.
+    """
     kind = {"count": int, "name": str}
     part: Schema = {**fields_schema(kind), "title": title}
     part |= {"readOnly": True, "observable": True, "rb:widget": "detections", "rb:camera": camera}
@@ -235,7 +286,16 @@ def event(
     choose: tuple[str, ...] = (),
     rize: ToRize | None = None,
 ) -> EventSpec:
-    """Something that happens, with typed fields; blocks offer the fields of `choose` as choices."""
+    """Declare an event as a class attribute.
+
+    Args:
+        text: Block text.
+        title: Name for people.
+        icon: Icon of the block.
+        fields: Types of its fields by name.
+        choose: Fields that the block offers as choices.
+        rize: Converts the fields to RIZE's primitive and input.
+    """
     block: Schema = {"category": "Events", "icon": icon, "text": {"en": text}}
     part: Schema = {
         "title": title,
@@ -248,7 +308,21 @@ def event(
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of robot: the class that drives it and its Thing Model; DescriptionError tells what is wrong."""
+    """Kind of robot: the class that drives it, and its Thing Model.
+
+    Attributes:
+        model: Id of the model.
+        title: Name for people.
+        body: Class of the robot.
+        virtual: True for a simulated robot.
+        kinds: Categories, such as "mobile".
+        driver: Kind of driver.
+        description: Sentence about the robot.
+        thing_model: Generated Thing Model.
+
+    Raises:
+        DescriptionError: The declaration is invalid.
+    """
 
     model: str
     title: str
@@ -269,29 +343,28 @@ class Kind:
 
     @property
     def actions(self) -> dict[str, ActionSpec]:
-        """The marked methods, in the order of the class."""
+        """Decorated methods, in the order of the class."""
         return {name: getattr(member, _MARK) for name, member in self._members() if hasattr(member, _MARK)}
 
     @property
     def sensors(self) -> dict[str, SensorSpec]:
-        """The sensors, in the order of the class."""
+        """Sensors, in the order of the class."""
         return {name: member for name, member in self._members() if isinstance(member, SensorSpec)}
 
     @property
     def events(self) -> dict[str, EventSpec]:
-        """The events, in the order of the class."""
+        """Events, in the order of the class."""
         return {name: member for name, member in self._members() if isinstance(member, EventSpec)}
 
     @property
     def stop(self) -> tuple[str, StopSpec]:
-        """The name of the stop method and what its decorator was told."""
+        """Name of the stop method, and its declaration."""
         found = [(name, getattr(m, _STOP_MARK)) for name, m in self._members() if hasattr(m, _STOP_MARK)]
         if len(found) != 1:
             raise DescriptionError(self.model, (_("exactly one method must be marked with safe_stop"),))
         return found[0]
 
     def _twice(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
-        """A sentence for each declared thing whose name the class gives again, which would hide the first."""
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
         twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
         return [
@@ -343,7 +416,6 @@ class Kind:
 
 
 def _check_function(function: Callable[..., object]) -> None:
-    """TypeError for a function that could not be called, or that would not run when it is."""
     if inspect.isgeneratorfunction(function) or inspect.isasyncgenfunction(function):
         raise TypeError(_("actions can't be generators (yield); report progress with call.feedback"))
     names = list(inspect.signature(function).parameters)
@@ -354,11 +426,10 @@ def _check_function(function: Callable[..., object]) -> None:
 
 
 def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema:
-    """The schema of a class attribute's type; DeclarationError with the line of the driver."""
     try:
         return schema(kind)
     except TypeError as error:
-        frame = sys._getframe(1)  # noqa: SLF001 - the documented way to who calls
+        frame = sys._getframe(1)  # noqa: SLF001 - documented way to get the caller
         while frame.f_back is not None and frame.f_code.co_filename == __file__:
             frame = frame.f_back
         where = SourceLine(Path(frame.f_code.co_filename).name, frame.f_lineno)
@@ -374,7 +445,6 @@ def _given(found: Mapping[str, object]) -> Schema:
 
 
 def _with_line(problem: str, lines: Mapping[str, list[SourceLine]]) -> str:
-    """A problem of the description, which begins with the path of what is wrong, with the line of that."""
     path = problem.replace(":", ".").split(" ")[0].split(".")
     found = lines.get(path[1]) if len(path) > 1 and path[0] in {"actions", "properties", "events"} else None
     return f"{found[-1]}: {problem}" if found else problem
@@ -382,26 +452,25 @@ def _with_line(problem: str, lines: Mapping[str, list[SourceLine]]) -> str:
 
 @dataclass(frozen=True)
 class SourceLine:
-    """A line of a file, as people look it up: ``table.py, line 12``."""
+    """Line of a source file, formatted as ``table.py, line 12``."""
 
     file: str
     number: int
 
     def __str__(self) -> str:
-        """In words."""
         return _("{file}, line {number}").format(file=self.file, number=self.number)
 
 
 def line_of(function: object) -> SourceLine | None:
-    """Where a function begins; None for what was not written in Python."""
+    """Return the line where a function begins; None if it isn't written in Python."""
     code = getattr(inspect.unwrap(function), "__code__", None) if callable(function) else None
     return None if code is None else SourceLine(Path(code.co_filename).name, code.co_firstlineno)
 
 
 def lines_of(body: type) -> dict[str, list[SourceLine]]:
-    """The lines at which a class gives each of its names something; empty where its source can't be read.
+    """Return the lines at which a class binds each of its names; empty if its source is unavailable.
 
-    What a property's setter or an overload gives again is no second name.
+    Property setters and overloads don't count as a second binding.
     """
     try:
         lines, first = inspect.getsourcelines(body)

@@ -1,8 +1,7 @@
-"""A supervised thread that runs callbacks one at a time, urgent ones first.
+"""Supervised thread that runs callbacks one at a time, urgent ones first.
 
-No exception of a callback ends the thread: it is counted, logged at increasing intervals, and the next
-callback runs. Should the loop itself end (no memory, an exception raised in the thread from outside), it is
-restarted.
+Exceptions of callbacks don't end the thread: they are counted and logged at increasing intervals. If the loop
+itself ends (out of memory, an exception injected into the thread), it is restarted.
 """
 
 from __future__ import annotations
@@ -28,7 +27,15 @@ def _nothing() -> None:
 
 
 class Dispatcher:
-    """Runs callbacks in the thread `name`. Thread-safe."""
+    """Queue of callbacks run by the thread `name`. Thread-safe.
+
+    Args:
+        name: Name of the thread.
+        clock: Clock of the thread's waits.
+        tick: Called in the thread after callbacks, and when `next_due_s` has passed.
+        next_due_s: Returns the seconds until `tick` is needed, or None.
+        on_restart: Called in the thread before a loop that ended runs again.
+    """
 
     def __init__(
         self,
@@ -39,17 +46,8 @@ class Dispatcher:
         next_due_s: Callable[[], float | None] = lambda: None,
         on_restart: Callable[[], object] = _nothing,
     ) -> None:
-        """Create the dispatcher; `start` starts its thread.
-
-        Args:
-            name: Name of the thread.
-            clock: Time; the thread waits by it.
-            tick: Called in the thread after callbacks, and when `next_due_s` has passed.
-            next_due_s: Returns the seconds until `tick` is needed, or None.
-            on_restart: Called in the thread after the loop ended and before it runs again.
-        """
         self.errors = SurvivedErrors(_log, name)
-        """Exceptions that callbacks, ticks or the loop raised."""
+        """Exceptions raised by callbacks, ticks or the loop."""
         self._name, self._clock = name, clock
         self._tick, self._next_due_s, self._on_restart = tick, next_due_s, on_restart
         self._urgent: deque[Callable[[], object]] = deque()
@@ -68,7 +66,7 @@ class Dispatcher:
         self._wake.set()
 
     def post_urgent(self, callback: Callable[[], object]) -> None:
-        """Run a callback in the thread before all that are not urgent."""
+        """Run a callback in the thread before all non-urgent ones."""
         self._urgent.append(callback)
         self._wake.set()
 
@@ -88,19 +86,19 @@ class Dispatcher:
         return threading.current_thread() is self._thread
 
     def call(self, function: Callable[[], object]) -> None:
-        """Call a function now, in the thread; an exception is counted and logged instead of raised.
+        """Call a function in the thread; exceptions are counted and logged instead of raised.
 
-        MemoryError, and SystemExit and its like, end the loop, which is restarted.
+        MemoryError and BaseExceptions such as SystemExit end the loop, which is restarted.
         """
         try:
             function()
         except MemoryError:
             raise
-        except Exception as error:  # noqa: BLE001 - whatever one callback does, the next one has its turn
+        except Exception as error:  # noqa: BLE001 - a failing callback must not stop the others
             self.errors.add(error)
 
     def close(self) -> None:
-        """End the thread and wait for it, 2 s at most; what has not run is dropped."""
+        """Stop the thread and wait up to 2 s for it; pending callbacks are dropped."""
         self._closing.set()
         self._wake.set()
         if self._thread.ident is not None and not self.is_current:
@@ -119,7 +117,7 @@ class Dispatcher:
                         self._closing.wait(_RESTART_PAUSE_S)
                     is_restart = True
                     self._loop()
-                except BaseException as error:  # noqa: BLE001 - whatever ended the loop: it runs again
+                except BaseException as error:  # noqa: BLE001 - the loop restarts after any exception
                     self.errors.add(error)
         finally:
             if not self._closing.is_set():  # an exception hit the handler above

@@ -1,6 +1,6 @@
-"""A robot on the network: its topics, its commands, its watchdog, made from its kind.
+"""Robot on the network: topics, commands and watchdog, created from its kind.
 
-Its ``async def`` actions run in one event loop (`EventLoop`), and what they connect lives in it.
+Its ``async def`` actions run in one event loop (`EventLoop`), to which their connections belong.
 """
 
 from __future__ import annotations
@@ -41,9 +41,19 @@ _log = logging.getLogger(__name__)
 
 
 class Driver:
-    """Runs one robot of a kind under a name; it is the `Link` of the robot's class.
+    """Driver of one robot; also the `Link` of the robot's class. Thread-safe.
 
-    `node` is borrowed: closing the driver closes what it made on it, not the node. Works in any thread.
+    The node is borrowed: closing the driver closes its publishers and subscribers, not the node. Usable as a
+    context manager.
+
+    Args:
+        kind: Kind of the robot.
+        name: Name of the robot; its topics begin with it.
+        node: Node for publishers and subscribers.
+        clock: Clock, replaceable in tests.
+
+    Raises:
+        DescriptionError: The description is too large.
     """
 
     def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: Clock | None = None) -> None:
@@ -73,15 +83,16 @@ class Driver:
 
     @property
     def body(self) -> object:
-        """The robot's own object while it runs, else None."""
+        """Instance of the robot's class while it runs, else None."""
         return self._body
 
-    # ---- life -------------------------------------------------------------------------------------
+    # ---- start and close -----------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Make the topics, then the robot, then announce it.
+        """Create the topics, then the robot, then publish its description.
 
-        Raises the errors of ``nep`` without a master; then nothing is left behind and it may be tried again.
+        Without a master the errors of ``nep`` are raised; everything is cleaned up and it can be called
+        again.
         """
         try:
             self._make_topics()
@@ -134,7 +145,7 @@ class Driver:
         self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.take))
 
     def close(self) -> None:
-        """Stop the robot, answer what is open, end its threads, leave the network. May be called twice."""
+        """Stop the robot, reply to open commands, end its threads and close its topics. Idempotent."""
         for subscriber in self._subscribers:
             subscriber.close()
         self._subscribers.clear()
@@ -148,7 +159,7 @@ class Driver:
         if callable(close):
             try:
                 self._done(close(), within_s=_CLOSE_S)
-            except Exception:  # noqa: BLE001 - whatever it is: the rest is closed all the same
+            except Exception:  # noqa: BLE001 - the rest must be closed in any case
                 _log.warning("%s: its close broke off", self.name, exc_info=True)
         self._loop.close()
         self._loop = EventLoop(self.name)
@@ -164,12 +175,14 @@ class Driver:
     def __exit__(self, *_exc: object) -> None:
         self.close()
 
-    # ---- what the robot tells ---------------------------------------------------------------------
+    # ---- publishing ---------------------------------------------------------------------
 
     def sense(self, sensor: str, value: object) -> None:
-        """Publish a sensor's new value.
+        """Publish a sensor's value.
 
-        KeyError when the kind has no such sensor, RobotValueError when the value is not of its type.
+        Raises:
+            KeyError: The kind has no such sensor.
+            RobotValueError: The value has a wrong type.
         """
         spec = self.kind.sensors[sensor]
         try:
@@ -180,9 +193,11 @@ class Driver:
         self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
-        """Publish an event, also to RIZE's blackboard if it knows it.
+        """Publish an event, also on RIZE's blackboard if it has a form there.
 
-        KeyError when there is none such, RobotValueError when a datum is not of its type.
+        Raises:
+            KeyError: The kind has no such event.
+            RobotValueError: A field has a wrong type.
         """
         spec = self.kind.events[event]
         try:
@@ -196,9 +211,9 @@ class Driver:
             self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """A sentence for each thing in which an event is not as the description says; empty when it is.
+        """Return a sentence for each way in which an event differs from the description; empty if valid.
 
-        Every field is there, no other, each as described: it is what programs are promised.
+        Every described field must be present with a valid value, and no other.
         """
         described = self.robot.event(event)
         if described is None:
@@ -210,14 +225,14 @@ class Driver:
         )
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish on a topic of the robot that its description doesn't name, such as ``state``."""
+        """Publish a value that the description doesn't name on ``/<name>/<leaf>``, such as ``state``."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
             self._open(topic)
         self._publish(topic, value)
 
     def watchers(self, leaf: str) -> int:
-        """How many subscribers one of the robot's topics has now."""
+        """Return the number of subscribers of one of the robot's topics."""
         publisher = self._publishers.get(topic_of(self.name, leaf))
         return 0 if publisher is None else publisher.subscribers
 
@@ -232,16 +247,16 @@ class Driver:
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic that several robots share: `changed` gets each message, as in `on_world`.
+        """Join a topic shared by several robots; `changed` gets each message, as in `on_world`.
 
-        What is returned publishes one; after `close` it does nothing.
+        Returns:
+            A function that publishes a message; after `close` it does nothing.
         """
         self._open(topic, latched=latched)
         self._subscribe(topic, changed)
         return partial(self._publish, topic)
 
     def _done(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
-        """What one of the robot's functions returned; that of an ``async def`` is run now, in its loop."""
         return self._loop.run(result, call, within_s=within_s) if inspect.isawaitable(result) else result
 
     # ---- topics -----------------------------------------------------------------------------------
@@ -254,14 +269,14 @@ class Driver:
     def _publish(self, topic: str, value: object) -> None:
         publisher = self._publishers.get(topic)
         if publisher is None:
-            return  # closed meanwhile
+            return  # closed in the meantime
         try:
             publisher.publish(value)
         except nep.ClosedError:
             return
 
     def _subscribe(self, topic: str, changed: Callable[[Mapping[str, object]], None]) -> None:
-        # In a thread of its own: what a driver does with a message must not hold up a stop.
+        # In a separate thread: handling a message must not delay a stop.
         if self._world is None:
             self._world = Dispatcher(f"{self.name} world", self.clock)
             self._world.start()
@@ -275,9 +290,9 @@ class Driver:
 
 
 class EventLoop:
-    """One asyncio event loop in a thread of its own, begun with the first coroutine. Works in any thread.
+    """Asyncio event loop in a thread of its own, started by the first coroutine. Thread-safe.
 
-    All of a robot's coroutines share it, so that a connection which one action made serves the next one.
+    All coroutines of a robot share it, so that one action can use a connection opened by another.
     """
 
     def __init__(self, name: str) -> None:
@@ -290,10 +305,13 @@ class EventLoop:
     def run(
         self, work: Awaitable[object], call: Call | None = None, *, within_s: float | None = None
     ) -> object:
-        """Run it and wait for its end: what it returns, or what it raises.
+        """Run an awaitable and wait for it; return its result or raise its exception.
 
-        A `call` that is canceled cancels it (its next ``await`` raises CancelledError); Canceled is raised
-        when it has ended so. TimeoutError when it has not ended `within_s`; then it is canceled, too.
+        Args:
+            work: Awaitable.
+            call: Call whose cancellation cancels the awaitable (its next ``await`` raises CancelledError);
+                then Canceled is raised.
+            within_s: Timeout in seconds, after which the awaitable is canceled and TimeoutError raised.
         """
         loop, waited = self._begun(work), _Waited(work)
         self._soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
@@ -307,7 +325,7 @@ class EventLoop:
         return waited.result
 
     def close(self) -> None:
-        """Cancel what runs, end the thread. A coroutine that holds the loop up is left behind, and said."""
+        """Cancel running coroutines and end the thread. A blocked loop is abandoned with a warning."""
         with self._lock:
             self._closed = True
             loop, thread = self._loop, self._thread
@@ -340,12 +358,15 @@ class EventLoop:
         try:
             if loop is not None:
                 loop.call_soon_threadsafe(what)
-        except RuntimeError:  # it has ended meanwhile
+        except RuntimeError:  # the loop has ended
             return
 
 
 class _Waited:
-    """One awaitable that another thread waits for; all but `ended` is for the loop's thread until then."""
+    """Awaitable that another thread waits for.
+
+    Until `ended` is set, its other attributes belong to the loop's thread.
+    """
 
     def __init__(self, work: Awaitable[object]) -> None:
         self.ended = threading.Event()
@@ -363,18 +384,18 @@ class _Waited:
             self._task.cancel()
 
     async def _run(self) -> None:
-        # What it raises is kept here: SystemExit that leaves a task would end the whole loop.
+        # Exceptions are stored: a SystemExit that leaves a task would end the loop.
         try:
             self.result = await self._work
             self.error = None
         except asyncio.CancelledError:
             return
-        except BaseException as error:  # noqa: BLE001 - raised again for who waits
+        except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
             self.error = error
 
     def _end(self, _task: object) -> None:
         if asyncio.iscoroutine(self._work):
-            self._work.close()  # one that was canceled before its first step was never awaited
+            self._work.close()  # canceled before its first step: avoid a "never awaited" warning
         self.ended.set()
 
 
@@ -384,7 +405,7 @@ def _serve(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) -> No
         while not is_closed():
             try:
                 loop.run_forever()
-            except BaseException:  # noqa: BLE001 - SystemExit of a driver's own task: an async stop needs the loop
+            except BaseException:  # noqa: BLE001 - e.g. SystemExit of a driver's task; an async stop needs the loop
                 _log.error("a coroutine ended the event loop; it goes on", exc_info=True)
         left = asyncio.all_tasks(loop)
         for task in left:

@@ -1,4 +1,4 @@
-"""A driver as a process of its own: its arguments, its master, and its end when its owner is gone."""
+"""Driver as a process: arguments, waiting for a master, and exit with its owner."""
 
 from __future__ import annotations
 
@@ -30,11 +30,17 @@ _OWNER_CHECK_S = 0.5
 
 
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
-    """Run a robot of this kind until SIGTERM, Ctrl+C or the end of its owner.
+    """Run a robot of this kind until SIGTERM, Ctrl+C or the exit of its owner.
 
-    Prints the robot's model, topics and master; waits for a master if none answers. Returns the exit code: 0
-    on an orderly end, 1 when the robot can't be connected (its class raised Failed) or described, 2 for
-    invalid arguments.
+    Prints the robot's model, topics and master; waits if no master replies.
+
+    Args:
+        kind: Kind of the robot.
+        arguments: Command line (default: that of the process).
+
+    Returns:
+        Exit code: 0 after a regular end, 1 if the robot can't be connected (its class raised Failed) or
+        described, 2 for invalid arguments.
     """
     parser = argparse.ArgumentParser(description=_("Drive a robot: {title}.").format(title=kind.title))
     parser.add_argument("--name", default=kind.title, help=_("robot name; its topics begin with it"))
@@ -48,7 +54,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
         log_to(terminal, logging.INFO)
         try:
             run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
-        except (Failed, AppError, nep.NepError) as error:  # Failed: its own __init__, it can't be reached
+        except (Failed, AppError, nep.NepError) as error:  # Failed: raised by the robot's __init__
             _say(f"{chosen.name}: {error}", terminal)
             return 1
     return 0
@@ -57,7 +63,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
 def tell_briefly() -> None:
     """Report an invalid description as one sentence instead of a traceback.
 
-    Descriptions are built while Python reads the class, before the driver can catch an exception.
+    Descriptions are generated while Python executes the class, before the driver can catch an exception.
     """
     before = sys.excepthook
 
@@ -74,10 +80,10 @@ def tell_briefly() -> None:
 def run(
     kind: Kind, name: str, ended: threading.Event, *, master: str | None = None, owner_pid: int | None = None
 ) -> None:
-    """Drive a robot until `ended` is set or the owner is gone; then stop it and leave the network.
+    """Drive a robot until `ended` is set or the owner exits; then stop it and leave the network.
 
-    Without an owner, progress is printed. An owner follows the robot over the network and takes printed
-    lines for the reason of its end.
+    Progress is printed only without an owner: an owner follows the robot over the network and takes printed
+    lines as the reason of its exit.
     """
     owner = _process(owner_pid)
     if owner_pid is not None and owner is None:
@@ -107,7 +113,6 @@ def run(
 def _wait_for_master(
     driver: Driver, name: str, address: str, say: Callable[[str], object], is_over: Callable[[], bool]
 ) -> bool:
-    """Start the driver as soon as a master answers; return False if `is_over` before that."""
     has_waited = False
     while not _started(driver):
         if not has_waited:
@@ -132,7 +137,6 @@ def _say(words: str, terminal: Terminal) -> None:
 
 @contextmanager
 def _published(node: nep.Node) -> Iterator[None]:
-    """Publish log records, so that Studio's Console and `nep log` show them."""
     root = logging.getLogger()
     root.addHandler(node.log_handler)
     try:
@@ -150,7 +154,7 @@ def _started(driver: Driver) -> bool:
 
 
 def _over(ended: threading.Event, owner: psutil.Process | None) -> bool:
-    # is_running knows a process by its pid and the time it began, so a reused pid is not taken for it.
+    # is_running compares pid and start time, so a reused pid doesn't count.
     return ended.is_set() or (owner is not None and _is_gone(owner))
 
 

@@ -1,6 +1,6 @@
-"""Receive a robot's messages: stops are carried out at once, everything else is queued for another thread.
+"""Reception of a robot's messages: stops are executed at once, everything else is queued.
 
-The network's thread decodes only what may be a stop, so no message, however large, holds one up.
+The network's thread only decodes messages that may be a stop, so that large messages don't delay one.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ _log = logging.getLogger(__name__)
 
 
 class Dialect(Protocol):
-    """What gives the commands of one topic their meaning."""
+    """Interpreter of the commands of one topic."""
 
     def is_stop(self, command: object) -> bool:
         """Return True for a command that stops the robot. Thread-safe."""
 
     def stop(self, command: object) -> None:
-        """Carry it out at once. Thread-safe."""
+        """Stop the robot at once. Thread-safe."""
 
     def receive(self, command: object, publisher: int | None, epoch: int | None) -> None:
         """Handle a command, in the deciding thread."""
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Answer a command that was not decoded, in the deciding thread."""
+        """Reply to a command that was not decoded, in the deciding thread."""
 
 
 class RejectedMessages:
-    """Counts messages to one robot that were not handled; logs them at increasing intervals. Thread-safe."""
+    """Count of messages to one robot that were not handled, logged at increasing intervals. Thread-safe."""
 
     def __init__(self, robot: str) -> None:
         self.count = 0
@@ -64,7 +64,14 @@ class RejectedMessages:
 
 
 class MessageQueue:
-    """Hands messages of one topic to another thread, which decodes them. Bounded, and thread-safe."""
+    """Bounded queue of one topic's messages that are decoded in another thread. Thread-safe.
+
+    Args:
+        topic: Name of the topic.
+        post: Runs a callback in the decoding thread.
+        rejected: Counter of messages that are too large or too many.
+        max_message_bytes: Size limit of a message.
+    """
 
     def __init__(
         self,
@@ -73,14 +80,13 @@ class MessageQueue:
         rejected: RejectedMessages,
         max_message_bytes: int,
     ) -> None:
-        """`post` runs a callback in the thread that decodes; what is too large or too much is `rejected`."""
         self.max_message_bytes = max_message_bytes
         self._topic, self._post, self._rejected = topic, post, rejected
         self._lock = threading.Lock()
         self._count = self._bytes = 0
 
     def put(self, message: Message, use: Callable[[object], object]) -> bool:
-        """Let the other thread decode a message and `use` its payload; False when it is too large."""
+        """Queue a message whose payload is passed to `use`; return False if it is too large."""
         size = message.size_bytes
         if size > self.max_message_bytes:
             self._rejected.add(self._topic, self.too_large(message))
@@ -97,7 +103,7 @@ class MessageQueue:
         return True
 
     def too_large(self, message: Message) -> str:
-        """The sentence for a message that is too large."""
+        """Return the sentence for a message that is too large."""
         return _("the message has {size} kB; the limit is {limit} kB").format(
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
         )
@@ -115,7 +121,16 @@ class MessageQueue:
 
 
 class CommandReceiver:
-    """Sink of one command topic of a robot."""
+    """Sink of one command topic of a robot.
+
+    Args:
+        topic: Name of the topic.
+        tasks: Tasks of the robot.
+        dialect: Interpreter of the commands.
+        stop_words: Texts of which every stop command contains one.
+        rejected: Counter of messages that are too large, undecodable or too many.
+        queues_stops: Also queue an executed stop, because `Dialect.receive` replies to it.
+    """
 
     def __init__(
         self,
@@ -127,23 +142,12 @@ class CommandReceiver:
         *,
         queues_stops: bool = False,
     ) -> None:
-        """Create the sink.
-
-        Args:
-            topic: Name of the topic.
-            tasks: Tasks of the robot.
-            dialect: Gives the commands their meaning.
-            stop_words: Each command that stops the robot has one of these texts in it.
-            rejected: Counts what is too large, can't be decoded, or comes faster than it is handled.
-            queues_stops: Also queue a command that was carried out as a stop, because `Dialect.receive`
-                answers it.
-        """
         self._tasks, self._dialect, self._queues_stops = tasks, dialect, queues_stops
         self._queue = MessageQueue(topic, tasks.call_soon, rejected, MAX_COMMAND_BYTES)
         self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
 
     def take(self, messages: Sequence[Message]) -> None:
-        """Take the next messages, in the network's thread. Raises nothing."""
+        """Process messages. Runs in the network's thread; never raises."""
         stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch
         for at in stops:
@@ -161,7 +165,7 @@ class CommandReceiver:
             return False
         try:
             return self._dialect.is_stop(message.payload)
-        except Exception:  # noqa: BLE001 - the deciding thread meets and reports it
+        except Exception:  # noqa: BLE001 - the deciding thread raises and reports it again
             return False
 
     def _stop(self, message: Message) -> None:
@@ -183,7 +187,6 @@ class CommandReceiver:
 
 
 def _found(pattern: re.Pattern[bytes], message: Message) -> str:
-    """The member of a command that is too large to decode, if it is in the first or last 2 kB; else ""."""
     data = message.data
     found = pattern.search(bytes(data[:_END_BYTES])) or pattern.search(bytes(data[-_END_BYTES:]))
     return "" if found is None else found[1].decode()

@@ -1,7 +1,7 @@
-"""The dialect of RIZE: ``robot_action`` in, ``action_state`` out (docs/robots.md).
+"""RIZE's dialect: commands on ``robot_action``, replies on ``action_state`` (docs/robots.md).
 
 A command is ``{"node": "action", "primitives": {...} or [...], "robots": "Pepper", "state": "idle", ...}``; a
-list of primitives runs side by side. The answer is the same object with the state ``success`` or ``failure``.
+list of primitives runs in parallel. The reply is the same object with the state ``success`` or ``failure``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MAX_PRIMITIVES = 100
 
 @dataclass(eq=False)
 class _Group:
-    """The primitives of one command, which are answered together."""
+    """Primitives of one command, which get one reply."""
 
     command: Mapping[str, object]
     open: int
@@ -36,7 +36,10 @@ class _Group:
 
 
 class RizeDialect:
-    """Speaks RIZE for one robot, in the deciding thread of its tasks; `stop` and `is_stop` in any."""
+    """Interpreter of RIZE commands for one robot.
+
+    Runs in the deciding thread of its tasks; `stop` and `is_stop` in any.
+    """
 
     def __init__(
         self,
@@ -63,11 +66,11 @@ class RizeDialect:
         )
 
     def stop(self, message: object) -> None:  # noqa: ARG002 - see `Dialect`
-        """Stop the robot at once; thread-safe. The message is answered when `receive` comes to it."""
+        """Stop the robot at once. Thread-safe. `receive` replies to the message."""
         self._tasks.stop(None)
 
     def receive(self, message: object, publisher: int | None = None, epoch: int | None = None) -> None:  # noqa: ARG002
-        """Handle one message of ``robot_action``; those for other robots are ignored.
+        """Handle one message of ``robot_action``; ignore those for other robots.
 
         `epoch` is `Tasks.epoch` when it was received.
         """
@@ -80,14 +83,13 @@ class RizeDialect:
             self._run(command, epoch)
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Do nothing: RIZE's answer repeats the whole command."""
+        """Do nothing: RIZE's reply repeats the whole command."""
 
     def _is_for_me(self, command: Mapping[str, object]) -> bool:
         robots = command.get("robots")
         return robots == self._robot.name or (isinstance(robots, list) and self._robot.name in robots)
 
     def _action_of(self, primitive: Mapping[str, object]) -> str:
-        """The name of the action that a primitive means; "" when it can be none."""
         name = text(primitive.get("primitive")) or ""
         return self._specs.get(name, (name, None))[0]
 
@@ -141,7 +143,6 @@ def _primitives(command: Mapping[str, object]) -> Sequence[object]:
 
 
 def _as_text(value: object) -> str:
-    """RIZE's input is text; other programs send numbers, too."""
     return str(value or "") if isinstance(value, (str, float, bool)) else bounded_str(value or "")
 
 
@@ -159,7 +160,6 @@ def _wait(call: Call, seconds: float) -> None:
 def _meant(
     action: Action, spec: ActionSpec | None, given: str, options: Mapping[str, object]
 ) -> Mapping[str, object] | None:
-    """The action's input that RIZE's input and options mean; None when they mean nothing here."""
     if spec is None or spec.from_rize is None:
         return _by_name(action, given, options)
     try:
@@ -169,7 +169,6 @@ def _meant(
 
 
 def _by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[str, object]:
-    """The input goes to the first parameter, options to those of their names; the others are left out."""
     meant: dict[str, object] = {}
     if action.parameters and given:
         first = action.parameters[0]
@@ -182,7 +181,6 @@ def _by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[
 
 
 def _of_kind(parameter: Parameter, value: object) -> object:
-    """RIZE sends numbers as text and switches as text or truth values: what the parameter needs instead."""
     if parameter.kind in {"number", "integer", "angle"} and isinstance(value, str):
         number = number_of(value)
         return value if number is None else number

@@ -1,8 +1,8 @@
-"""From the types of a Python function to the data schemas of its description.
+"""Conversion of a Python function's types to the data schemas of its description.
 
 A value is ``float``, ``int``, ``bool``, ``str``, :data:`Colour`, ``list``, ``tuple``, ``dict``, ``Optional``,
-a ``Literal`` or Enum, a dataclass or TypedDict; what the type can't say is annotated:
-``Annotated[float, Range(-2, 2, step=0.05, unit="m")]``.
+a ``Literal`` or Enum, a dataclass or TypedDict; further constraints are annotated: ``Annotated[float,
+Range(-2, 2, step=0.05, unit="m")]``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,15 @@ _TYPES: Mapping[object, str] = {float: "number", int: "integer", bool: "boolean"
 
 @dataclass(frozen=True)
 class Range:
-    """Limits of a number, its unit as in UCUM ("m", "deg", "s", "%"), and the step that editors offer."""
+    """Limits and unit of a number.
+
+    Attributes:
+        minimum: Smallest value.
+        maximum: Largest value.
+        step: Step that editors offer.
+        unit: Unit as in UCUM ("m", "deg", "s", "%").
+        widget: Editor, such as "slider" or "angle".
+    """
 
     minimum: float | None = None
     maximum: float | None = None
@@ -43,7 +51,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Text:
-    """How long a text may be."""
+    """Length limits of a text in characters."""
 
     min_length: int = 0
     max_length: int | None = None
@@ -51,47 +59,47 @@ class Text:
 
 @dataclass(frozen=True)
 class Words:
-    """The words that people see for the values of a ``Literal``."""
+    """Words shown for the values of a ``Literal``."""
 
     shown: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Title:
-    """What a form calls the value, when its Python name won't do."""
+    """Title shown instead of the Python name."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Suggested:
-    """What forms and blocks start with; the caller must give the value all the same."""
+    """Initial value in forms and blocks; callers must still give a value."""
 
     value: object
 
 
 @dataclass(frozen=True)
 class Advanced:
-    """Folded away in forms."""
+    """Parameter that forms collapse."""
 
 
 @dataclass(frozen=True)
 class _HexColour:
-    """A text that is a colour."""
+    """Text that is a colour."""
 
 
 @dataclass(frozen=True)
 class _PictureText:
-    """A text that is a picture."""
+    """Text that is an image."""
 
 
 Colour: TypeAlias = Annotated[str, _HexColour()]
 Image: TypeAlias = Annotated[str, _PictureText()]
-"""A picture as ``data:image/jpeg;base64,...``, or its address."""
+"""Image as ``data:image/jpeg;base64,...``, or its address."""
 
 
 def schema_of(annotation: object) -> Schema:
-    """The data schema of a type; TypeError names what can't be described."""
+    """Return the data schema of a type. Raises TypeError for unsupported types."""
     return _schema_of(annotation, ())
 
 
@@ -139,7 +147,7 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
 
 
 def _held(annotation: object, inside: tuple[object, ...]) -> Schema:
-    """What a list or the like holds: always a value, never None."""
+    # Elements of a list or map: None is not allowed.
     if without_none(bare(annotation)[0])[1]:
         raise TypeError(
             _("a robot's list can't hold None: {annotation}; leave the value out").format(
@@ -206,7 +214,6 @@ def _given(found: Mapping[str, object]) -> Schema:
 
 
 def _check_unit(unit: object) -> None:
-    """TypeError for what is no unit, or a word where UCUM has a sign: people see "°" for "deg"."""
     if unit is None:
         return
     if not isinstance(unit, str):
@@ -223,7 +230,11 @@ def _check_unit(unit: object) -> None:
 
 
 def input_types(function: Callable[..., object]) -> dict[str, object]:
-    """The types of an action's parameters but ``self`` and ``call``; TypeError when one has none."""
+    """Return the types of an action's parameters except ``self`` and ``call``.
+
+    Raises:
+        TypeError: A parameter has no type, or is variadic or positional-only.
+    """
     hints: dict[str, Any] = get_type_hints(function, include_extras=True)
     found: dict[str, object] = {}
     parameters = list(inspect.signature(function).parameters.values())
@@ -251,7 +262,7 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
 
 
 def returned_type(function: Callable[..., object]) -> object:
-    """The type that a function says it returns; None when it says nothing, None, or any object."""
+    """Return a function's annotated return type; None for no annotation, None, or any object."""
     kind = get_type_hints(function, include_extras=True).get("return")
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]
@@ -261,7 +272,7 @@ def returned_type(function: Callable[..., object]) -> object:
 
 
 def input_schema(function: Callable[..., object]) -> Schema | None:
-    """The schema of an action's input: the parameters but ``self`` and ``call``; None without any."""
+    """Return the schema of an action's input (all parameters except ``self`` and ``call``), or None."""
     properties: dict[str, Schema] = {}
     required = []
     parameters = inspect.signature(function).parameters
@@ -288,6 +299,6 @@ def _default(kind: object, default: object, name: str) -> object:
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:
-    """The schema of an object with these typed fields."""
+    """Return the schema of an object with these typed fields."""
     properties = {name: {"title": name.replace("_", " "), **schema_of(kind)} for name, kind in fields.items()}
     return {"type": "object", "properties": properties}

@@ -1,7 +1,7 @@
-"""The values of typed Python: what a type is made of, and its values from JSON and to JSON.
+"""Values of typed Python: inspection of types, conversion from JSON and to JSON.
 
-:func:`given` makes what a function takes from JSON that its description allows; :func:`told` makes JSON of
-what a driver tells, and raises RobotValueError with what it must be: "the value must be a number, not 'far'".
+:func:`given` converts valid JSON to a function's argument; :func:`told` converts a driver's value to JSON,
+and raises RobotValueError if it is invalid: "the value must be a number, not 'far'".
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _DEEPEST = 40
 
 
 def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
-    """A type without its ``Annotated``, and what that said about it."""
+    """Split ``Annotated`` into the type and its annotations."""
     if get_origin(annotation) is Annotated:
         plain, *notes = get_args(annotation)
         return plain, tuple(notes)
@@ -36,7 +36,7 @@ def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
 
 
 def without_none(annotation: object) -> tuple[object, bool]:
-    """What an ``Optional`` holds, and whether it is one; ``int | float`` is a number like float."""
+    """Return the type inside an ``Optional``, and whether it is one; ``int | float`` counts as float."""
     if get_origin(annotation) not in {Union, UnionType}:
         return annotation, False
     kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
@@ -53,7 +53,7 @@ def without_none(annotation: object) -> tuple[object, bool]:
 
 
 def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
-    """The fields of a dataclass or TypedDict with their types, and whether each must be given; else None."""
+    """Return the fields of a dataclass or TypedDict with type and required flag; None for other types."""
     if not isinstance(annotation, type):
         return None
     if dataclasses.is_dataclass(annotation):
@@ -72,18 +72,16 @@ def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
 
 
 def _present(kind: object, must: bool) -> tuple[object, bool]:
-    """Without the Required or NotRequired around it, which counts more than the TypedDict's own list of keys.
-
-    (That list misses them in a module whose annotations are texts.)
-    """
+    # Required and NotRequired take precedence over `__required_keys__`, which misses them in modules with
+    # string annotations.
     word = str(get_origin(kind))
     return (get_args(kind)[0], "Not" not in word) if word.endswith("Required") else (kind, must)
 
 
 def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], ...] | None:
-    """Of a Literal or Enum: what JSON has, what Python has, and the word that people see; else None.
+    """Return the values of a Literal or Enum as (JSON value, Python value, word); None for other types.
 
-    TypeError when JSON can't tell the values of an Enum apart.
+    Enums with values that JSON can't represent use their names.
     """
     if get_origin(annotation) is Literal:
         return tuple((value, value, None) for value in get_args(annotation))
@@ -99,16 +97,16 @@ def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], .
 
 
 def shown(annotation: object) -> str:
-    """A type as a person wrote it: ``float``, ``list[str]``, ``Pose``."""
+    """Format a type as written in source: ``float``, ``list[str]``, ``Pose``."""
     if isinstance(annotation, type) and get_origin(annotation) is None:
         return annotation.__name__
     return str(annotation).replace("typing.", "")
 
 
 def given(annotation: object, value: object) -> object:
-    """What a function of this type takes, from a JSON value that its description allows.
+    """Convert a valid JSON value to an argument of this type.
 
-    A dataclass may refuse with a ValueError of its own.
+    The constructor of a dataclass may raise ValueError.
     """
     kind, is_optional = without_none(bare(annotation)[0])
     kind = bare(kind)[0]
@@ -140,7 +138,7 @@ def given(annotation: object, value: object) -> object:
 
 
 def told(annotation: object, value: object) -> object:
-    """The JSON value of what a driver tells as this type; RobotValueError says what it must be instead."""
+    """Convert a driver's value of this type to JSON. Raises RobotValueError if it is invalid."""
     kind, is_optional = without_none(bare(annotation)[0])
     kind = bare(kind)[0]
     if value is None and is_optional:
@@ -170,11 +168,10 @@ def told(annotation: object, value: object) -> object:
 def told_fields(
     kinds: Mapping[str, object], value: object, required: Sequence[str] = ()
 ) -> dict[str, object]:
-    """The JSON object of what a driver tells as these fields; what it tells besides stays as it is.
+    """Convert a driver's value with these fields to a JSON object; other fields are kept unchanged.
 
-    None is what is not known just now, but for the required ones.
-
-    RobotValueError names the field that is wrong, or missing of the required ones.
+    None means unknown, except for required fields. Raises RobotValueError naming the field that is invalid or
+    missing.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
@@ -197,7 +194,7 @@ def told_fields(
 
 
 def plain(value: object, depth: int = 0) -> object:
-    """The value as JSON has it, whatever type was declared; RobotValueError when JSON has no such thing."""
+    """Convert a value of any type to JSON. Raises RobotValueError if JSON can't represent it."""
     value = _out_of_numpy(value)
     if value is None or isinstance(value, (bool, str)):
         return value
@@ -219,7 +216,7 @@ def plain(value: object, depth: int = 0) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """RobotValueError when a message can't hold a JSON value: an endless number, half a letter."""
+    """Raise RobotValueError for NaN, infinity and lone surrogates, which messages can't hold."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
         raise RobotValueError(lazy("{place} must be valid Unicode text"))
     if isinstance(value, float) and not math.isfinite(value):
@@ -233,7 +230,7 @@ def check_sendable(value: object) -> None:
 
 
 def same(allowed: object, value: object) -> bool:
-    """Whether two values are the same in JSON: 1 == True in Python, but 1 is not "yes"."""
+    """Return whether two values are equal in JSON: unlike in Python, 1 differs from true."""
     return allowed == value and isinstance(allowed, bool) == isinstance(value, bool)
 
 
@@ -252,7 +249,6 @@ def _simple(kind: object, value: object) -> object:
 
 
 def _number(value: object) -> int | float | None:
-    """The number as Python's own; None when it is none. Yes and no are no numbers."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         return None
     return int(value) if isinstance(value, numbers.Integral) else float(value)
@@ -293,7 +289,6 @@ def _required(fields: Mapping[str, tuple[object, bool]]) -> list[str]:
 
 
 def _out_of_numpy(value: object) -> object:
-    """Numbers and arrays of numpy as Python has them; numpy itself is not needed for that."""
     if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
         return value.tolist()
     return value

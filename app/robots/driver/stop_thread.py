@@ -1,4 +1,4 @@
-"""The thread of a robot's stop function. It exists before it is needed and waits for nothing else."""
+"""Thread of a robot's stop function. It is started in advance and runs nothing else."""
 
 from __future__ import annotations
 
@@ -17,9 +17,15 @@ _log = logging.getLogger(__name__)
 
 
 class StopThread:
-    """Runs the stop function of one robot. Thread-safe.
+    """Runner of one robot's stop function. Thread-safe.
 
-    Runs are numbered from 1. Stops that are asked for while the function runs share that run.
+    Runs are numbered from 1. Stops requested while the function runs share that run.
+
+    Args:
+        name: Name of the robot.
+        stop: The robot's stop function.
+        ended: Called in this thread with the number of a run and its error sentence, or None.
+        clock: Clock of the thread's waits.
     """
 
     def __init__(
@@ -29,14 +35,6 @@ class StopThread:
         ended: Callable[[int, str | None], object],
         clock: Clock,
     ) -> None:
-        """Create the thread; `start` starts it.
-
-        Args:
-            name: Name of the robot.
-            stop: The robot's stop function.
-            ended: Called in this thread with the number of a run and the sentence of its failure, or None.
-            clock: Waits for the next stop.
-        """
         self._name, self._stop, self._ended, self._clock = name, stop, ended, clock
         self._errors = SurvivedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
@@ -51,22 +49,22 @@ class StopThread:
 
     @property
     def requested(self) -> int:
-        """Number of the newest run that was reserved; 0 before the first one."""
+        """Number of the newest reserved run; 0 before the first."""
         return self._requested
 
     def reserve(self) -> int:
-        """Return the number of the run that serves a stop that is asked for now; `wake` begins it."""
+        """Return the number of the run that serves a stop requested now; `wake` starts it."""
         with self._lock:
             if self._requested == self._finished:
                 self._requested += 1
             return self._requested
 
     def wake(self) -> None:
-        """Begin the reserved run at once, in this object's thread."""
+        """Start the reserved run at once, in this object's thread."""
         self._wake.set()
 
     def close(self) -> None:
-        """End the thread; a stop function that does not return is left behind."""
+        """Stop the thread; a stop function that doesn't return is abandoned."""
         self._is_closing = True
         self._wake.set()
         if self._thread.ident is not None:
@@ -85,7 +83,7 @@ class StopThread:
                     if self._requested > self._finished:
                         self._run(self._requested)
         finally:
-            if not self._is_closing:  # an exception was raised in this thread outside of the lines above
+            if not self._is_closing:  # an exception was injected outside of the try block
                 self._thread = self._new_thread()
                 self._wake.set()
                 self._thread.start()
@@ -104,7 +102,7 @@ class StopThread:
             self._stop()
         except Failed as failed:
             why = bounded_str(failed, ERROR_MOST)
-        except BaseException as failed:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
+        except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
             why = _("its stop failed: {error}").format(error=bounded_str(failed, ERROR_MOST))
         else:

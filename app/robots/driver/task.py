@@ -1,4 +1,4 @@
-"""One thing that a robot is asked to do, and what is answered to it."""
+"""Task of a robot, and the answers to it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "cancel
 
 @dataclass(frozen=True)
 class Answer:
-    """How a task stands; `error` is a sentence for people.
+    """State of a task; `error` is a sentence for people.
 
-    An accepted one may wait for other actions (`waits_for`) or have ended them (`replaces`).
+    An accepted task may wait for other actions (`waits_for`) or have replaced them (`replaces`).
     """
 
     state: State
@@ -28,14 +28,14 @@ class Answer:
 
     @property
     def is_final(self) -> bool:
-        """True when no other answer follows."""
+        """True if no other answer follows."""
         return self.state in {"succeeded", "failed", "canceled"}
 
 
 class ProgramId(NamedTuple):
-    """Who asks a robot to act: the name in ``from``, and the id of the publisher that the command came from.
+    """Requesting program: the name in ``from``, and the id of the command's publisher.
 
-    Anybody can write another's name; only both together are the program that must stay alive.
+    Names can be forged; only both together identify the program that must stay alive.
     """
 
     name: str
@@ -44,13 +44,30 @@ class ProgramId(NamedTuple):
 
 @dataclass(eq=False)
 class Task:
-    """Something to run: `run` gets its :class:`Call` in a thread, `answer` is called in the deciding one.
+    """Execution of an action.
 
-    `stopped` says that a stop of the robot told it to end; `answered` that its final answer was given, also
-    while its function goes on.
-    `program` asked for it and must stay alive while it runs; one that `goes_on` (a speed) also afterwards.
-    `publisher` is the id of the publisher that the command came from, also when it named no program.
-    `epoch` is `Tasks.epoch` when the command was received: after a later stop it is not run.
+    `run` gets its :class:`Call` in a thread, `answer` is called in the deciding thread.
+
+    Attributes:
+        id: Id of the command.
+        action: Name of the action.
+        run: Function of the action.
+        answer: Callback for answers.
+        uses: Resources of the action.
+        on_busy: "queue", "replace" or "reject".
+        timeout_s: Maximum duration.
+        cancellable: False if it can't be canceled.
+        title: Name for people.
+        program: Program that must stay alive while the task runs; with `goes_on` also afterwards.
+        publisher: Id of the command's publisher, also if it named no program.
+        goes_on: True for a speed, which continues after success.
+        epoch: `Tasks.epoch` when the command was received: after a later stop it is not run.
+        call: Running call.
+        thread: Its thread.
+        due_s: When it is overdue.
+        ending: Answer to give when it ends.
+        answered: True once the final answer was given, even if the function is still running.
+        stopped: True if a stop of the robot ended it.
     """
 
     id: str
@@ -74,13 +91,13 @@ class Task:
     stopped: bool = False
 
     def end(self, how: Answer) -> None:
-        """Ask the running function to end; `how` is what will be answered, whatever it returns."""
+        """Ask the running function to end; `how` is the answer, whatever it returns."""
         self.ending = self.ending or how
         if self.call is not None:
             self.call.cancel()
 
     def finish(self, answer: Answer) -> None:
-        """Give the final answer, once."""
+        """Give the final answer once."""
         if not self.answered:
             self.answered = True
             self.answer(answer)

@@ -1,9 +1,8 @@
-"""Run what a robot is asked to do: order, busy policies, cancel, stop, watchdog.
+"""Execution of a robot's tasks: order, busy policies, cancel, stop, watchdog.
 
-All decisions are taken in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has a
-thread of its own. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and
-wakes the thread of the stop function (`StopThread`). Commands that were received before a stop are not run
-after it.
+All decisions are made in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has its
+own thread. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and wakes
+the thread of the stop function (`StopThread`). Commands received before a stop are not run after it.
 """
 
 from __future__ import annotations
@@ -23,16 +22,18 @@ from nep.i18n import _, lazy, ngettext, number
 from nep.text import bounded_str
 
 BEAT_S = 0.5
-"""While something runs or waits, the robot says at least so often that it lives."""
+"""Maximum interval of signs of life while a task runs or waits."""
 STOP_ANSWER_S = 0.5
-"""A stop is answered after so long at the latest (or the robot's own `within_s`, when that is longer), also
-when something goes on: well before Studio gives up (`app.core.run.control.STOP_TIMEOUT_S`) and calls it
-silent."""
+"""Maximum time until a stop is answered, even if a function keeps running.
+
+The robot's `within_s` applies if it is longer. Well below the time after which Studio treats a robot as
+silent (`app.core.run.control.STOP_TIMEOUT_S`).
+"""
 _GRACE_S = 1.0
-"""So long a function may take to put things away after a cancel, a time-out or one that takes its place."""
+"""Time in which a function may clean up after a cancel, a time-out or a replacement."""
 _LONGEST_QUEUE = 50
 _MOST_RUNNING = 50
-"""What uses nothing runs side by side, each in a thread of its own."""
+"""Actions without resources run in parallel, each in its own thread."""
 THE_STOP = lazy("the stop itself")
 NOTHING_RUNS = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
@@ -41,42 +42,45 @@ _log = logging.getLogger(__name__)
 
 
 class Watchdog:
-    """Hears programs and bites when one falls silent for which the robot acts. It has no thread."""
+    """Detector of programs that fall silent while the robot acts for them. It has no thread.
+
+    Args:
+        patience_s: Allowed silence; None disables the watchdog.
+    """
 
     def __init__(self, patience_s: float | None) -> None:
-        """`patience_s` may pass without a sign of life; None never bites."""
         self.patience_s = patience_s
         self._heard: dict[ProgramId, float] = {}
         self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
     def hear(self, program: ProgramId, now: float, *, watch: bool) -> None:
-        """A program said something; `watch` begins to expect more (it asked the robot to act)."""
+        """Note a sign of life; `watch` starts to expect more (the program requested an action)."""
         if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
 
     def begins(self, task: Task) -> None:
-        """What it uses is not left in motion any more: the task has it now."""
+        """Note that a task uses its resources: they are no longer left in motion."""
         for used in task.uses:
             self._going_on.pop(used, None)
 
     def ends_well(self, task: Task) -> None:
-        """One that goes on (a speed) leaves what it uses in motion."""
+        """Note that a task succeeded: one that continues (a speed) leaves its resources in motion."""
         if task.goes_on and task.program is not None:
             self._going_on |= dict.fromkeys(task.uses, task.program)
 
     def reset(self) -> None:
-        """The robot was stopped: nobody need be heard."""
+        """Forget all programs, because the robot was stopped."""
         self._heard.clear()
         self._going_on.clear()
 
     def due(self) -> list[float]:
-        """When to look again."""
+        """Return the times at which programs become silent."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
     def bites(self, now: float, acting: Collection[ProgramId | None]) -> bool:
-        """Whether the robot is to stop; `acting` are the programs of what runs or waits now.
+        """Return whether the robot must stop; `acting` are the programs of running and waiting tasks.
 
-        A silent program for which nothing is done is forgotten: it may have ended long ago.
+        Silent programs without a task are forgotten: they may have ended long ago.
         """
         if self.patience_s is None:
             return False
@@ -87,16 +91,28 @@ class Watchdog:
 
 
 class _PendingStop(NamedTuple):
-    """A stop that is not answered yet."""
+    """Stop that is not answered yet."""
 
     run: int
-    """Number of the run of the stop function that it waits for."""
+    """Number of the stop function's run that it waits for."""
     limit_s: float
     answer: Callable[[Answer], None]
 
 
 class Tasks:
-    """The tasks of one robot. Methods without another word are for the deciding thread only."""
+    """Tasks of one robot. Unless stated otherwise, methods run in the deciding thread.
+
+    Args:
+        name: Name of the robot.
+        stop: The robot's stop function.
+        clock: Clock.
+        within_s: Time in which the robot stops.
+        watchdog_s: Allowed silence of a program; None disables the watchdog.
+        beat: Called in the deciding thread twice a second while a task runs or waits or a stop has not
+            succeeded, with the actions that keep running although they were asked to end and a sentence about
+            them, and once more when the last one has ended. A failed stop of the watchdog is included until a
+            stop succeeds, because it has no other answer.
+    """
 
     def __init__(
         self,
@@ -108,12 +124,6 @@ class Tasks:
         watchdog_s: float | None,
         beat: Callable[[tuple[str, ...], str | None], None] | None = None,
     ) -> None:
-        """`beat` is called in the deciding thread twice a second while anything runs, waits or did not stop.
-
-        It is given the actions whose functions were told to end and go on, with the sentence for it, and is
-        called once more with none of them as soon as the last one has ended. A stop that nobody asked for (of
-        the watchdog) and that failed is among them until a stop succeeds: there is no other answer to it.
-        """
         self._name, self._clock, self._beat = name, clock, beat
         self._next_beat_s = 0.0
         self._told_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
@@ -137,20 +147,20 @@ class Tasks:
         self._queue: list[Task] = []
         self._pending_stops: list[_PendingStop] = []
 
-    # ---- for every thread -------------------------------------------------------------------------
+    # ---- thread-safe methods -------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Begin to decide."""
+        """Start the threads."""
         self._stop_thread.start()
         self._dispatcher.start()
 
     def call_soon(self, what: Callable[[], object]) -> None:
-        """Let the deciding thread do something next."""
+        """Run a callback in the deciding thread."""
         self._dispatcher.post(what)
 
     @property
     def backlog(self) -> int:
-        """How many things the deciding thread has still to do."""
+        """Number of callbacks that the deciding thread has not run."""
         return self._dispatcher.backlog
 
     @property
@@ -160,15 +170,15 @@ class Tasks:
 
     @property
     def epoch(self) -> int:
-        """Number of stops so far. A command that was received in an earlier epoch is not run."""
+        """Number of stops so far. A command received in an earlier epoch is not run."""
         return self._epoch
 
     def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
-        """Stop the robot at once and end everything. Thread-safe; waits for nothing.
+        """Stop the robot at once and end all tasks. Thread-safe; does not block.
 
         `answer` is called in the deciding thread when the robot stands still and every function has ended.
-        What does not end within STOP_ANSWER_S is named in the answers, and nothing is accepted until it has.
-        Begins a new `epoch`.
+        Functions that don't end within STOP_ANSWER_S are named in the answer, and no task is accepted until
+        they have. Starts a new `epoch`.
         """
         with self._lock:
             self._epoch += 1
@@ -186,7 +196,7 @@ class Tasks:
             self._stop_thread.wake()
 
     def close(self) -> None:
-        """Stop the robot, end everything and join the threads; a function that never ends is left behind."""
+        """Stop the robot, end all tasks and join the threads; a function that never ends is abandoned."""
         stopped = threading.Event()
 
         def take(answer: Answer) -> None:
@@ -198,10 +208,10 @@ class Tasks:
         self._stop_thread.close()
         self._dispatcher.close()
 
-    # ---- what is asked ----------------------------------------------------------------------------
+    # ---- requests ----------------------------------------------------------------------------
 
     def submit(self, task: Task) -> None:
-        """Run a task as soon as what it uses is free; refuse it, or end others, by its busy policy."""
+        """Run a task as soon as its resources are free; reject it, or end others, by its busy policy."""
         if task.epoch is not None and task.epoch < self._epoch:
             self._tell(task.finish, _stopped_before())
             return
@@ -244,7 +254,7 @@ class Tasks:
         self._start_ready()
 
     def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
-        """End the tasks that are wanted; None when there was one, else a sentence."""
+        """End the tasks that `wanted` selects; return None if there were any, else a sentence."""
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
             return NOTHING_RUNS
@@ -257,13 +267,12 @@ class Tasks:
         return None
 
     def sign_of_life(self, program: ProgramId, *, watch: bool) -> None:
-        """A program said something; `watch` begins to expect more (it asked the robot to act)."""
+        """Note a sign of life; `watch` starts to expect more (the program requested an action)."""
         self._watchdog.hear(program, self._clock.now(), watch=watch)
 
     # ---- the deciding thread ----------------------------------------------------------------------
 
     def _begin_stop(self, run: int, answer: Callable[[Answer], None] | None, why: str) -> None:
-        """End all tasks; the stop function is called in `run`."""
         limit = self._clock.now() + self._patience_s
         if answer is not None:
             self._pending_stops.append(_PendingStop(run, limit, answer))
@@ -277,15 +286,13 @@ class Tasks:
             elif task.due_s is not None:
                 task.due_s = min(task.due_s, limit)
             task.stopped = True
-        if run <= self._ended_run:  # another stop came at the same time and its run has ended
+        if run <= self._ended_run:  # a concurrent stop's run has already ended
             self._stop_ended(self._ended_run, self._ended_error)
 
     def _restarted(self) -> None:
-        """Stop the robot: the deciding loop ended by an exception, and nobody knows what it left undone."""
         self.stop(self._take_unasked, _("its driver had an internal error"))
 
     def _tell(self, answer: Callable[[Answer], None], told: Answer) -> None:
-        """Give an answer; one that can't be given keeps nothing else from being done."""
         self._dispatcher.call(partial(answer, told))
 
     def _next_due(self) -> float | None:
@@ -302,7 +309,6 @@ class Tasks:
 
     @property
     def _is_stopping(self) -> bool:
-        """Whether the stop function runs, or its end is not known yet."""
         return self._stop_thread.requested > self._ended_run
 
     @property
@@ -310,26 +316,22 @@ class Tasks:
         return self._is_busy or self._not_stopped is not None
 
     def _refusal(self) -> str | None:
-        """Why nothing is accepted now; None when it is."""
         stopped = [task for task in self._running if task.stopped]
         if self._stop_is_late or any(task.answered for task in stopped):
             return still_moving(self._name, self._not_ended())
         return _("{robot} is stopping").format(robot=self._name) if self._is_stopping or stopped else None
 
     def _not_ended(self) -> tuple[str, ...]:
-        """What goes on although it should have ended, and was answered so."""
         names = [task.action for task in self._running if task.answered]
         return tuple(names + [THE_STOP] * self._stop_is_late)
 
     def _still_moving(self) -> tuple[tuple[str, ...], str | None]:
-        """What a sign of life tells: what has not ended, and the sentence for it."""
         not_ended = self._not_ended()
         if not_ended:
             return not_ended, still_moving(self._name, not_ended)
         return ((THE_STOP,) if self._not_stopped is not None else ()), self._not_stopped
 
     def _tell_beat(self) -> None:
-        """Say in time that the robot lives, and at once when a function that would not end has ended."""
         if self._beat is None:
             return
         now = self._clock.now()
@@ -368,14 +370,13 @@ class Tasks:
             )
 
     def _take_unasked(self, answer: Answer) -> None:
-        """The answer to a stop that nobody asked for: a failure is logged, and told by each sign of life."""
         if answer.state == "failed":
-            if answer.error != self._not_stopped:  # the same again says nothing new
+            if answer.error != self._not_stopped:  # log repeated failures once
                 _log.error("%s", answer.error)
             self._not_stopped = answer.error
 
     def _end(self, task: Task, how: Answer) -> None:
-        """Ask for the end; of a function that goes on all the same it is said after a second."""
+        # A function that keeps running is reported after `_GRACE_S`.
         if task.ending is None:
             task.end(how)
             task.due_s = self._clock.now() + _GRACE_S
@@ -408,14 +409,14 @@ class Tasks:
             if not taken & set(task.uses):
                 self._queue.remove(task)
                 self._start(task)
-            taken |= set(task.uses)  # also for one that waits: nobody overtakes it
+            taken |= set(task.uses)  # waiting tasks keep their place in the queue
 
     def _start(self, task: Task) -> None:
         def report(values: Mapping[str, object]) -> None:
             self.call_soon(partial(self._progress, task, dict(values)))
 
         call = Call(task.action, self._clock, report)
-        with self._lock:  # either a stop in another thread finds the call, or the task finds the stop
+        with self._lock:  # either a concurrent stop sees the call, or the task sees the new epoch
             is_stopped = task.epoch is not None and task.epoch < self._epoch
             if not is_stopped:
                 task.call = call
@@ -430,7 +431,7 @@ class Tasks:
         task.thread = threading.Thread(target=self._work, args=(task, call), name=name, daemon=True)
         try:
             task.thread.start()
-        except (RuntimeError, MemoryError) as error:  # no room for a thread
+        except (RuntimeError, MemoryError) as error:  # out of threads
             task.thread = None
             self._ended(task, Answer("failed", error=self._broke_off(task, error)))
 
@@ -448,14 +449,14 @@ class Tasks:
 
     def _outcome(self, task: Task, call: Call) -> Answer:
         try:
-            if call.canceled:  # by a stop that came before this thread began
+            if call.canceled:  # by a stop before this thread started
                 raise Canceled
             output = task.run(call)
         except Canceled:
             return Answer("canceled")
         except Failed as failed:
             return Answer("failed", error=bounded_str(failed, ERROR_MOST))
-        except BaseException as error:  # noqa: BLE001 - also SystemExit: whatever it is, it is answered
+        except BaseException as error:  # noqa: BLE001 - also SystemExit: a task must always be answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
             return Answer("failed", error=self._broke_off(task, error))
         return Answer("succeeded", output=output if isinstance(output, Mapping) else {})
@@ -471,18 +472,18 @@ class Tasks:
         if done.state == "succeeded" and task.ending is None:
             self._watchdog.ends_well(task)
         if task.stopped and not self._is_stopping:
-            # It may have moved the robot after the stop: it is stopped once more, and only then stands still.
+            # It may have moved the robot after the stop, so the robot is stopped again.
             self._stop_is_late = task.answered
             run = self._stop_thread.reserve()
             self._stop_thread.wake()
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
-        # A function that was told to end may return as if it had finished: what was asked counts.
+        # A function that was asked to end may return normally; the requested ending counts.
         self._tell(task.finish, done if task.ending is None or done.state == "failed" else task.ending)
         self._start_ready()
         self._settle()
 
     def _stop_run_ended(self, run: int, error: str | None) -> None:
-        """In the thread of the stop function."""
+        # Runs in the thread of the stop function.
         self._dispatcher.post_urgent(partial(self._stop_ended, run, error))
 
     def _stop_ended(self, run: int, error: str | None) -> None:
@@ -496,14 +497,14 @@ class Tasks:
         waiting = [pending for pending in self._pending_stops if pending.run <= run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
         if not waiting:
-            self._take_unasked(failed)  # who asked was answered already that it had not ended
+            self._take_unasked(failed)  # the requester already got the answer that it had not ended
         elif self._not_stopped is not None:
             self._not_stopped = error
         for pending in waiting:
             self._tell(pending.answer, failed)
 
     def _settle(self) -> None:
-        """Answer the stops whose run of the stop function has ended, once no task runs."""
+        # Answers the stops whose run of the stop function has ended, once no task runs.
         if self._running:
             return
         stopped = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
@@ -517,7 +518,7 @@ def _stopped_before() -> Answer:
 
 
 def still_moving(name: str, actions: Sequence[str]) -> str:
-    """The sentence about functions that go on although they were told to end."""
+    """Return the sentence about functions that keep running although they were asked to end."""
     why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
     told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
     return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))

@@ -1,4 +1,4 @@
-"""The virtual robot's room, body, camera and eyes: no messaging in here.
+"""Simulation of virtual robots: room, body, camera and object detection, without messaging.
 
-`app.robots.simulated` and `app.robots.turtle` are the drivers that put them on the network.
+`app.robots.simulated` and `app.robots.turtle` are the drivers that connect them to the network.
 """

@@ -1,4 +1,4 @@
-"""What the virtual robot senses, and how it does things: a movement begins, ends, or brakes at a cancel."""
+"""Sensors of the virtual Pepper, and its movements, which brake when their action is canceled."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from nep.i18n import _
 _HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
 _HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
 FEEDBACK_S = 0.2
-"""Seconds between two messages of feedback."""
+"""Interval between feedback messages in seconds."""
 
 Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
 
 
 def _touch(text: str, title: str, rize_value: int) -> EventSpec:
-    """A place is touched or let go; RIZE says both as ``touched``, with 1 or 0."""
     return event(
         text,
         title=title,
@@ -38,7 +37,6 @@ def _touch(text: str, title: str, rize_value: int) -> EventSpec:
 
 
 def _face(text: str, title: str, rize_word: str) -> EventSpec:
-    """A face comes into sight or goes; RIZE says both as ``human_detected``, with yes or no."""
     return event(
         text,
         title=title,
@@ -49,7 +47,7 @@ def _face(text: str, title: str, rize_word: str) -> EventSpec:
 
 
 class Senses:
-    """Its sensors and events; what fills them is :class:`~app.robots.virtual.simulation.Life`."""
+    """Sensors and events; :class:`~app.robots.virtual.simulation.Simulation` publishes them."""
 
     battery = battery_sensor()
     distance = distance_sensor(most_m=5)
@@ -86,7 +84,7 @@ class Senses:
 
 
 class Acting(Senses):
-    """The life of the virtual robot and the ways its actions use it."""
+    """Simulation of the virtual Pepper, and the helpers of its actions."""
 
     start_room: ClassVar[Room] = Room()
 
@@ -96,7 +94,7 @@ class Acting(Senses):
         self._life.start()
 
     def close(self) -> None:
-        """End its threads."""
+        """Stop its threads."""
         self._life.close()
 
     def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:

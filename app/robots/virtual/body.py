@@ -1,4 +1,4 @@
-"""The virtual robot's body in its room: what it is asked to do, stepped in time; no clock, no threads."""
+"""Body of the virtual Pepper in its room: movements stepped in time; no clock, no threads."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _SECONDS_PER_LETTER = 0.06
 _SHORTEST_SPEECH_S = 0.6
 _LONGEST_STEP_S = 0.02
 TOUCH_LEAST_S = 0.3
-"""A tap counts as long as this: a program that looks now and then must see it."""
+"""Minimum duration of a touch, so that programs that poll see a tap."""
 HEARD_FOR_S = 4.0
-"""So long the room shows what a person said to it."""
+"""Time for which the room shows what a person said."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
 
 
 @dataclass(frozen=True)
 class BodyEvent:
-    """Something that the body noticed: an event of the robot's description and its data."""
+    """Event of the robot's description with its data."""
 
     event: str
     data: dict[str, object]
@@ -38,7 +38,7 @@ class BodyEvent:
 
 @dataclass
 class Speech:
-    """Words being spoken; ``done`` when the last one is out."""
+    """Text being spoken; ``done`` after the last word."""
 
     text: str
     seconds: float
@@ -47,12 +47,12 @@ class Speech:
 
     @classmethod
     def of(cls, text: str, speed_percent: float = 100.0) -> Speech:
-        """As long as its letters take."""
+        """Return a speech whose duration depends on its length."""
         return cls(text, max(_SHORTEST_SPEECH_S, len(text) * _SECONDS_PER_LETTER) * 100.0 / speed_percent)
 
     @property
     def word(self) -> str:
-        """The word that is being spoken now."""
+        """Word being spoken now."""
         words = self.text.split()
         place = int(len(words) * min(0.999, self.spoken_s / self.seconds))
         return words[place] if words else ""
@@ -60,7 +60,7 @@ class Speech:
 
 @dataclass
 class Body:
-    """Where everything is now. The owner holds a lock around every call."""
+    """State of the body. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
     x: float = START[0]
@@ -79,32 +79,32 @@ class Body:
     emotion: str = "neutral"
     battery: float = 84.4
     touched: dict[str, float] = field(default_factory=dict)
-    """Where hands are now, and for how many seconds they have been there."""
+    """Touched places, and for how many seconds."""
     heard: str = ""
     listened_s: float = HEARD_FOR_S
-    """How long ago it heard that."""
+    """Seconds since it heard that."""
     volume: int = 60
     language: str = "en"
     held: bool = False
-    """Whether a person holds it up: its base does not move."""
+    """True while a person holds it up, so that its base doesn't move."""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _turning: bool = field(default=False, repr=False)
     sound: Sound | None = None
-    """What it plays now."""
+    """Sound being played."""
     _sounds: int = field(default=0, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
     _leaving: set[str] = field(default_factory=set, repr=False)
 
-    # ---- what it is asked to do -------------------------------------------------------------------
+    # ---- commands ---------------------------------------------------------------------------
 
     def walk(self, distance: float, speed: float) -> Motion:
-        """Start to walk straight, backwards when negative."""
+        """Start to drive straight, backwards if negative."""
         return self._start(Motion.walk(distance, speed), turning=False)
 
     def turn(self, angle_deg: float, speed_deg: float) -> Motion:
-        """Start to turn on the spot, to the left when positive."""
+        """Start to turn on the spot, to the left if positive."""
         return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
 
     def _start(self, motion: Motion, *, turning: bool) -> Motion:
@@ -114,13 +114,13 @@ class Body:
         return motion
 
     def say(self, text: str, speed_percent: float = 100.0) -> Speech:
-        """Start to speak; what was being said ends."""
+        """Start to speak; the current speech ends."""
         self.hush()
         self._speech = Speech.of(text, speed_percent)
         return self._speech
 
     def hush(self) -> None:
-        """Say and play nothing more."""
+        """Stop speaking and playing."""
         if self._speech is not None:
             self._speech.done = True
             self._speech = None
@@ -129,7 +129,7 @@ class Body:
             self.sound = None
 
     def play(self, title: str, notes: Notes) -> Sound:
-        """Start to play these tones; what was being said or played ends."""
+        """Start to play notes; the current speech or sound ends."""
         self.hush()
         self._sounds += 1
         self.sound = Sound(self._sounds, title, notes)
@@ -142,13 +142,13 @@ class Body:
         return made
 
     def stand(self) -> None:
-        """Let the arms hang and look straight ahead."""
+        """Lower the arms and look straight ahead."""
         for joint in (*self.arms.values(), *self.elbows.values(), self.head_yaw):
             joint.aim(0.0)
         self.head_pitch.aim(START_PITCH)
 
     def halt(self) -> None:
-        """Brake and be quiet: the base brakes in the next steps, all else holds at once."""
+        """Brake and be silent: the base brakes in the next steps, everything else holds at once."""
         if self._base is not None:
             self._base.halt()
         for wave in self._waves:
@@ -158,12 +158,12 @@ class Body:
         self.emotion = "neutral"
 
     def hold_joints(self) -> None:
-        """Keep head and arms where they are now."""
+        """Hold head and arms at their current angles."""
         for joint in self._joints():
             joint.hold()
 
     def reset(self, room: Room) -> None:
-        """Back to the start, in this room, with nothing going on."""
+        """Return to the start in this room and stop everything."""
         self.halt()
         if self._base is not None:
             self._base.block()
@@ -179,17 +179,17 @@ class Body:
 
     @property
     def joints_still(self) -> bool:
-        """True when head and arms have arrived."""
+        """True when head and arms have reached their targets."""
         return all(joint.arrived for joint in self._joints())
 
     @property
     def speech(self) -> str | None:
-        """The words in the bubble."""
+        """Text in the speech bubble."""
         return None if self._speech is None else self._speech.text
 
     @property
     def spoken(self) -> float:
-        """How much of its words it has said, from 0 to 1."""
+        """Spoken part of the text, 0 to 1."""
         return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.seconds)
 
     @property
@@ -199,19 +199,19 @@ class Body:
 
     @property
     def still(self) -> bool:
-        """True when nothing at all moves."""
+        """True when nothing moves."""
         return not self.rolling and not self._waves and self.joints_still
 
     @property
     def distance(self) -> float:
-        """From the rim of the base to what is ahead, at most 5 m."""
+        """Distance from the rim of the base to the next obstacle ahead, at most 5 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
 
-    # ---- what people do to it ---------------------------------------------------------------------
+    # ---- people's actions ------------------------------------------------------------------------
 
     def touch(self, place: str, *, down: bool) -> None:
-        """A hand on the head or on a hand, or away again; a tap lasts at least `TOUCH_LEAST_S`."""
+        """Start or end a touch; a tap lasts at least `TOUCH_LEAST_S`."""
         if down:
             self._leaving.discard(place)
             if place not in self.touched:
@@ -222,7 +222,7 @@ class Body:
             self._let_go()
 
     def _let_go(self) -> None:
-        """Hands that are leaving are away once their touch has lasted long enough."""
+        # Ends touches that have lasted long enough.
         for place in sorted(self._leaving):
             if self.touched[place] >= TOUCH_LEAST_S:
                 self._leaving.discard(place)
@@ -230,29 +230,29 @@ class Body:
                 self.happenings.append(BodyEvent("released", {"place": place}))
 
     def hold(self, *, held: bool) -> None:
-        """A person takes it up, or puts it down: what it was doing goes on there."""
+        """Pick it up or put it down; interrupted movements continue afterwards."""
         self.held = held
 
     def carry(self, x: float, y: float) -> None:
-        """A person puts it there, if nothing is in the way; at walls it stops."""
+        """Move it to a place if that is free; it stops at walls."""
         place = self.room.carried(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.place(*place)
 
     def place(self, x: float, y: float) -> None:
-        """It stands there from now on."""
+        """Set its position."""
         self.x, self.y = x, y
         self.room = self.room.pushed_ball(x, y, RADIUS)
 
     def hear(self, word: str) -> None:
-        """Somebody said something."""
+        """Note a word that a person said."""
         self.heard, self.listened_s = word, 0.0
         self.happenings.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
 
     def step(self, seconds: float) -> None:
-        """Let time pass, in small steps so that nothing is walked through."""
+        """Simulate time in small steps, so that it can't pass through objects."""
         while seconds > 1e-9:
             dt = min(seconds, _LONGEST_STEP_S)
             seconds -= dt
@@ -260,7 +260,7 @@ class Body:
 
     @property
     def just_heard(self) -> str:
-        """What it heard a moment ago; "" when that is longer ago."""
+        """Word heard recently, else ""."""
         return self.heard if self.listened_s < HEARD_FOR_S else ""
 
     def _step(self, dt: float) -> None:
@@ -306,5 +306,4 @@ class Body:
 
 
 def _wrapped(angle_deg: float) -> float:
-    """The same direction between -180 and 180."""
     return (angle_deg + 180.0) % 360.0 - 180.0

@@ -1,4 +1,4 @@
-"""The virtual robot's camera: the room as it is seen from its head, 320 x 240 pixels."""
+"""Camera of the virtual robot: rendering of the room from its head, 320 x 240 pixels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BOOKS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
 
 
 def lens_of(body: Body) -> Lens:
-    """Where the camera is now and where it looks."""
+    """Return the camera's current position and orientation."""
     yaw = body.theta_deg + body.head_yaw.angle
     x = body.x + EYE_FORWARD * math.cos(math.radians(yaw))
     y = body.y + EYE_FORWARD * math.sin(math.radians(yaw))
@@ -28,7 +28,7 @@ def lens_of(body: Body) -> Lens:
 
 
 class Camera:
-    """Paints pictures of one room; what never changes is painted once, here."""
+    """Renderer of one room; static parts are rendered once."""
 
     def __init__(self, room: Room) -> None:
         self._floor = scenery.floor(room)
@@ -41,7 +41,7 @@ class Camera:
         self._light = _vignette(320, 240)
 
     def picture(self, room: Room, lens: Lens) -> Picture:
-        """What the camera sees: uint8 (240, 320, 3), BGR."""
+        """Render the view: uint8 (240, 320, 3), BGR."""
         canvas = Canvas(lens)
         self._shell(canvas, room)
         self._shadows(canvas, room)
@@ -79,7 +79,6 @@ class Camera:
         canvas.put(self._marker(card.id), corner.tolist(), (across * 2 * half).tolist(), (0, 0, -2 * half))
 
     def _stand_marker(self, canvas: Canvas, card: Marker) -> None:
-        """A card on a thin post, turned to the camera."""
         _block(canvas, (card.x, card.y, 0.0), (0.03, 0.03, card.z), "#6b6f7a")
         self._card(canvas, card, looking_across(canvas.lens, card.x, card.y))
 
@@ -92,7 +91,6 @@ class Camera:
             canvas.put(self._shadow, (x - wide, y - deep, 0), (2 * wide, 0, 0), (0, 2 * deep, 0))
 
     def _stand(self, canvas: Canvas, one: Person | Other) -> None:
-        """The picture of a person or another robot, turned to the camera."""
         across = looking_across(canvas.lens, one.x, one.y)
         if isinstance(one, Person):
             picture, wide = self._person, one.height * scenery.FIGURE_WIDTH
@@ -105,7 +103,6 @@ class Camera:
         canvas.put(picture, corner.tolist(), (across * wide).tolist(), (0, 0, -one.height))
 
     def _roll(self, canvas: Canvas, ball: Ball) -> None:
-        """The ball's picture, square to the line of sight."""
         middle = np.array([ball.x, ball.y, ball.z])
         sight = middle - np.asarray(canvas.lens.place)
         sight /= np.linalg.norm(sight)
@@ -129,14 +126,12 @@ def _things(room: Room) -> list[_Upright]:
 
 
 def _faces(other: Other, lens: Lens) -> bool:
-    """Whether a robot looks towards the camera."""
     to_x, to_y = lens.place[0] - other.x, lens.place[1] - other.y
     theta = math.radians(other.theta_deg)
     return to_x * math.cos(theta) + to_y * math.sin(theta) > 0
 
 
 def _ahead(thing: _Upright, lens: Lens) -> bool:
-    """False when all of a thing is behind the camera."""
     half = math.hypot(thing.width, thing.depth) / 2 if isinstance(thing, Box) else 0.5
     forward = lens.rotation[2]
     flat = math.hypot(float(forward[0]), float(forward[1]))
@@ -149,7 +144,7 @@ def _away(thing: _Upright, lens: Lens) -> float:
 
 
 def looking_across(lens: Lens, x: float, y: float) -> Matrix:
-    """The level direction to the right, square to the line from the camera to a place."""
+    """Return the horizontal unit vector to the right, perpendicular to the camera's line to a place."""
     dx, dy = x - lens.place[0], y - lens.place[1]
     length = math.hypot(dx, dy) or 1.0
     return np.array([dy / length, -dx / length, 0.0])
@@ -221,7 +216,6 @@ def _upright(
 def _block(
     canvas: Canvas, foot: tuple[float, float, float], size: tuple[float, float, float], colour: str
 ) -> None:
-    """A box on (x, y, z) with the sides that the camera sees, each in its own shade."""
     (x, y, z), (wide, deep, high) = foot, size
     eye = canvas.lens.place
     x0, x1, y0, y1, z1 = x - wide / 2, x + wide / 2, y - deep / 2, y + deep / 2, z + high
@@ -239,7 +233,6 @@ def _block(
 
 
 def _vignette(width: int, height: int) -> Picture:
-    """How much light each pixel gets: less in the corners, as with a real lens."""
     y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     light = 255 * (1.0 - 0.2 * np.clip(np.hypot(x, y) - 0.35, 0, None))
     return np.repeat(light[:, :, None], 3, axis=2).astype(np.uint8)

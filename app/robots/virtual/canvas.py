@@ -1,4 +1,4 @@
-"""Painting pictures on parallelograms in the room, as the camera sees them, with OpenCV."""
+"""Drawing of textures on parallelograms in the room, in the camera's perspective, with OpenCV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SHIFT = 4  # fractional bits of polygon corners
 
 
 class Texture:
-    """A picture (height, width, 3 or 4: BGR and alpha, not multiplied in), with smaller copies of itself."""
+    """Image (height, width, 3 or 4: BGR and straight alpha) with mipmap levels."""
 
     def __init__(self, picture: Picture) -> None:
         self.has_alpha = picture.shape[2] == 4
@@ -29,7 +29,7 @@ class Texture:
             self.levels.append(picture)
 
     def level_for(self, shrink: float) -> Picture:
-        """The copy to sample when `shrink` texels of the full picture fall on one pixel."""
+        """Return the level to sample when `shrink` texels of the full image cover one pixel."""
         level = round(np.log2(max(1.0, shrink)))
         return self.levels[min(int(level), len(self.levels) - 1)]
 
@@ -41,14 +41,14 @@ def _multiplied(picture: Picture) -> Picture:
 
 
 class Canvas:
-    """One picture in the making, painted from far to near."""
+    """Image being rendered with the painter's algorithm, from far to near."""
 
     def __init__(self, lens: Lens) -> None:
         self.lens = lens
         self.picture: Picture = np.zeros((lens.height, lens.width, 3), dtype=np.uint8)
 
     def fill(self, points: Matrix, colour: tuple[int, int, int]) -> None:
-        """A polygon of the room in one colour."""
+        """Draw a polygon of the room in one colour."""
         outline = self.lens.outline(points)
         if len(outline) >= 3:
             cv2.fillConvexPoly(self.picture, _fixed(outline), colour, cv2.LINE_AA, _SHIFT)
@@ -56,7 +56,7 @@ class Canvas:
     def put(
         self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
     ) -> None:
-        """A texture on a parallelogram: `corner` is its upper left one, the others its sides, in metres."""
+        """Draw a texture on a parallelogram: its upper left `corner` and its sides in metres."""
         start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
         box = self._box(outline)
@@ -83,7 +83,6 @@ class Canvas:
             cv2.copyTo(warped, mask, target)
 
     def _box(self, outline: Matrix) -> tuple[int, int, int, int] | None:
-        """The part of the picture that an outline can touch."""
         if len(outline) < 3:
             return None
         low, high = np.floor(outline.min(axis=0)), np.ceil(outline.max(axis=0)) + 1
@@ -93,13 +92,12 @@ class Canvas:
 
 
 def _blend(target: Picture, over: Picture) -> None:
-    """Lay a picture with multiplied alpha over the target, in place."""
     through = cv2.merge([255 - over[:, :, 3]] * 3)
     under = cv2.multiply(target, through, scale=1 / 255)
     cv2.add(under, over[:, :, :3], dst=target)
 
 
 def _fixed(outline: Matrix) -> NDArray[np.int32]:
-    # Far outside is cut: OpenCV counts in 16.16 bits, and the near plane keeps real corners below this.
+    # Clip: OpenCV uses 16.16 fixed point; the near plane keeps visible corners below this.
     limited = np.clip(outline, -32000.0, 32000.0)
     return np.round(limited * (1 << _SHIFT)).astype(np.int32)

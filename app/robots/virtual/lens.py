@@ -1,4 +1,4 @@
-"""The pinhole of the virtual camera: points in the room to pixels in the picture."""
+"""Pinhole model of the virtual camera: points in the room to pixels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NEAR = 0.06
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera at `place` (m) that looks along `yaw_deg` (left positive) and `pitch_deg` (down positive)."""
+    """Camera at `place` (m), oriented by `yaw_deg` (left positive) and `pitch_deg` (down positive)."""
 
     place: tuple[float, float, float]
     yaw_deg: float
@@ -27,36 +27,36 @@ class Lens:
 
     @cached_property
     def focal(self) -> float:
-        """Pixels per unit of x/z."""
+        """Focal length in pixels."""
         return self.width / 2 / math.tan(math.radians(self.hfov_deg / 2))
 
     @cached_property
     def rotation(self) -> Matrix:
-        """Rows right, down, forward: room directions to camera directions."""
+        """Rotation from room to camera coordinates; rows: right, down, forward."""
         yaw, up = math.radians(self.yaw_deg), math.radians(-self.pitch_deg)
         forward = np.array([math.cos(yaw) * math.cos(up), math.sin(yaw) * math.cos(up), math.sin(up)])
         right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
         return np.stack([right, np.cross(forward, right), forward])
 
     def to_camera(self, points: Matrix) -> Matrix:
-        """Points (n, 3) of the room seen from the camera: right, down, forward in metres."""
+        """Transform points (n, 3) of the room to camera coordinates: right, down, forward in metres."""
         seen: Matrix = (points - np.asarray(self.place)) @ self.rotation.T
         return seen
 
     def to_pixels(self, seen: Matrix) -> Matrix:
-        """Camera points (n, 3), all in front of it, to pixels (n, 2)."""
+        """Project camera points (n, 3) in front of the camera to pixels (n, 2)."""
         scale = self.focal / seen[:, 2]
         return np.stack([seen[:, 0] * scale + self.width / 2, seen[:, 1] * scale + self.height / 2], axis=1)
 
     def outline(self, points: Matrix) -> Matrix:
-        """The pixels (n, 2) of a flat polygon's part in front of the camera; n is 0 when it is behind."""
+        """Return the pixels (n, 2) of a flat polygon's part in front of the camera; empty if it is behind."""
         clipped = _clipped(self.to_camera(points))
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
 
     def texture_to_pixels(
         self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
     ) -> Matrix:
-        """The homography from a texture (width, height) on a parallelogram in the room to the picture."""
+        """Return the homography from a texture (width, height) on a parallelogram in the room to pixels."""
         columns = [across / size[0], along / size[1], corner - np.asarray(self.place)]
         seen = self.rotation @ np.stack(columns, axis=1)
         half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
@@ -65,7 +65,6 @@ class Lens:
 
 
 def _clipped(seen: Matrix) -> Matrix:
-    """The part of a polygon in front of the camera."""
     if seen[:, 2].min() >= NEAR:
         return seen
     if seen[:, 2].max() < NEAR:

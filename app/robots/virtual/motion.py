@@ -1,6 +1,6 @@
-"""Movements of the virtual body, each a small machine that is stepped in time.
+"""Movements of the virtual body as state machines stepped in time; no clock, no threads.
 
-A movement is asked for, then stepped until ``done``; ``halt`` lets it brake to a stand. No clock, no threads.
+A movement is stepped until ``done``; ``halt`` makes it brake.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ TURN_BRAKING = 4000.0
 
 @dataclass
 class Motion:
-    """Moves by `amount` (m or °, either sign) at most at `speed`, gently at both ends.
+    """Movement by `amount` (m or °, signed) with limited speed and acceleration.
 
-    ``moved`` is how far it came; ``blocked`` tells that something stood in the way.
+    ``moved`` is the progress; ``blocked`` is True if an obstacle ended it.
     """
 
     amount: float
@@ -33,17 +33,17 @@ class Motion:
 
     @classmethod
     def walk(cls, distance: float, speed: float) -> Motion:
-        """Straight ahead, metres and m/s."""
+        """Return a straight movement (m, m/s)."""
         return cls(distance, speed, WALK_ACCELERATION, WALK_BRAKING)
 
     @classmethod
     def turn(cls, angle_deg: float, speed_deg: float) -> Motion:
-        """On the spot, degrees and °/s, to the left when positive."""
+        """Return a turn on the spot (°, °/s), to the left if positive."""
         return cls(angle_deg, speed_deg, TURN_ACCELERATION, TURN_BRAKING)
 
     @property
     def remaining(self) -> float:
-        """What is still to go, with its sign."""
+        """Signed remaining amount."""
         return self.amount - self.moved
 
     def halt(self) -> None:
@@ -52,18 +52,18 @@ class Motion:
         self.done = self.done or self._velocity == 0.0
 
     def block(self) -> None:
-        """End here: something is in the way."""
+        """End at once because of an obstacle."""
         self.blocked = True
         self.done = True
         self._velocity = 0.0
 
     def hold(self) -> bool:
-        """Stand still now and go on later; False when it is to end, which it may."""
+        """Pause at once; return False if it is ending and may not be paused."""
         self._velocity = 0.0
         return not self._halting
 
     def step(self, dt: float) -> float:
-        """The way made in the next `dt` seconds, with its sign."""
+        """Advance by `dt` seconds and return the signed distance made."""
         if self.done:
             return 0.0
         if self._halting:
@@ -73,7 +73,7 @@ class Motion:
             fast_enough_to_end = math.sqrt(2 * self.acceleration * abs(self.remaining))
             self._velocity = min(self.speed, self._velocity + self.acceleration * dt, fast_enough_to_end)
         way = math.copysign(min(self._velocity * dt, abs(self.remaining)), self.remaining)
-        # The last millimetres would take for ever: their speed goes to 0 with the way that is left.
+        # Snap to the target: the speed approaches 0 with the remaining distance.
         if abs(self.remaining - way) < 0.002 * max(1.0, abs(self.acceleration)):
             way = self.remaining if not self._halting else way
             self.done = True
@@ -85,7 +85,7 @@ class Motion:
 
 @dataclass
 class Joint:
-    """One angle that goes to its target with a limited speed (°/s) inside its limits (°)."""
+    """Angle that approaches its target with limited speed (°/s) within its limits (°)."""
 
     speed: float
     low: float
@@ -94,20 +94,20 @@ class Joint:
     target: float = 0.0
 
     def aim(self, target: float) -> None:
-        """Go there, or as far as the limit."""
+        """Set the target, clamped to the limits."""
         self.target = min(max(target, self.low), self.high)
 
     def hold(self) -> None:
-        """Stay where it is now."""
+        """Set the current angle as target."""
         self.target = self.angle
 
     @property
     def arrived(self) -> bool:
-        """True once it has come to its target."""
+        """True at the target."""
         return self.angle == self.target
 
     def step(self, dt: float) -> None:
-        """Go on for `dt` seconds."""
+        """Advance by `dt` seconds."""
         way = self.target - self.angle
         reach = self.speed * dt
         self.angle = self.target if abs(way) <= reach else self.angle + math.copysign(reach, way)
@@ -115,7 +115,7 @@ class Joint:
 
 @dataclass
 class Wave:
-    """One arm's greeting: up, three times to and fro with the elbow, and down again."""
+    """Greeting with one arm: up, three waves with the elbow, down."""
 
     arm: Joint
     elbow: Joint
@@ -125,7 +125,7 @@ class Wave:
     )
 
     def step(self) -> None:
-        """Aim at the next pose once both joints have arrived; joints are stepped by the body."""
+        """Aim at the next pose once both joints have arrived; the body steps the joints."""
         if self.done or not (self.arm.arrived and self.elbow.arrived):
             return
         if not self._poses:
@@ -136,7 +136,7 @@ class Wave:
         self.elbow.aim(elbow)
 
     def halt(self) -> None:
-        """Hold the arm where it is."""
+        """Hold the arm at its current angle."""
         self.arm.hold()
         self.elbow.hold()
         self.done = True

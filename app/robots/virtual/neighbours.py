@@ -1,4 +1,4 @@
-"""The other virtual robots in the room, as they tell where they are; and this one, as it tells them."""
+"""Positions of the virtual robots in the shared room."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from app.robots.driver.call import Clock
 from app.robots.virtual.room import Other
 
 GONE_AFTER_S = 1.5
-"""Who has not told for so long where it is has ended."""
+"""Silence after which a robot counts as gone."""
 CALM_S = 0.2
-"""Who stands still tells where it is as often as this."""
+"""Interval of a standing robot's position messages."""
 MOST = 12
 
 
 class Neighbours:
-    """Who else is in the room. The owner holds a lock around every call."""
+    """Other robots in the room. Not thread-safe: hold the owner's lock around every call."""
 
     def __init__(self, name: str, clock: Clock, began_ns: int | None = None) -> None:
-        """``name`` is this robot's; who began earlier keeps its place when two stand in one."""
         self._name, self._clock = name, clock
         self.began_ns = time.time_ns() if began_ns is None else began_ns
         self._seen: dict[str, tuple[Other, float, int]] = {}
@@ -28,7 +27,7 @@ class Neighbours:
         self._told_s = -math.inf
 
     def hear(self, message: Mapping[str, object]) -> None:
-        """A robot tells where it is; what is damaged, or this one's own, is left out."""
+        """Process a robot's position; ignore invalid messages and our own."""
         other = _parsed(message)
         if other is None or other.name == self._name:
             return
@@ -38,13 +37,13 @@ class Neighbours:
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
 
     def others(self) -> tuple[Other, ...]:
-        """Those who are there now."""
+        """Return the robots that are present now."""
         since = self._clock.now() - GONE_AFTER_S
         self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
     def makes_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
-        """Whether this robot stands where another one, that is not ``ignored``, stood before it came."""
+        """Return whether this robot stands where another one (not ``ignored``) stood before it came."""
         return any(
             other.name not in ignored
             and math.hypot(other.x - x, other.y - y) < other.radius + radius
@@ -53,7 +52,7 @@ class Neighbours:
         )
 
     def tell(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
-        """Tell the others where this one is: at once when that has changed, else now and then."""
+        """Publish this robot's position: at once if it changed, else at intervals."""
         now = self._clock.now()
         if me != self._told or now - self._told_s >= CALM_S:
             self._told, self._told_s = me, now

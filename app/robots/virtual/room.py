@@ -1,4 +1,4 @@
-"""The room of the virtual robot: walls, furniture, and the things that a person can move about.
+"""Room of the virtual robots: walls, furniture and movable things.
 
 Metres; x grows east, y north, z up; angles in degrees, 0 is east, counter-clockwise.
 """
@@ -18,7 +18,7 @@ WALLS: tuple[Wall, ...] = ("north", "south", "east", "west")
 
 @dataclass(frozen=True)
 class Opening:
-    """Something flat on a wall: ``at`` is the x or y of its centre, ``bottom`` its height over the floor."""
+    """Flat object on a wall: ``at`` is the x or y of its centre, ``bottom`` its height above the floor."""
 
     kind: str
     wall: Wall
@@ -30,7 +30,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class Box:
-    """A piece of furniture that stands square to the walls; it stops the robot and hides what is behind."""
+    """Furniture aligned with the walls; it blocks robots and hides what is behind it."""
 
     kind: str
     x: float
@@ -41,7 +41,7 @@ class Box:
     name: str = ""
 
     def distance_to(self, x: float, y: float) -> float:
-        """From a point on the floor to the nearest side; 0 inside."""
+        """Return the distance from a point on the floor to the nearest side; 0 inside."""
         dx = max(abs(x - self.x) - self.width / 2, 0.0)
         dy = max(abs(y - self.y) - self.depth / 2, 0.0)
         return math.hypot(dx, dy)
@@ -49,7 +49,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball on the floor."""
+    """Ball on the floor."""
 
     name: str
     x: float
@@ -59,13 +59,13 @@ class Ball:
 
     @property
     def z(self) -> float:
-        """The height of its centre."""
+        """Height of its centre."""
         return self.radius
 
 
 @dataclass(frozen=True)
 class Person:
-    """A person who stands there and looks at the robot."""
+    """Standing person who looks at the robot."""
 
     name: str
     x: float
@@ -75,25 +75,25 @@ class Person:
 
     @property
     def face_z(self) -> float:
-        """The height of the middle of the face."""
+        """Height of the face's centre."""
         return self.height - 0.5 * self.face_height
 
     @property
     def face_height(self) -> float:
-        """From chin to hair, in metres."""
+        """Distance from chin to hair in metres."""
         return 0.26
 
     @property
     def face_width(self) -> float:
-        """From ear to ear, in metres."""
+        """Distance from ear to ear in metres."""
         return 0.21
 
 
 @dataclass(frozen=True)
 class Marker:
-    """An ArUco card (dictionary 4x4, 50); ``size`` is the printed square, without its white rim.
+    """ArUco card (dictionary 4x4, 50); ``size`` is the printed square without its white border.
 
-    On a wall it faces a direction; one that stands in the room (None) is seen from everywhere.
+    On a wall it faces one direction; one that stands in the room (None) is visible from everywhere.
     """
 
     id: int
@@ -105,13 +105,13 @@ class Marker:
 
     @property
     def name(self) -> str:
-        """What the robot calls it."""
+        """Name for the robot."""
         return f"marker {self.id}"
 
 
 @dataclass(frozen=True)
 class Other:
-    """Another robot in the room, upright and round; it stops this one and is seen by it."""
+    """Another robot in the room: an upright cylinder that blocks this one and is visible to it."""
 
     name: str
     x: float
@@ -128,7 +128,7 @@ _Round: TypeAlias = Person | Other
 
 @dataclass(frozen=True)
 class Room:
-    """Everything around the robot at one moment."""
+    """Everything around the robot at one moment. Immutable."""
 
     x_min: float = -2.5
     x_max: float = 3.0
@@ -153,11 +153,14 @@ class Room:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """Everything that a person can move; each has a name of its own."""
+        """Movable things; their names are unique."""
         return (*self.balls, *self.people, *self.markers, *self.boxes)
 
     def thing(self, name: str) -> Thing | None:
-        """The thing of that name, or the first of that kind: ``ball 2``, ``ball``, ``person``, ``face``."""
+        """Return the thing of that name, or the first of that kind.
+
+        Names are such as ``ball 2``; kinds are ``ball``, ``person``, ``face`` and ``marker``.
+        """
         named = next((thing for thing in self.things if thing.name == name), None)
         kinds: dict[str, Sequence[Thing]] = {
             "ball": self.balls,
@@ -168,9 +171,9 @@ class Room:
         return named or next(iter(kinds.get(name, ())), None)
 
     def free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
-        """Is there place for something round on the floor? Balls do not count, they roll away.
+        """Return whether a disc on the floor is free of obstacles, except balls, which roll away.
 
-        Who stood at ``before`` and touched somebody there may go away from them, wherever both came from.
+        From a position ``before`` that overlaps an obstacle, moves away from it are allowed.
         """
         if not (
             self.x_min + radius <= x <= self.x_max - radius
@@ -191,7 +194,7 @@ class Room:
         )
 
     def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
-        """The free place nearest to a point; the point itself where there is none at all."""
+        """Return the free position nearest to a point, or the point itself if there is none."""
         x, y = self.inside(x, y, radius)
         for away in range(60):
             for turn in range(1 if away == 0 else 16):
@@ -204,7 +207,7 @@ class Room:
         return x, y
 
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
-        """From a point to the nearest wall, person, robot or piece of furniture in a direction."""
+        """Return the distance to the nearest wall, person, robot or furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
         rounds: tuple[_Round, ...] = (*self.people, *self.others)
         hits = [self._to_walls(x, y, dx, dy), *(_to_circle(x, y, dx, dy, each) for each in rounds)]
@@ -212,7 +215,7 @@ class Room:
         return min(hits)
 
     def hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
-        """True when a piece of furniture or a robot stands between two points."""
+        """Return whether furniture or a robot is between two points."""
         ex, ey, ez = eye
         dx, dy, dz = target[0] - ex, target[1] - ey, target[2] - ez
         length = math.hypot(dx, dy)
@@ -229,9 +232,9 @@ class Room:
         return False
 
     def moved(self, name: str, x: float, y: float) -> Room:
-        """The room with a thing elsewhere, kept inside the walls; the same when there is no such thing.
+        """Return the room with a thing moved, within the walls; unchanged if the thing doesn't exist.
 
-        A marker that comes near a wall hangs on it.
+        A marker near a wall is attached to it.
         """
         thing = self.thing(name)
         match thing:
@@ -252,7 +255,7 @@ class Room:
         return self
 
     def pushed_ball(self, x: float, y: float, radius: float) -> Room:
-        """The room after something round at (x, y) pushed balls out of its place."""
+        """Return the room after a disc at (x, y) pushed overlapping balls aside."""
         room = self
         for ball in self.balls:
             away_x, away_y = ball.x - x, ball.y - y
@@ -283,9 +286,9 @@ class Room:
     def carried(
         self, x: float, y: float, radius: float, at: tuple[float, float]
     ) -> tuple[float, float] | None:
-        """Where a body that stands ``at`` comes to when it is carried there; None when all ways are taken.
+        """Return where a body ``at`` a position ends up when it is carried to (x, y), or None if blocked.
 
-        At walls it stops; what is in the way lets it go along one side.
+        It stops at walls and slides along obstacles.
         """
         place = self.inside(x, y, radius)
         for to in (place, (place[0], at[1]), (at[0], place[1])):
@@ -294,7 +297,7 @@ class Room:
         return None
 
     def inside(self, x: float, y: float, half: float, deep: float | None = None) -> tuple[float, float]:
-        """The place nearest to a point where something so large (m to each side) is inside the walls."""
+        """Return the nearest position at which something of this half size is within the walls."""
         deep = half if deep is None else deep
         return (
             min(max(x, self.x_min + half), self.x_max - half),

@@ -1,8 +1,8 @@
-"""Where the things of the shared room are: a map that everybody changes and merges, the last writer wins.
+"""Replicated map of the shared room's things: a last-writer-wins register per thing.
 
-Each thing has the time (ns since 1970) of its last change. Who changes something publishes the whole map on
-`TOPIC`; who hears one takes over what is newer. So all have the same room, in whatever order messages come,
-and nobody owns it (ADR 0022).
+Each thing has the time (ns since 1970) of its last change. A participant that changes something publishes the
+whole map on `TOPIC`; receivers merge newer entries. So all converge to the same room in any message order,
+without an owner (ADR 0022).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FARTHEST = 100.0
 
 @dataclass(frozen=True, slots=True)
 class ThingPlace:
-    """One thing as the map has it: its kind, its place (m), whether it was taken away, and when (ns)."""
+    """Thing in the map: kind, position (m), whether it was removed, and the time of its change (ns)."""
 
     name: str
     kind: str
@@ -39,12 +39,12 @@ class ThingPlace:
 
     @property
     def order(self) -> tuple[int, bool, float, float]:
-        """Of two that say something of the same thing, the greater one is believed."""
+        """Merge key: the greater one of two entries for the same thing wins."""
         return self.changed_ns, self.gone, self.x, self.y
 
 
 def kind_of(thing: Thing) -> str:
-    """Its kind, as maps and drawings name it."""
+    """Return the kind of a thing, as in maps and drawings."""
     match thing:
         case Ball():
             return "ball"
@@ -57,28 +57,27 @@ def kind_of(thing: Thing) -> str:
 
 
 class RoomMap:
-    """The things of the room. The owner holds a lock around every call."""
+    """Things of the room. Not thread-safe: hold the owner's lock around every call."""
 
     def __init__(self, start: Room | None = None, clock_ns: Callable[[], int] = time.time_ns) -> None:
-        """The room is ``start`` until somebody changes it; ``clock_ns`` tells ns since 1970."""
         self.start = start if start is not None else Room()
         self._clock_ns = clock_ns
-        first_ns = 0 if self.start == Room() else clock_ns()  # another start than usual is a change, too
+        first_ns = 0 if self.start == Room() else clock_ns()  # a custom start counts as a change
         self._things = {
             thing.name: ThingPlace(thing.name, kind_of(thing), thing.x, thing.y, first_ns)
             for thing in self.start.things
         }
         self.revision = 0
 
-    # -- what a person or a robot changes ---------------------------------------------------------
+    # -- local changes ------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float) -> bool:
-        """A thing is elsewhere now, inside the walls; False when nothing has changed."""
+        """Move a thing within the walls; return whether anything changed."""
         moved = self.room().moved(name, x, y)
         return self.follow(moved)
 
     def follow(self, room: Room) -> bool:
-        """Take over the places of all things in a room; False when they are where they were."""
+        """Copy the positions of all things in a room; return whether anything changed."""
         changed = False
         for thing in room.things:
             known = self._things.get(thing.name)
@@ -88,7 +87,7 @@ class RoomMap:
         return changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Put one more thing of a kind there; its name, or None when there are enough of them."""
+        """Add a thing of a kind; return its name, or None if there are enough of them."""
         there = {each.name for each in self._things.values() if not each.gone}
         free = [name for name in _names(kind) if name not in there]
         if not free:
@@ -98,7 +97,7 @@ class RoomMap:
         return free[0]
 
     def remove(self, name: str) -> bool:
-        """Take a thing away; False when it is not there."""
+        """Remove a thing; return False if it doesn't exist."""
         known = self._things.get(name)
         if known is None or known.gone:
             return False
@@ -106,7 +105,7 @@ class RoomMap:
         return True
 
     def put_back(self) -> None:
-        """Everything is where it was at the start; what was added goes."""
+        """Restore the initial state; added things are removed."""
         first = {thing.name: thing for thing in self.start.things}
         for known in list(self._things.values()):
             thing = first.get(known.name)
@@ -121,10 +120,10 @@ class RoomMap:
         self._things[thing.name] = replace(thing, changed_ns=max(self._clock_ns(), newest))
         self.revision += 1
 
-    # -- what others say --------------------------------------------------------------------------
+    # -- replication ------------------------------------------------------------------------------
 
     def merge(self, message: Mapping[str, object]) -> bool:
-        """Take over what is newer in somebody's map; False when nothing is. What is damaged is left out."""
+        """Merge newer entries of another map; return whether any changed. Invalid entries are ignored."""
         told = message.get("things")
         changed = False
         for thing in _parsed(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
@@ -138,13 +137,13 @@ class RoomMap:
         return changed
 
     def message(self) -> dict[str, object]:
-        """The whole map, as it is published and kept."""
+        """Return the whole map as published and saved."""
         return {"things": [asdict(thing) for thing in self._things.values()]}
 
-    # -- what it means ----------------------------------------------------------------------------
+    # -- conversion --------------------------------------------------------------------------------
 
     def room(self) -> Room:
-        """The room with every thing in its place."""
+        """Return the room with every thing in its place."""
         balls, people, markers, boxes = [], [], [], []
         for made in filter(None, map(self._made, self._things.values())):
             match made:
@@ -196,7 +195,6 @@ def _number(name: str) -> int:
 
 
 def _names(kind: str) -> Sequence[str]:
-    """The names that things of a kind have, in the order in which they are given."""
     if kind == "person":
         return PEOPLE
     if kind == "marker":

@@ -1,4 +1,4 @@
-"""What the room looks like: its walls, floor, furniture and people as pictures, painted once at the start."""
+"""Textures of the room: walls, floor, furniture and people, rendered once at start."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from app.robots.virtual.room import Opening, Room, Wall
 PER_M = 110  # pixels of a wall's picture per metre
 Colour = tuple[int, int, int]
 
-_FINE = 2  # painted this much larger, then reduced: smooth edges
-FIGURE = (340, 720)  # width, height of the person's picture; the head's top is its upper edge
-FACE_ROWS = (0.0, 0.21)  # the face in parts of the figure's height, hair to chin
+_FINE = 2  # supersampling factor
+FIGURE = (340, 720)  # width, height of the person's image; the head touches its upper edge
+FACE_ROWS = (0.0, 0.21)  # face from hair to chin, as parts of the figure's height
 FIGURE_WIDTH = FIGURE[0] / FIGURE[1]  # of its height
 
 
 def bgr(colour: str) -> Colour:
-    """The colour "#rrggbb" in OpenCV's order."""
+    """Convert "#rrggbb" to OpenCV's order."""
     return int(colour[5:7], 16), int(colour[3:5], 16), int(colour[1:3], 16)
 
 
 def gradient(height: int, width: int, top: str, bottom: str) -> Picture:
-    """A picture that fades from one colour to another, downwards."""
+    """Return an image with a vertical gradient."""
     part = np.linspace(0.0, 1.0, height)[:, None, None]
     rows = np.array(bgr(top)) * (1 - part) + np.array(bgr(bottom)) * part
     return np.repeat(rows, width, axis=1).astype(np.uint8)
@@ -40,7 +40,7 @@ def _rect(picture: Picture, left: float, top: float, right: float, bottom: float
 
 
 def wall(room: Room, side: Wall) -> Texture:
-    """One wall with its openings, seen from inside: its left end is the left edge."""
+    """Return a wall with its openings, seen from inside: its left end is the left edge."""
     length = room.y_max - room.y_min if side in {"east", "west"} else room.x_max - room.x_min
     width, height = round(length * PER_M), round(room.height * PER_M)
     picture = gradient(height, width, "#b9bdc0", "#d5d6d4")
@@ -56,7 +56,7 @@ def wall(room: Room, side: Wall) -> Texture:
 
 
 def _open(picture: Picture, room: Room, opening: Opening) -> None:
-    # Seen from inside, north and west walls grow to the right with x and y, the others run the other way.
+    # Seen from inside, x and y grow to the right on north and west walls, to the left on the others.
     along = {
         "east": room.y_max - opening.at,
         "west": opening.at - room.y_min,
@@ -131,7 +131,7 @@ def _painting(picture: Picture, left: float, top: float, right: float, bottom: f
 
 
 def floor(room: Room) -> Texture:
-    """Wooden boards that run east, darker towards the walls."""
+    """Return wooden boards along the x axis, darker near the walls."""
     width, depth = round((room.x_max - room.x_min) * PER_M), round((room.y_max - room.y_min) * PER_M)
     shades = np.random.default_rng(5)  # always the same boards
     picture = np.zeros((depth, width, 3), dtype=np.uint8)
@@ -153,12 +153,12 @@ def floor(room: Room) -> Texture:
 
 
 def ceiling() -> Texture:
-    """Plain and bright."""
+    """Return a plain bright texture."""
     return Texture(gradient(64, 64, "#dfe1e1", "#d3d5d5"))
 
 
 def shadow() -> Texture:
-    """A soft round shadow for the floor."""
+    """Return a soft round shadow for the floor."""
     y, x = np.mgrid[-1:1:64j, -1:1:64j]
     alpha = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 1.2 * 150
     picture = np.zeros((64, 64, 4), dtype=np.uint8)
@@ -168,7 +168,7 @@ def shadow() -> Texture:
 
 
 def marker(number: int) -> Texture:
-    """An ArUco card: the printed square and a white rim of one module each."""
+    """Return an ArUco card: the printed square and a white border of one module."""
     square = cv2.aruco.generateImageMarker(
         cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), number, 6 * 24
     )
@@ -181,7 +181,7 @@ MARKER_RIM = 8 / 6  # the card is this much wider than its printed square
 
 
 class _Paint:
-    """Shapes on a clear picture, in parts of the figure's width and height."""
+    """Drawing of shapes on a transparent image, in parts of the figure's width and height."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width * _FINE, height * _FINE
@@ -198,7 +198,6 @@ class _Paint:
         colour: str,
         part: tuple[int, int] = (0, 360),
     ) -> None:
-        """An ellipse or the part of it between two angles; `size` is its two radii."""
         radii = (round(size[0] * self.width), round(size[1] * self.height))
         for target, value in ((self.colour, bgr(colour)), (self.alpha, (255,))):
             cv2.ellipse(target, self._point(*middle), radii, 0, *part, value, cv2.FILLED, cv2.LINE_AA)
@@ -206,7 +205,6 @@ class _Paint:
     def arc(
         self, middle: tuple[float, float], radii: tuple[float, float], colour: str, part: tuple[int, int]
     ) -> None:
-        """A curved line between two angles of an ellipse."""
         thick = round(0.014 * self.width)
         across, down = round(radii[0] * self.width), round(radii[1] * self.height)
         cv2.ellipse(
@@ -214,20 +212,18 @@ class _Paint:
         )
 
     def shape(self, points: list[tuple[float, float]], colour: str) -> None:
-        """A filled polygon."""
         corners = np.array([self._point(x, y) for x, y in points], dtype=np.int32)
         for target, value in ((self.colour, bgr(colour)), (self.alpha, (255,))):
             cv2.fillPoly(target, [corners], value, cv2.LINE_AA)
 
     def done(self) -> Picture:
-        """The picture in its final size, with alpha."""
         both = np.dstack([self.colour, self.alpha])
         size = (self.width // _FINE, self.height // _FINE)
         return np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def person() -> Texture:
-    """A friendly person from head to feet."""
+    """Return a friendly person from head to feet."""
     paint = _Paint(*FIGURE)
     for x in (0.40, 0.60):  # legs and shoes
         paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
@@ -268,7 +264,7 @@ def _head(paint: _Paint) -> None:
 
 
 def robot(small: bool, *, faces: bool) -> Texture:
-    """Another robot: the large white one or the small green one on wheels, from its front or its back."""
+    """Return another robot, the large white or the small green one, from the front or back."""
     paint = _Paint(*(FIGURE if not small else (400, 300)))
     (_small_robot if small else _large_robot)(paint, faces=faces)
     return Texture(paint.done())
@@ -310,7 +306,7 @@ def _small_robot(paint: _Paint, *, faces: bool) -> None:
 
 
 def ball(colour: str) -> Texture:
-    """A shining ball; its edge is the picture's."""
+    """Return a shiny ball that fills the image."""
     side = 128
     y, x = np.mgrid[-1:1:128j, -1:1:128j]
     radius = np.hypot(x, y)

@@ -1,4 +1,4 @@
-"""One virtual robot's part in the room that all of them share: what it hears of it, and what it tells."""
+"""Participation of one virtual robot in the shared room."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.robots.virtual.room import Other, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap
 
 ARRIVES_S = 3.0
-"""So long after its start a robot steps aside for one that stood there before."""
+"""Time after its start in which a robot makes way for one that stood there before."""
 
 
 class InRoom(Protocol):
-    """What is needed of a body in the room."""
+    """Body in the room, as needed here."""
 
     room: Room
     x: float
@@ -26,22 +26,21 @@ class InRoom(Protocol):
 
     @property
     def still(self) -> bool:
-        """Whether nothing moves."""
+        """True if nothing moves."""
 
     def place(self, x: float, y: float) -> None:
-        """Stand there from now on."""
+        """Set the position."""
 
     def reset(self, room: Room) -> None:
-        """Back to the start, in this room, with nothing going on."""
+        """Return to the start in this room and stop everything."""
 
 
 class SharedRoom:
-    """Keeps a body's room as everybody has it; ``lock`` guards the body, and is held where it says so."""
+    """Synchronization of a body's room with the other robots; ``lock`` guards the body."""
 
     def __init__(
         self, link: Link, clock: Clock, body: InRoom, lock: AbstractContextManager[object], like: Other
     ) -> None:
-        """``like`` is the robot as others see it; where it stands is asked of the body."""
         self._body, self._lock, self._like, self._clock = body, lock, replace(like, name=link.name), clock
         self._map = RoomMap(body.room)
         self._neighbours = Neighbours(link.name, clock)
@@ -61,10 +60,10 @@ class SharedRoom:
         with self._lock:
             self._neighbours.hear(message)
 
-    # -- the lock is held ---------------------------------------------------------------------------
+    # -- call with the lock held ------------------------------------------------------------------------
 
     def take_over(self) -> None:
-        """Let the body have the room as it is now, and who else is in it."""
+        """Update the body's room and the other robots in it."""
         body, others = self._body, self._neighbours.others()
         if self._map.revision != self._revision:
             self._revision = self._map.revision
@@ -78,41 +77,41 @@ class SharedRoom:
                 self._start = body.x, body.y
 
     def follow(self) -> None:
-        """What the body pushed away is elsewhere for everybody."""
+        """Publish the positions of things that the body has pushed."""
         if self._map.follow(self._body.room):
             self._revision, self._is_new = self._map.revision, True
 
     def move(self, name: str, x: float, y: float) -> None:
-        """A person moves a thing."""
+        """Move a thing on behalf of a person."""
         self._is_new = self._map.move(name, x, y) or self._is_new
         self.take_over()
 
     def to_start(self, together: object) -> None:
-        """Let the body begin again where it stood when it came; the things of the room stay.
+        """Return the body to its start position; the things of the room stay.
 
-        ``together`` are the names of the robots that go back now: their places become free. Another robot
-        that stands there is avoided.
+        ``together`` are the names of the robots that return now: their positions become free. Other robots at
+        the start position are avoided.
         """
         self.take_over()
         names = together if isinstance(together, list) else []
         body, leaving = self._body, frozenset(name for name in names if isinstance(name, str))
-        self._went_back_with = leaving  # what is heard of them may still be where they stood before
+        self._went_back_with = leaving  # their reported positions may still be the old ones
         body.reset(body.room)
         staying = tuple(other for other in body.room.others if other.name not in leaving)
         room = replace(body.room, others=staying)
         body.place(*room.nearest_free(*self._start, self._like.radius))
 
     def put_back(self) -> Room:
-        """Everything is where it was at the start; the room then."""
+        """Restore the initial state of the room and return it."""
         self._map.put_back()
         self._is_new = True
         self.take_over()
         return self._body.room
 
-    # -- the lock is not held -----------------------------------------------------------------------
+    # -- call without the lock -------------------------------------------------------------------------
 
     def tell(self) -> None:
-        """Tell the others what is new; called with every step."""
+        """Publish changes; call after every step."""
         with self._lock:
             body = self._body
             me = replace(

@@ -1,4 +1,4 @@
-"""What keeps the virtual robot going: a thread that moves it and tells its state, and one that looks."""
+"""Simulation of the virtual Pepper: a thread for the body, and one for the camera."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from nep.text import bounded_str, quotable
 
 BODY_HZ = 30.0
 CAMERA_HZ = 15.0
-_LOOK_EVERY = 3  # pictures; people and balls do not come and go faster
+_LOOK_EVERY = 3  # images; people and balls don't change faster
 _SLOW_EVERY = 3  # steps between two values of pose and distance
-_CALM_EVERY = 30  # steps between two values of what hardly changes
-_LONGEST_STEP_S = 0.25  # after a suspended computer the world goes on from where it was
-_SMALL_STEP_S = 0.004  # while a stop waits for the body to stand still
+_CALM_EVERY = 30  # steps between two values of slowly changing sensors
+_LONGEST_STEP_S = 0.25  # after a suspend the simulation continues from where it was
+_SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _STOP_S = 2.0
 ITSELF = "robot"
-"""What a person moves who takes the robot itself."""
+"""Name of the robot itself in a move by a person."""
 PLACES = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class _View:
-    """What the camera sees of a room from one place: the same until one of both changes."""
+    """View of a room from one position; reused until one of both changes."""
 
     room: Room
     lens: Lens
@@ -47,7 +47,7 @@ class _View:
 
 
 class Simulation:
-    """Owns the body, its lock and the two threads; `link` hears of everything."""
+    """Body with its lock and two threads; publishes on `link`."""
 
     def __init__(self, body: Body, link: Link, clock: Clock) -> None:
         self.body = body
@@ -68,19 +68,19 @@ class Simulation:
         ]
 
     def start(self) -> None:
-        """Begin to live."""
-        cv2.setNumThreads(1)  # small pictures: more threads cost more than they bring
+        """Start both threads."""
+        cv2.setNumThreads(1)  # more threads don't pay for small images
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """End both threads."""
+        """Stop both threads."""
         self._ended.set()
         for thread in self._threads:
             thread.join(_STOP_S)
 
     def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait, in small steps, until something is true of the body; False when it took too long."""
+        """Wait until a condition on the body is true; return False after the timeout."""
         limit = self._clock.now() + timeout_s
         with self.changed:
             while self._clock.now() < limit:
@@ -91,14 +91,14 @@ class Simulation:
         return False
 
     def _advance(self) -> None:
-        """Let the body come to the present; the lock is held."""
+        # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.take_over()
         self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
         self._shared.follow()
         self._stepped_s = now
 
-    # ---- moving -----------------------------------------------------------------------------------
+    # ---- body thread --------------------------------------------------------------------------------
 
     def _move(self) -> None:
         with self.changed:
@@ -113,7 +113,7 @@ class Simulation:
             self._shared.tell()
 
     def tell(self, happenings: list[BodyEvent], step: int) -> None:
-        """Publish what happened, the drawing, and the sensors whose turn it is."""
+        """Publish events, the drawing, and the sensors due at this step."""
         for happening in happenings:
             self._link.happen(happening.event, **happening.data)
             if happening.event in {"touched", "released"}:
@@ -132,18 +132,18 @@ class Simulation:
             self._link.sense("head_touched", "head" in self.body.touched)
             self._link.sense("heard_word", self.body.heard)
 
-    # ---- looking ----------------------------------------------------------------------------------
+    # ---- camera thread --------------------------------------------------------------------------------
 
     def _look(self) -> None:
         for count, _ in enumerate(self._beat(CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
             is_turn = count % _LOOK_EVERY == 0
-            # who watches sees boxes that belong to this very picture
+            # subscribers get boxes that belong to the same image
             if is_watched or is_turn:
                 self.look(publish=is_watched)
 
     def look(self, *, publish: bool) -> None:
-        """Take one picture, publish it when somebody watches, and what is recognised in it."""
+        """Take one image, detect objects, and publish both."""
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
@@ -161,7 +161,7 @@ class Simulation:
 
     def _painted(self, room: Room, lens: Lens) -> _View:
         picture = self._camera.picture(room, lens)
-        picture.flags.writeable = False  # it is published until something moves
+        picture.flags.writeable = False  # shared until something moves
         seen = {
             "faces": self._eyes.faces(room, lens),
             "balls": self._eyes.balls(picture),
@@ -181,13 +181,16 @@ class Simulation:
             gone, self._face = self._face, None
             self._link.happen("face_lost", name=gone)
 
-    # ---- time and people --------------------------------------------------------------------------
+    # ---- time and people's actions -----------------------------------------------------------------------
 
     def _beat(self, rate_hz: float) -> Beat:
         return Beat(self._clock, self._ended, 1 / rate_hz)
 
     def act(self, change: Mapping[str, object]) -> None:
-        """A person does something to the world: touch, move, say, reset; or a run begins: start."""
+        """Apply a person's change of the world.
+
+        Changes are touch, move, say, hold, reset, start, and the simulation of an event.
+        """
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite(change.get("x")), finite(change.get("y"))
         with self.changed:
@@ -210,7 +213,6 @@ class Simulation:
             self._let_happen(change)
 
     def _let_happen(self, change: Mapping[str, object]) -> None:
-        """A person lets an event happen as if the robot had noticed it."""
         event, given = told_event(change)
         data = {**self._made_up(event), **given}
         if not may_happen(self._link, event, data):
@@ -226,13 +228,12 @@ class Simulation:
         self._link.happen(event, **data)
 
     def _made_up(self, event: str) -> dict[str, object]:
-        """What belongs to an event that a person lets happen and does not say."""
         people = self.body.room.people
         return {"name": people[0].name if people else "Aiko"} if "face" in event else {}
 
 
 class Beat:
-    """Times of a steady beat, until an event is set; beats that are late are left out, not made up for."""
+    """Iterator over regular times until an event is set; late beats are skipped."""
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
@@ -250,12 +251,12 @@ class Beat:
 
 
 def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
-    """The event that a person lets happen, ``{"happen": "bumped", "side": "front"}``, and its data."""
+    """Return the event that a person simulates, ``{"happen": "bumped", "side": "front"}``, and its data."""
     return bounded_str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
 def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
-    """Whether an event that a person lets happen is as the description says; one that is not is logged."""
+    """Return whether a simulated event matches the description; log it if it doesn't."""
     wrong = link.wrong_in(event, data)
     if wrong:
         _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
@@ -263,7 +264,10 @@ def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
 
 
 def drawable(body: Body) -> dict[str, object]:
-    """Metres and degrees; head pitch positive is down, arms 0 hang and 180 point up."""
+    """Return the state for drawing, in metres and degrees.
+
+    Head pitch is positive down; arms hang at 0 and point up at 180.
+    """
     return {
         "x": round(body.x, 3),
         "y": round(body.y, 3),
@@ -289,7 +293,7 @@ def drawable(body: Body) -> dict[str, object]:
 
 
 def surroundings(room: Room) -> dict[str, object]:
-    """The room and what is in it."""
+    """Return the room and its things for drawing."""
     return {
         "objects": _objects(room),
         "room": {

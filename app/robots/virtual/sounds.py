@@ -1,4 +1,4 @@
-"""What a virtual robot plays: a sound that has a name, or a tone; stepped in time."""
+"""Sounds and tones of a virtual robot, stepped in time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Hertz (0 is silence) and seconds."""
+"""Frequency in hertz (0 is silence) and duration in seconds."""
 SoundName: TypeAlias = Literal["beep", "bell", "cheer", "buzzer", "whistle"]
 
 SOUNDS: Mapping[SoundName, Notes] = {
@@ -21,7 +21,7 @@ SOUNDS: Mapping[SoundName, Notes] = {
 
 @dataclass
 class Sound:
-    """Something that is being played; ``done`` when the last tone is out. ``number`` tells it from others."""
+    """Sound being played; ``done`` after the last note. ``number`` identifies it."""
 
     number: int
     title: str
@@ -31,16 +31,16 @@ class Sound:
 
     @property
     def seconds(self) -> float:
-        """How long all of it takes."""
+        """Total duration."""
         return sum(seconds for _hz, seconds in self.notes)
 
     def step(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance by `seconds`."""
         self.played_s += seconds
         self.done = self.done or self.played_s >= self.seconds
 
     def drawable(self) -> dict[str, object]:
-        """As Studio hears and shows it; ``played`` goes from 0 to 1."""
+        """Return the state for Studio; ``played`` goes from 0 to 1."""
         return {
             "number": self.number,
             "title": self.title,

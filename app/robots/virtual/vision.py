@@ -1,7 +1,7 @@
-"""What virtual robots recognise in their pictures: colours, the ball by its colour, markers, faces.
+"""Object detection of virtual robots: colours, red balls, markers, faces.
 
-The face is where the camera's geometry puts it, not searched for in the pixels: a cascade costs a third of a
-core. It counts only when most of it is in the picture and nothing stands before it.
+Faces are located by the camera's geometry instead of the pixels, because a cascade classifier costs a third
+of a core. A face counts only if most of it is in the image and nothing hides it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _LEAST_SATURATION, _LEAST_VALUE = 95, 60
 
 @dataclass(frozen=True)
 class Detection:
-    """Something recognised: its name, how sure (0 to 1), and its box x, y, width, height in pixels."""
+    """Detected object: name, confidence (0 to 1), and box x, y, width, height in pixels."""
 
     name: str
     confidence: float
@@ -41,13 +41,13 @@ class Detection:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """The middle of its box."""
+        """Centre of its box."""
         x, y, width, height = self.box
         return x + width / 2, y + height / 2
 
 
 def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
-    """Detections as they are published; ``name`` is that of the largest, or null."""
+    """Return detections as published; ``name`` is that of the largest, or null."""
     listed = sorted(found, key=lambda one: -one.box[2] * one.box[3])
     return {
         "count": len(listed),
@@ -61,14 +61,14 @@ def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
 
 
 class ObjectDetector:
-    """Looks at pictures; keeps only what OpenCV needs."""
+    """Detector of balls, markers and faces."""
 
     def __init__(self) -> None:
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         self._markers = cv2.aruco.ArucoDetector(dictionary)
 
     def balls(self, picture: Picture) -> list[Detection]:
-        """Round red things."""
+        """Return round red regions."""
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
         low, high = (
             cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)),
@@ -85,9 +85,9 @@ class ObjectDetector:
         return found
 
     def markers(self, picture: Picture) -> list[Detection]:
-        """ArUco cards of the dictionary 4x4, 50."""
+        """Return ArUco cards of the dictionary 4x4, 50."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
-        # OpenCV gives None for no markers, which its annotations do not know.
+        # OpenCV returns None for no markers, unlike its annotations say.
         numbers = [int(one) for one in np.asarray(ids).ravel()] if len(corners) else []
         return [
             Detection(f"marker {number}", 1.0, _box_of(outline[0]))
@@ -95,7 +95,7 @@ class ObjectDetector:
         ]
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
-        """People who look at the camera."""
+        """Return people who look at the camera."""
         found = [_face(room, person, lens) for person in room.people]
         return sorted((each for each in found if each is not None), key=lambda one: -one.box[2] * one.box[3])
 
@@ -129,7 +129,7 @@ def _box_of(points: ArrayLike) -> tuple[int, int, int, int]:
 
 
 def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
-    """How far the head must turn to have a pixel in the middle: degrees to the left, degrees down."""
+    """Return how far the head must turn to centre a pixel: degrees to the left, degrees down."""
     left = -np.degrees(np.arctan2(pixel[0] - lens.width / 2, lens.focal))
     down = np.degrees(np.arctan2(pixel[1] - lens.height / 2, lens.focal))
     return float(left), float(down)
@@ -137,7 +137,7 @@ def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ColourPatch:
-    """The largest patch of a colour: ``x`` from -1 (left) to 1, ``area`` as a share of the picture."""
+    """Largest region of a colour: ``x`` from -1 (left) to 1, ``area`` as a share of the image."""
 
     name: str
     x: float
@@ -145,7 +145,7 @@ class ColourPatch:
 
 
 def colours_in(picture: Picture) -> dict[str, ColourPatch]:
-    """The colours of a BGR picture that fill at least 0.4 % of it in one piece."""
+    """Return the colours of a BGR image that fill at least 0.4 % of it in one region."""
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
     found = {}

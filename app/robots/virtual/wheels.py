@@ -1,4 +1,4 @@
-"""The body of the virtual robot on two wheels: speeds, stepped in time; no clock, no threads."""
+"""Body of the virtual two-wheeled robot: speeds stepped in time; no clock, no threads."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LONGEST_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _ASIDE_DEG = 50.0
 PRESS_S = 0.3
-"""How long a bumper that a person pressed stays pressed."""
+"""Time for which a bumper pressed by a person stays pressed."""
 
 
 @dataclass
 class WheelBody:
-    """Where the robot is and how fast. The owner holds a lock around every call."""
+    """Position and speeds of the robot. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
     x: float = START[0]
@@ -38,55 +38,55 @@ class WheelBody:
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _wanted: tuple[float, float] = (0.0, 0.0)
     held: bool = False
-    """Whether a person holds it up: it does not move."""
+    """True while a person holds it up, so that it doesn't move."""
     driven: float = 0.0
-    """The metres that it has rolled, forwards and backwards."""
+    """Metres rolled, forwards and backwards."""
     _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Ask for a speed (m/s, forwards positive) and a turn (°/s, left positive); 0, 0 brakes."""
+        """Set the target speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
         self._wanted = (speed, turn_speed)
 
     @property
     def still(self) -> bool:
-        """True when nothing moves and nothing is asked for."""
+        """True when nothing moves and the target speeds are 0."""
         return self._wanted == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
     @property
     def distance(self) -> float:
-        """From its rim to what is ahead, at most 4 m."""
+        """Distance from its rim to the next obstacle ahead, at most 4 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(FULL_RANGE, max(0.0, ahead))
 
     def press(self, side: str) -> None:
-        """A hand presses its bumper: it stops as if it had run into something."""
+        """Press a bumper: it stops as after a collision."""
         self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)
         self.bumped, self._pressed_s = side, PRESS_S
         self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
-        """Back to the start, in this room."""
+        """Return to the start in this room."""
         self.room, self._wanted, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
         self.x, self.y = room.nearest_free(*START[:2], RADIUS)
         self.theta_deg, self.light, self.bumped, self.held = START[2], LIGHT, "", False
 
     def hold(self, *, held: bool) -> None:
-        """A person takes it up, or puts it down: what it was asked to do goes on there."""
+        """Pick it up or put it down; commanded speeds apply again afterwards."""
         self.held = held
 
     def carry(self, x: float, y: float) -> None:
-        """A person puts it there, if nothing is in the way; at walls it stops."""
+        """Move it to a place if that is free; it stops at walls."""
         place = self.room.carried(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.place(*place)
 
     def place(self, x: float, y: float) -> None:
-        """It stands there from now on."""
+        """Set its position."""
         self.x, self.y = x, y
         self.room = self.room.pushed_ball(x, y, RADIUS)
 
     def step(self, seconds: float) -> None:
-        """Let time pass, in small steps so that nothing is driven through."""
+        """Simulate time in small steps, so that it can't pass through objects."""
         while seconds > 1e-9:
             dt = min(seconds, _LONGEST_STEP_S)
             seconds -= dt
@@ -121,7 +121,6 @@ class WheelBody:
             self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def _side(self, way: float) -> str:
-        """Where it touches: at the left, at the right, in front or at the back."""
         if way < 0:
             return "back"
         touches = {
@@ -139,7 +138,7 @@ class WheelBody:
 
 
 def _towards(now: float, wanted: float, faster: float, slower: float) -> float:
-    """The speed after a moment: braking (also to turn round) is quicker than going faster."""
+    # Braking (also to reverse) uses the larger rate.
     brakes = abs(wanted) < abs(now) or now * wanted < 0
     change = slower if brakes else faster
     goal = 0.0 if now * wanted < 0 else wanted
