@@ -79,8 +79,8 @@ class VirtualPepper(Acting):
         language: Language = "en",
     ) -> Mapping[str, object]:
         """Say a text; the words stand in a bubble for as long as they take."""
-        with self._life.changed:
-            body = self._life.body
+        with self._simulation.changed:
+            body = self._simulation.body
             body.volume, body.language = volume, language
             speech = body.say(text)
         try:
@@ -88,9 +88,9 @@ class VirtualPepper(Acting):
             while not call.until(lambda: speech.done, for_s=FEEDBACK_S):
                 call.feedback(word=speech.word)
         except Canceled:
-            with self._life.changed:
+            with self._simulation.changed:
                 if not speech.done:
-                    self._life.body.hush()
+                    self._simulation.body.hush()
             raise
         return {"seconds": round(speech.seconds, 2)}
 
@@ -125,14 +125,14 @@ class VirtualPepper(Acting):
         self._play(call, f"{frequency:g} Hz", ((frequency, seconds),), volume)
 
     def _play(self, call: Call, title: str, notes: Notes, volume: int) -> None:
-        with self._life.changed:
-            body = self._life.body
+        with self._simulation.changed:
+            body = self._simulation.body
             body.volume = volume
             sound = body.play(title, notes)
 
         def end() -> None:
             if not sound.done:
-                self._life.body.hush()
+                self._simulation.body.hush()
 
         self._until(call, lambda: sound.done, end)
 
@@ -183,7 +183,7 @@ class VirtualPepper(Acting):
     @moves("look at %target", "eye", "looks at %target", "head", timeout_s=10, title="look at")
     def look_at(self, call: Call, target: Target = "face") -> None:
         """Turn the head to a side, or to the face or the ball that is in the picture."""
-        with self._life.changed:
+        with self._simulation.changed:
             yaw, pitch = self._direction_of(target)
         self._turn_head(call, yaw, pitch)
 
@@ -207,16 +207,16 @@ class VirtualPepper(Acting):
     @moves("wave %hand hand", "hand", "waves its %hand hand", "arms", timeout_s=20, rize="wave")
     def wave(self, call: Call, hand: Side = "right") -> None:
         """Greet with one hand."""
-        with self._life.changed:
-            wave = self._life.body.wave(hand)
+        with self._simulation.changed:
+            wave = self._simulation.body.wave(hand)
         self._until(call, lambda: wave.done, wave.halt)
 
     @moves("stand straight", "person-standing", "stands straight", "arms", "head", timeout_s=10)
     def stand(self, call: Call) -> None:
         """Let the arms hang and look ahead."""
-        with self._life.changed:
-            self._life.body.stand()
-        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
+        with self._simulation.changed:
+            self._simulation.body.stand()
+        self._until(call, lambda: self._simulation.body.joints_still, self._simulation.body.hold_joints)
 
     # ---- face and lights --------------------------------------------------------------------------
 
@@ -238,13 +238,13 @@ class VirtualPepper(Acting):
         seconds: Annotated[float, Range(0.5, 60, 0.5, "s")] = 2.0,
     ) -> None:
         """Make a face for a while."""
-        with self._life.changed:
-            self._life.body.emotion = emotion
+        with self._simulation.changed:
+            self._simulation.body.emotion = emotion
         try:
             call.wait(seconds)
         finally:
-            with self._life.changed:
-                self._life.body.emotion = "neutral"
+            with self._simulation.changed:
+                self._simulation.body.emotion = "neutral"
 
     @action(
         "light %where %colour",
@@ -263,20 +263,20 @@ class VirtualPepper(Acting):
         colour: Colour = "#35b0fa",
     ) -> None:
         """Give the lights a colour."""
-        with self._life.changed:
+        with self._simulation.changed:
             if where in {"eyes", "both"}:
-                self._life.body.eyes = colour
+                self._simulation.body.eyes = colour
             if where in {"shoulders", "both"}:
-                self._life.body.shoulders = colour
+                self._simulation.body.shoulders = colour
 
     # ---- stopping ---------------------------------------------------------------------------------
 
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
         """Brake, hold the joints, be quiet; returns when nothing moves any more."""
-        with self._life.changed:
-            self._life.body.halt()
-        if not self._life.wait_for(lambda: self._life.body.still, timeout_s=2.0):
+        with self._simulation.changed:
+            self._simulation.body.halt()
+        if not self._simulation.wait_for(lambda: self._simulation.body.still, timeout_s=2.0):
             raise Failed(_("the virtual robot keeps moving"))
 
 

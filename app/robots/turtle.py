@@ -25,11 +25,11 @@ from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 
 BODY_HZ, CAMERA_HZ = 60.0, 15.0
-_STATE_EVERY, _SLOW_EVERY, _CALM_EVERY = 2, 6, 60
-_LONGEST_STEP_S = 0.25
+_STATE_PERIOD_STEPS, _SLOW_PERIOD_STEPS, _BATTERY_PERIOD_STEPS = 2, 6, 60
+_MAX_STEP_S = 0.25
 _EYE_HEIGHT = 0.22
 _EYE_PITCH = -6.0
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 
 
 class VirtualWheels:
@@ -46,8 +46,8 @@ class VirtualWheels:
         self._shared = SharedRoom(link, clock, self.body, self._lock, like)
         self._stepped_s = clock.now()
         self._threads = [
-            threading.Thread(target=self._move, name=f"{link.name} wheels", daemon=True),
-            threading.Thread(target=self._look, name=f"{link.name} camera", daemon=True),
+            threading.Thread(target=self._run_body, name=f"{link.name} wheels", daemon=True),
+            threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
         ]
         link.on_world(self.act)
 
@@ -77,7 +77,7 @@ class VirtualWheels:
     def still(self) -> bool:
         """Return whether it stands still."""
         with self._lock:
-            self._advance()  # don't wait for the next step of the body thread
+            self._advance_locked()  # don't wait for the next step of the body thread
             return self.body.still
 
     def bumped(self) -> str:
@@ -94,36 +94,36 @@ class VirtualWheels:
         self._ended.set()
         for thread in self._threads:
             if thread.is_alive():
-                thread.join(_JOIN_S)
+                thread.join(_JOIN_TIMEOUT_S)
 
     # ---- threads ----------------------------------------------------------------------------------
 
-    def _move(self) -> None:
+    def _run_body(self) -> None:
         with self._lock:
             self._stepped_s = self._clock.now()
         for step, _ in enumerate(Beat(self._clock, self._ended, 1 / BODY_HZ)):
             with self._lock:
-                self._advance()
+                self._advance_locked()
                 happenings = list(self.body.happenings)
                 self.body.happenings.clear()
                 state, distance = self._drawable(), self.body.distance
             for happening in happenings:
                 self._link.happen(happening.event, **happening.data)
-            if step % _STATE_EVERY == 0:
+            if step % _STATE_PERIOD_STEPS == 0:
                 self._shared.tell()
                 self._link.tell("state", state)
                 self._link.sense("pose", {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]})
-            if step % _SLOW_EVERY == 0:
+            if step % _SLOW_PERIOD_STEPS == 0:
                 self._link.sense("distance", round(distance, 2))
                 self._link.sense("bumper", bool(state["bumped"]))
-            if step % _CALM_EVERY == 0:
+            if step % _BATTERY_PERIOD_STEPS == 0:
                 self._link.sense("battery", int(self.body.battery))
 
-    def _advance(self) -> None:
+    def _advance_locked(self) -> None:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.take_over()
-        self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
         self._shared.follow()
         self._stepped_s = now
 
@@ -142,7 +142,7 @@ class VirtualWheels:
             **surroundings(body.room),
         }
 
-    def _look(self) -> None:
+    def _run_camera(self) -> None:
         for count, _ in enumerate(Beat(self._clock, self._ended, 1 / CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
             if not is_watched and count % 3:
@@ -191,13 +191,13 @@ class VirtualTurtle(DiffDrive):
     def __init__(self, link: Link) -> None:
         wheels = VirtualWheels(link, MonotonicClock())
         super().__init__(link, wheels)
-        self._rolled = wheels
+        self._wheels = wheels
         wheels.start()
 
     def odometer(self) -> Callable[[], float]:
         """Return a function that gives the metres rolled since now; being carried doesn't count."""
-        began = self._rolled.driven()
-        return lambda: self._rolled.driven() - began
+        began = self._wheels.driven()
+        return lambda: self._wheels.driven() - began
 
 
 ROBOT = replace(

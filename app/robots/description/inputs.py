@@ -18,9 +18,9 @@ from nep.i18n import _, listed, ngettext, translate
 from nep.i18n import number as number_text
 from nep.text import bounded_str, quotable
 
-_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
-_LENGTH, _ITEMS = ("minLength", "maxLength"), ("minItems", "maxItems")
-_DEEPEST = 40
+_HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_LENGTH_KEYS, _ITEM_COUNT_KEYS = ("minLength", "maxLength"), ("minItems", "maxItems")
+_MAX_DEPTH = 40
 _MAX_WORD_LENGTH = 100
 _MAX_UNKNOWN_NAMED = 5  # a similarity search takes 20 µs, and untrusted input may have any number of names
 NUMBER_KINDS = frozenset({"number", "integer", "angle"})
@@ -104,7 +104,7 @@ def near_miss(wrong: str, known: Iterable[str]) -> str:
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
     """Convert a data schema to a parameter."""
     is_list = data.get("type") == "array"
-    shortest, longest = (number(data.get(rule)) for rule in (_ITEMS if is_list else _LENGTH))
+    shortest, longest = (number(data.get(rule)) for rule in (_ITEM_COUNT_KEYS if is_list else _LENGTH_KEYS))
     held = data.get("items") if is_list else data.get("additionalProperties")
     places = held if isinstance(held, (list, tuple)) else ()
     return Parameter(
@@ -190,10 +190,10 @@ def from_words(parameter: Parameter, words: str) -> object:
         words = words.replace(",", ".").replace(";", ",")
     items = [word.strip() for word in words.split(",") if word.strip()]
     if parameter.places:
-        return [_of_word(each, item) for each, item in zip(parameter.places, items, strict=False)] + items[
+        return [_parse_word(each, item) for each, item in zip(parameter.places, items, strict=False)] + items[
             len(parameter.places) :
         ]
-    return items if parameter.each is None else [_of_word(parameter.each, item) for item in items]
+    return items if parameter.each is None else [_parse_word(parameter.each, item) for item in items]
 
 
 def to_words(value: object) -> str:
@@ -205,7 +205,7 @@ def to_words(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _of_word(parameter: Parameter, word: str) -> object:
+def _parse_word(parameter: Parameter, word: str) -> object:
     known = [choice.value for choice in parameter.choices if word in {str(choice.value), choice.title}]
     if known:
         return known[0]
@@ -268,7 +268,7 @@ def wrong_value(parameter: Parameter, value: object, place: str = "") -> str | N
     if parameter.kind == "boolean":
         return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=place)
     if parameter.kind == "colour":
-        good = isinstance(value, str) and _COLOUR.fullmatch(value) is not None
+        good = isinstance(value, str) and _HEX_COLOUR.fullmatch(value) is not None
         return None if good else _("{place} must be a colour like #20c0e0").format(place=place)
     if parameter.kind == "list":
         return _wrong_list(parameter, value, place)
@@ -346,9 +346,9 @@ def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str)
 
 def _is_json(value: object, depth: int = 0) -> bool:
     if isinstance(value, (list, tuple)):
-        return depth < _DEEPEST and all(_is_json(item, depth + 1) for item in value)
+        return depth < _MAX_DEPTH and all(_is_json(item, depth + 1) for item in value)
     if isinstance(value, Mapping):
-        return depth < _DEEPEST and all(_is_json(item, depth + 1) for item in value.values())
+        return depth < _MAX_DEPTH and all(_is_json(item, depth + 1) for item in value.values())
     return value is None or isinstance(value, (str, int, float))
 
 

@@ -67,7 +67,7 @@ def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Act
         icon=text(block.get("icon")) or _ICONS.get(risk or "", "play"),
         category=_category(block, "Actions"),
         parameters=parameters,
-        text=_with_robot(_words(block, "text") or _spelled(title, parameters)),
+        text=_with_robot(_words(block, "text") or _default_text(title, parameters)),
         says=_with_robot(_words(block, "says")) or None,
         topic=_topic(action, topics.command),
         answer_topic=_topic(action, topics.answer, "rb:answer"),
@@ -159,7 +159,7 @@ def _words(block: Mapping[str, object], kind: str) -> str:
     ).strip()
 
 
-def _spelled(title: str, parameters: tuple[Parameter, ...]) -> str:
+def _default_text(title: str, parameters: tuple[Parameter, ...]) -> str:
     shown = [parameter for parameter in parameters if not parameter.advanced]
     values = [f"%{p.name}{' ' + p.unit if p.unit else ''}" for p in shown]
     return " ".join([title, *values])

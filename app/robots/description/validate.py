@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
-_MOST_PROBLEMS = 20
-_DEEPEST = 40
+_MAX_PROBLEMS = 20
+_MAX_DEPTH = 40
 MOST_VALUES = 20_000
 """Limit of values in a description; each takes some 0.05 ms to check. Pepper has 900."""
 _BLOCK = "rb:block"
-_WORDS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
+_TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
 """Members of a description that are shown to people or contain shown text."""
-_VALUES = frozenset({"default", "enum", "const"})
-_LARGEST = 1e15
+_VALUE_MEMBERS = frozenset({"default", "enum", "const"})
+_MAX_NUMBER = 1e15
 _accepted: deque[str] = deque(maxlen=8)
 """Recently accepted descriptions: a robot publishes the same one again and again."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
@@ -58,7 +58,7 @@ def validate(model: object) -> tuple[str, ...]:
         return (strange,)
     text, problems = json.dumps(model), []
     if text not in _accepted:
-        problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MOST_PROBLEMS)]
+        problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MAX_PROBLEMS)]
         if not problems:
             _accepted.append(text)
     control = control_in(str(model.get("title")))
@@ -70,7 +70,7 @@ def validate(model: object) -> tuple[str, ...]:
         problems = list(_contradictions(model))
     if not problems and (harmless_model := cleaned(model)) != model:
         return validate(harmless_model)  # removing control characters may leave an empty text
-    return tuple(dict.fromkeys(problems))[:_MOST_PROBLEMS]
+    return tuple(dict.fromkeys(problems))[:_MAX_PROBLEMS]
 
 
 def cleaned(document: Mapping[str, object]) -> dict[str, object]:
@@ -81,21 +81,21 @@ def cleaned(document: Mapping[str, object]) -> dict[str, object]:
     """
 
     def clean(value: object, place: str) -> object:
-        if place in _VALUES:
+        if place in _VALUE_MEMBERS:
             return value
         if isinstance(value, Mapping):
             return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
         if isinstance(value, (list, tuple)):
             return [clean(item, "") for item in value]
-        return harmless(value) if isinstance(value, str) and place in _WORDS else value
+        return harmless(value) if isinstance(value, str) and place in _TEXT_MEMBERS else value
 
     return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
 def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
     # Also rejects `$ref`, unusable numbers, and more than `MOST_VALUES` values, counted by `seen`.
-    if next(seen) > MOST_VALUES or depth > _DEEPEST:
-        if depth > _DEEPEST:
+    if next(seen) > MOST_VALUES or depth > _MAX_DEPTH:
+        if depth > _MAX_DEPTH:
             return _("{place} is nested too deeply").format(place=path)
         return _("the description has more than {count} values").format(count=MOST_VALUES)
     if isinstance(value, dict):
@@ -111,7 +111,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
             _not_json(item, seen, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
         )
         return next((found for found in found_items if found is not None), None)
-    if isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
+    if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
         return _("{place} is not a usable number").format(place=path)
     if value is None or isinstance(value, (str, bool, int, float)):
         return None

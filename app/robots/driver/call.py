@@ -9,7 +9,7 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Protocol
 
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
 
 
@@ -168,7 +168,7 @@ class Call:
     def close(self) -> None:
         """Wait up to 2 s until the callbacks of `on_cancel` have returned."""
         if self._canceling is not None:
-            self._canceling.join(_JOIN_S)
+            self._canceling.join(_JOIN_TIMEOUT_S)
 
     def on_cancel(self, tell: Callable[[], object]) -> None:
         """Call `tell` once, in another thread, when the action must end; at once if it must already.

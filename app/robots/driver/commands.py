@@ -23,7 +23,7 @@ from nep.text import bounded_str, quotable
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
 Done: TypeAlias = Callable[[object, Call], object]
 _MAX_ID_LENGTH = 200
-_ENDED_KEPT = 100
+_MAX_ENDED_PROGRAMS = 100
 
 
 class CommandHandler:
@@ -40,8 +40,8 @@ class CommandHandler:
     ) -> None:
         self._robot, self._body, self._specs = robot, body, specs
         self._tasks, self._publish, self._done = tasks, publish, done
-        self._open: set[str] = set()
-        self._ended: deque[str] = deque(maxlen=_ENDED_KEPT)
+        self._open_ids: set[str] = set()
+        self._ended_programs: deque[str] = deque(maxlen=_MAX_ENDED_PROGRAMS)
 
     def is_stop(self, command: object) -> bool:
         """Return True for a command that stops the robot. Thread-safe."""
@@ -56,9 +56,9 @@ class CommandHandler:
         message = as_part(command)
         ended = text(message.get("ends"))
         if ended is not None:
-            self._ended.append(program_of(ended))
+            self._ended_programs.append(program_of(ended))
         wanted, operation = _id_of(message), message.get("op")
-        if wanted is None or (operation == "invoke" and wanted in self._open):
+        if wanted is None or (operation == "invoke" and wanted in self._open_ids):
             self._tasks.stop(None)
         else:
             self._tasks.stop(self._answering(wanted, str(operation), self._robot.safe_stop.action))
@@ -80,7 +80,7 @@ class CommandHandler:
             else:
                 self._handle(message, wanted, publisher, epoch)
         except Exception as error:
-            if wanted is not None and wanted not in self._open:
+            if wanted is not None and wanted not in self._open_ids:
                 words = _("{robot} can't handle this command: {error}").format(
                     robot=self._robot.name, error=quotable(error)
                 )
@@ -89,7 +89,7 @@ class CommandHandler:
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
         """Reply to a command that was not decoded, unless its id belongs to another command."""
-        if wanted not in self._open:
+        if wanted not in self._open_ids:
             self._answering(wanted, operation, "")(Answer("failed", error=error))
 
     def _handle(
@@ -195,11 +195,11 @@ class CommandHandler:
         publisher: int | None,
         epoch: int | None,
     ) -> None:
-        if wanted in self._open:
+        if wanted in self._open_ids:
             return  # duplicate command
         name, given = message.get("action"), message.get("input")
         answer = self._answering(wanted, "invoke", quotable(name or ""))
-        if program is not None and program.name in self._ended:
+        if program is not None and program.name in self._ended_programs:
             # sent before its program was ended, received after the stop: must not move the robot
             answer(Answer("canceled", error=_("its program was stopped")))
             return
@@ -215,16 +215,16 @@ class CommandHandler:
             answer(Answer("failed", error="; ".join(sentences)))
             return
         task = self.task(wanted, action, as_part(given), answer, program, publisher=publisher, epoch=epoch)
-        self._open.add(wanted)
+        self._open_ids.add(wanted)
         try:
             self._tasks.submit(task)
         except BaseException:
-            self._open.discard(wanted)
+            self._open_ids.discard(wanted)
             raise
 
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
-        if error is not None and wanted in self._open and error == NOTHING_RUNS:
+        if error is not None and wanted in self._open_ids and error == NOTHING_RUNS:
             error = _("only the program that started “{action}” can cancel it; anyone can stop").format(
                 action=name or wanted
             )
@@ -235,7 +235,7 @@ class CommandHandler:
     def _answering(self, wanted: str, operation: str, name: str) -> Callable[[Answer], None]:
         def answer(given: Answer) -> None:
             if given.is_final and operation == "invoke":
-                self._open.discard(wanted)
+                self._open_ids.discard(wanted)
             told: dict[str, object] = {"id": wanted, "op": operation, "action": name, "state": given.state}
             told |= {
                 "output": dict(given.output),

@@ -38,9 +38,12 @@ Busy: TypeAlias = Literal["queue", "replace", "reject"]
 Risk: TypeAlias = Literal["moves", "locomotes"]
 FromRize: TypeAlias = Callable[[str, Mapping[str, object]], Mapping[str, object]]
 ToRize: TypeAlias = Callable[[Mapping[str, object]], tuple[str, Mapping[str, object]]]
-_CONTEXT = ["https://www.w3.org/2022/wot/td/v1.1", {"rb": "https://nep-studio.example/robot-blocks/v1#"}]
-_MARK = "__robot_action__"
-_STOP_MARK = "__robot_stop__"
+_JSON_LD_CONTEXT = [
+    "https://www.w3.org/2022/wot/td/v1.1",
+    {"rb": "https://nep-studio.example/robot-blocks/v1#"},
+]
+_ACTION_ATTRIBUTE = "__robot_action__"
+_STOP_ATTRIBUTE = "__robot_stop__"
 
 
 @dataclass(frozen=True)
@@ -101,14 +104,14 @@ class action:  # noqa: N801 - used as a decorator
         except (TypeError, NameError) as error:
             where = line_of(function)
             raise DeclarationError(function.__name__, str(error), str(where or "")) from error
-        setattr(function, _MARK, spec)
+        setattr(function, _ACTION_ATTRIBUTE, spec)
         return function
 
     def _part(self, function: Callable[..., object], returns: Returned) -> Schema:
         part: Schema = {
             "title": self.title or function.__name__.replace("_", " "),
             "synchronous": not self.cancellable,
-            **_given({"description": inspect.getdoc(function), "input": input_schema(function)}),
+            **_without_none({"description": inspect.getdoc(function), "input": input_schema(function)}),
         }
         output = returns.schema()
         if output is not None:
@@ -116,7 +119,9 @@ class action:  # noqa: N801 - used as a decorator
         if self.feedback:
             part["rb:feedback"] = fields_schema(self.feedback)
         part |= {"rb:cancel": self.cancellable, "rb:uses": list(self.uses), "rb:onBusy": self.on_busy}
-        part |= _given({"rb:timeout": self.timeout_s, "rb:risk": self.risk, "rb:repeat": self.repeat_s})
+        part |= _without_none(
+            {"rb:timeout": self.timeout_s, "rb:risk": self.risk, "rb:repeat": self.repeat_s}
+        )
         block: Schema = {"category": self.category, "icon": self.icon, "text": {"en": self.text}}
         part["rb:block"] = block | ({"says": {"en": self.says}} if self.says else {})
         return part
@@ -217,7 +222,7 @@ def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Fu
     """
 
     def mark(function: Function) -> Function:
-        setattr(function, _STOP_MARK, StopSpec(watchdog_s, within_s))
+        setattr(function, _STOP_ATTRIBUTE, StopSpec(watchdog_s, within_s))
         return function
 
     return mark
@@ -238,7 +243,7 @@ def sensor(
     schema = _described(fields_schema, kind) if isinstance(kind, Mapping) else _described(schema_of, kind)
     is_object = schema.get("type") == "object"
     part: Schema = {**schema, "title": title, "readOnly": True, "observable": True}
-    part |= _given({"rb:rate": rate_hz})
+    part |= _without_none({"rb:rate": rate_hz})
     part["rb:block"] = {"category": "Sensors", "icon": icon} | ({"text": {"en": text}} if text else {})
     return SensorSpec(part, is_object=is_object, kind=kind)
 
@@ -272,7 +277,7 @@ def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = No
     kind = {"count": int, "name": str}
     part: Schema = {**fields_schema(kind), "title": title}
     part |= {"readOnly": True, "observable": True, "rb:widget": "detections", "rb:camera": camera}
-    part |= _given({"rb:rate": rate_hz})
+    part |= _without_none({"rb:rate": rate_hz})
     part["rb:block"] = {"category": "Sensors", "icon": icon}
     return SensorSpec(part, is_object=True, kind=kind)
 
@@ -336,7 +341,7 @@ class Kind:
     def __post_init__(self) -> None:
         lines = lines_of(self.body) if isinstance(self.body, type) else {}
         made = self._thing_model()
-        problems = (*self._twice(lines), *(_with_line(each, lines) for each in validate(made)))
+        problems = (*self._duplicate_problems(lines), *(_with_line(each, lines) for each in validate(made)))
         if problems:
             raise DescriptionError(self.model, problems)
         object.__setattr__(self, "thing_model", made)
@@ -344,7 +349,11 @@ class Kind:
     @property
     def actions(self) -> dict[str, ActionSpec]:
         """Decorated methods, in the order of the class."""
-        return {name: getattr(member, _MARK) for name, member in self._members() if hasattr(member, _MARK)}
+        return {
+            name: getattr(member, _ACTION_ATTRIBUTE)
+            for name, member in self._members()
+            if hasattr(member, _ACTION_ATTRIBUTE)
+        }
 
     @property
     def sensors(self) -> dict[str, SensorSpec]:
@@ -359,12 +368,14 @@ class Kind:
     @property
     def stop(self) -> tuple[str, StopSpec]:
         """Name of the stop method, and its declaration."""
-        found = [(name, getattr(m, _STOP_MARK)) for name, m in self._members() if hasattr(m, _STOP_MARK)]
+        found = [
+            (name, getattr(m, _STOP_ATTRIBUTE)) for name, m in self._members() if hasattr(m, _STOP_ATTRIBUTE)
+        ]
         if len(found) != 1:
             raise DescriptionError(self.model, (_("exactly one method must be marked with safe_stop"),))
         return found[0]
 
-    def _twice(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
+    def _duplicate_problems(self, lines: Mapping[str, list[SourceLine]]) -> list[str]:
         declared = {*self.actions, *self.sensors, *self.events, self.stop[0]}
         twice = [(name, found) for name, found in lines.items() if len(found) > 1 and name in declared]
         return [
@@ -392,10 +403,10 @@ class Kind:
         about: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
         about |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
         return {
-            "@context": _CONTEXT,
+            "@context": _JSON_LD_CONTEXT,
             "@type": ["tm:ThingModel", "rb:Robot"],
             "title": self.title,
-            **_given({"description": self.description or None}),
+            **_without_none({"description": self.description or None}),
             "version": {"model": "1.0.0"},
             "rb:profile": 1,
             "rb:robot": about,
@@ -440,7 +451,7 @@ def _listed(value: object) -> list[str]:
     return [str(item) for item in value] if isinstance(value, list) else []
 
 
-def _given(found: Mapping[str, object]) -> Schema:
+def _without_none(found: Mapping[str, object]) -> Schema:
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -481,12 +492,12 @@ def lines_of(body: type) -> dict[str, list[SourceLine]]:
     found: dict[str, list[SourceLine]] = {}
     (declared,) = tree.body
     for statement in declared.body if isinstance(declared, ast.ClassDef) else ():
-        for name in _names_given(statement):
+        for name in _bound_names(statement):
             found.setdefault(name, []).append(SourceLine(file, first + statement.lineno - 1))
     return found
 
 
-def _names_given(statement: ast.stmt) -> Iterator[str]:
+def _bound_names(statement: ast.stmt) -> Iterator[str]:
     if isinstance(statement, (ast.FunctionDef, ast.AsyncFunctionDef)):
         again = (_decorator_name(each) for each in statement.decorator_list)
         if not {"setter", "getter", "deleter", "overload"} & set(again):

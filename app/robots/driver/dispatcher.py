@@ -18,11 +18,11 @@ from nep.system.log_rarely import SurvivedErrors
 
 _MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting
 _RESTART_PAUSE_S = 0.05
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     return
 
 
@@ -42,9 +42,9 @@ class Dispatcher:
         name: str,
         clock: Clock,
         *,
-        tick: Callable[[], object] = _nothing,
+        tick: Callable[[], object] = _do_nothing,
         next_due_s: Callable[[], float | None] = lambda: None,
-        on_restart: Callable[[], object] = _nothing,
+        on_restart: Callable[[], object] = _do_nothing,
     ) -> None:
         self.errors = SurvivedErrors(_log, name)
         """Exceptions raised by callbacks, ticks or the loop."""
@@ -102,7 +102,7 @@ class Dispatcher:
         self._closing.set()
         self._wake.set()
         if self._thread.ident is not None and not self.is_current:
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
 
     def _new_thread(self, *, is_restart: bool = False) -> threading.Thread:
         supervise = partial(self._supervise, is_restart=is_restart)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 RIZE_COMMANDS, RIZE_ANSWERS, RIZE_EVENTS = "robot_action", "action_state", "rize_event"
 BLACKBOARD = "/blackboard"
 MAX_WORLD_BYTES = 1_000_000
-_CLOSE_S, _JOIN_S = 2.0, 2.0
+_CLOSE_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 2.0
 _log = logging.getLogger(__name__)
 
 
@@ -95,9 +95,9 @@ class Driver:
         again.
         """
         try:
-            self._make_topics()
+            self._create_topics()
             self._body = self.kind.body(self)
-            self._take_commands(self._body)
+            self._start_commands(self._body)
             self._open(self.robot.topics.description, "robot/description", latched=True)
         except nep.NepError:
             self.close()
@@ -105,7 +105,7 @@ class Driver:
         self._publish(self.robot.topics.description, self.description)
         self._publish(RIZE_EVENTS, {"robot": "ready", "name": self.name})
 
-    def _make_topics(self) -> None:
+    def _create_topics(self) -> None:
         for name, spec in self.kind.sensors.items():
             msg_type = "image" if spec.is_image else "json"
             self._open(topic_of(self.name, name), msg_type, latched=not spec.is_image)
@@ -117,7 +117,7 @@ class Driver:
         if any(spec.to_rize for spec in self.kind.events.values()):
             self._open(BLACKBOARD)
 
-    def _take_commands(self, body: object) -> None:
+    def _start_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
         stop_function: Callable[[], object] = getattr(body, stop)
         answer = partial(self._publish, self.robot.topics.answer)
@@ -127,13 +127,13 @@ class Driver:
 
         self._tasks = tasks = Tasks(
             self.name,
-            lambda: self._done(stop_function()),
+            lambda: self._resolve(stop_function()),
             self.clock,
             within_s=timing.within_s,
             watchdog_s=timing.watchdog_s,
             beat=beat,
         )
-        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, answer, self._done)
+        desk = CommandHandler(self.robot, body, self.kind.actions, tasks, answer, self._resolve)
         dialect = RizeDialect(
             self.robot, self.kind.actions, desk, tasks, partial(self._publish, RIZE_ANSWERS)
         )
@@ -158,7 +158,7 @@ class Driver:
         close, self._body = getattr(self._body, "close", None), None
         if callable(close):
             try:
-                self._done(close(), within_s=_CLOSE_S)
+                self._resolve(close(), within_s=_CLOSE_TIMEOUT_S)
             except Exception:  # noqa: BLE001 - the rest must be closed in any case
                 _log.warning("%s: its close broke off", self.name, exc_info=True)
         self._loop.close()
@@ -256,7 +256,7 @@ class Driver:
         self._subscribe(topic, changed)
         return partial(self._publish, topic)
 
-    def _done(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
+    def _resolve(self, result: object, call: Call | None = None, *, within_s: float | None = None) -> object:
         return self._loop.run(result, call, within_s=within_s) if inspect.isawaitable(result) else result
 
     # ---- topics -----------------------------------------------------------------------------------
@@ -313,12 +313,12 @@ class EventLoop:
                 then Canceled is raised.
             within_s: Timeout in seconds, after which the awaitable is canceled and TimeoutError raised.
         """
-        loop, waited = self._begun(work), _Waited(work)
-        self._soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
+        loop, waited = self._running_loop(work), _PendingAwaitable(work)
+        self._call_soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
         if call is not None:
-            call.on_cancel(partial(self._soon, waited.cancel))
+            call.on_cancel(partial(self._call_soon, waited.cancel))
         if not waited.ended.wait(within_s) and within_s is not None:
-            self._soon(waited.cancel)
+            self._call_soon(waited.cancel)
             raise TimeoutError(_("it has not ended after {seconds} s").format(seconds=number(within_s)))
         if waited.error is not None:
             raise waited.error
@@ -331,12 +331,12 @@ class EventLoop:
             loop, thread = self._loop, self._thread
         if loop is None or thread is None:
             return
-        self._soon(loop.stop)
-        thread.join(_JOIN_S)
+        self._call_soon(loop.stop)
+        thread.join(_JOIN_TIMEOUT_S)
         if thread.is_alive():
             _log.warning("%s: an async function holds the event loop up; it was left behind", self._name)
 
-    def _begun(self, work: Awaitable[object]) -> asyncio.AbstractEventLoop:
+    def _running_loop(self, work: Awaitable[object]) -> asyncio.AbstractEventLoop:
         with self._lock:
             if self._closed or threading.current_thread() is self._thread:
                 if asyncio.iscoroutine(work):
@@ -353,7 +353,7 @@ class EventLoop:
                 self._thread.start()
             return self._loop
 
-    def _soon(self, what: Callable[[], object]) -> None:
+    def _call_soon(self, what: Callable[[], object]) -> None:
         loop = self._loop
         try:
             if loop is not None:
@@ -362,7 +362,7 @@ class EventLoop:
             return
 
 
-class _Waited:
+class _PendingAwaitable:
     """Awaitable that another thread waits for.
 
     Until `ended` is set, its other attributes belong to the loop's thread.
@@ -411,7 +411,7 @@ def _serve(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) -> No
         for task in left:
             task.cancel()
         if left:
-            loop.run_until_complete(asyncio.wait(left, timeout=_JOIN_S / 2))
+            loop.run_until_complete(asyncio.wait(left, timeout=_JOIN_TIMEOUT_S / 2))
         loop.run_until_complete(loop.shutdown_asyncgens())
     finally:
         asyncio.set_event_loop(None)

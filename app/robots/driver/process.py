@@ -49,13 +49,13 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     ended = threading.Event()
     say_where_it_crashes()
-    _on_signals(ended)
+    _handle_signals(ended)
     with Terminal(sys.stderr) as terminal:  # a blocked stderr must not block the robot's threads
         log_to(terminal, logging.INFO)
         try:
             run(kind, chosen.name, ended, master=chosen.master, owner_pid=chosen.owner_pid)
         except (Failed, AppError, nep.NepError) as error:  # Failed: raised by the robot's __init__
-            _say(f"{chosen.name}: {error}", terminal)
+            _print(f"{chosen.name}: {error}", terminal)
             return 1
     return 0
 
@@ -70,7 +70,7 @@ def tell_briefly() -> None:
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if isinstance(error, DescriptionError):
             with Terminal(sys.stderr) as terminal:
-                _say(str(error), terminal)
+                _print(str(error), terminal)
         else:
             before(kind, error, trace)
 
@@ -85,7 +85,7 @@ def run(
     Progress is printed only without an owner: an owner follows the robot over the network and takes printed
     lines as the reason of its exit.
     """
-    owner = _process(owner_pid)
+    owner = _owner_process(owner_pid)
     if owner_pid is not None and owner is None:
         return
     with Terminal(sys.stdout) as output, nep.node(name, master=master) as node, _published(node):
@@ -93,7 +93,7 @@ def run(
 
         def say(sentence: str) -> None:
             if owner is None:
-                _say(sentence, output)
+                _print(sentence, output)
 
         words = (
             _("{robot}: a robot, model virtual {model}; its topics are {topics}")
@@ -102,9 +102,11 @@ def run(
         )
         say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
         try:
-            if not _wait_for_master(driver, name, master_address(master), say, lambda: _over(ended, owner)):
+            if not _wait_for_master(
+                driver, name, master_address(master), say, lambda: _is_over(ended, owner)
+            ):
                 return
-            while not _over(ended, owner):
+            while not _is_over(ended, owner):
                 ended.wait(_OWNER_CHECK_S)
         finally:
             driver.close()
@@ -114,7 +116,7 @@ def _wait_for_master(
     driver: Driver, name: str, address: str, say: Callable[[str], object], is_over: Callable[[], bool]
 ) -> bool:
     has_waited = False
-    while not _started(driver):
+    while not _try_start(driver):
         if not has_waited:
             words = _("{robot}: no master at {address}; waiting for one. Start Studio or `nep master`")
             say(words.format(robot=name, address=address))
@@ -130,7 +132,7 @@ def _wait_for_master(
     return True
 
 
-def _say(words: str, terminal: Terminal) -> None:
+def _print(words: str, terminal: Terminal) -> None:
     # Terminal drops lines instead of blocking: a full pipe must not stop the robot.
     terminal.write(escaped(words) + "\n")
 
@@ -145,7 +147,7 @@ def _published(node: nep.Node) -> Iterator[None]:
         root.removeHandler(node.log_handler)
 
 
-def _started(driver: Driver) -> bool:
+def _try_start(driver: Driver) -> bool:
     try:
         driver.start()
     except nep.MasterUnreachable:
@@ -153,7 +155,7 @@ def _started(driver: Driver) -> bool:
     return True
 
 
-def _over(ended: threading.Event, owner: psutil.Process | None) -> bool:
+def _is_over(ended: threading.Event, owner: psutil.Process | None) -> bool:
     # is_running compares pid and start time, so a reused pid doesn't count.
     return ended.is_set() or (owner is not None and _is_gone(owner))
 
@@ -165,7 +167,7 @@ def _is_gone(owner: psutil.Process) -> bool:
         return True
 
 
-def _process(pid: int | None) -> psutil.Process | None:
+def _owner_process(pid: int | None) -> psutil.Process | None:
     if pid is None:
         return None
     try:
@@ -174,7 +176,7 @@ def _process(pid: int | None) -> psutil.Process | None:
         return None
 
 
-def _on_signals(ended: threading.Event) -> None:
+def _handle_signals(ended: threading.Event) -> None:
     def end(_number: int, _frame: FrameType | None) -> None:
         ended.set()
 

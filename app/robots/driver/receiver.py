@@ -22,7 +22,7 @@ from nep.system.log_rarely import is_logged
 MAX_COMMAND_BYTES = 64_000
 _MAX_BACKLOG = 2_000
 _MAX_BACKLOG_BYTES = 16_000_000
-_END_BYTES = 2_048
+_SEARCHED_BYTES = 2_048
 _ID = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
 _OPERATION = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
 _log = logging.getLogger(__name__)
@@ -188,5 +188,5 @@ class CommandReceiver:
 
 def _found(pattern: re.Pattern[bytes], message: Message) -> str:
     data = message.data
-    found = pattern.search(bytes(data[:_END_BYTES])) or pattern.search(bytes(data[-_END_BYTES:]))
+    found = pattern.search(bytes(data[:_SEARCHED_BYTES])) or pattern.search(bytes(data[-_SEARCHED_BYTES:]))
     return "" if found is None else found[1].decode()

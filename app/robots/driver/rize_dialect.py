@@ -22,7 +22,7 @@ from app.robots.driver.tasks import Tasks
 from nep.text import bounded_str
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
-_LONGEST_WAIT_S = 3600.0
+_MAX_WAIT_S = 3600.0
 _MAX_PRIMITIVES = 100
 
 
@@ -45,11 +45,11 @@ class RizeDialect:
         self,
         robot: Robot,
         specs: Mapping[str, ActionSpec],
-        desk: CommandHandler,
+        commands: CommandHandler,
         tasks: Tasks,
         publish: Publish,
     ) -> None:
-        self._robot, self._desk, self._tasks, self._publish = robot, desk, tasks, publish
+        self._robot, self._commands, self._tasks, self._publish = robot, commands, tasks, publish
         self._specs = {spec.primitive: (name, spec) for name, spec in specs.items() if spec.primitive}
         self._numbers = itertools.count(1)
 
@@ -123,9 +123,11 @@ class RizeDialect:
             return
         task = None
         if action is not None:
-            meant = _meant(action, spec, given, as_part(primitive.get("options")))  # options may be "none"
+            meant = _parsed_input(
+                action, spec, given, as_part(primitive.get("options"))
+            )  # options may be "none"
             if meant is not None and not action.check(meant):
-                task = self._desk.task(wanted, action, meant, answer, epoch=epoch)
+                task = self._commands.task(wanted, action, meant, answer, epoch=epoch)
         elif name == "wait":
             task = _waiting(wanted, given, answer, epoch)
         if task is None:
@@ -148,7 +150,7 @@ def _as_text(value: object) -> str:
 
 def _waiting(wanted: str, given: str, answer: Callable[[Answer], None], epoch: int | None) -> Task | None:
     seconds = number_of(given)
-    if seconds is None or not 0 <= seconds <= _LONGEST_WAIT_S:
+    if seconds is None or not 0 <= seconds <= _MAX_WAIT_S:
         return None
     return Task(wanted, "wait", lambda call: _wait(call, seconds), answer, epoch=epoch)
 
@@ -157,7 +159,7 @@ def _wait(call: Call, seconds: float) -> None:
     call.wait(seconds)
 
 
-def _meant(
+def _parsed_input(
     action: Action, spec: ActionSpec | None, given: str, options: Mapping[str, object]
 ) -> Mapping[str, object] | None:
     if spec is None or spec.from_rize is None:

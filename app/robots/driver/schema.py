@@ -18,8 +18,8 @@ from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, 
 from nep.i18n import _
 
 Schema: TypeAlias = dict[str, object]
-_LONGEST_UNIT = 16
-_UNIT_WORDS = {
+_MAX_UNIT_LENGTH = 16
+_UNIT_SPELLINGS = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "centimeter": "cm", "centimeters": "cm",
     "millimeter": "mm", "millimeters": "mm", "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad",
     "radians": "rad", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "minute": "min",
@@ -110,7 +110,7 @@ def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
     if may_be_none:
         schema["rb:nullable"] = True
     for note in notes:
-        schema.update(_noted(note, schema))
+        schema.update(_note_schema(note, schema))
     return schema
 
 
@@ -122,15 +122,17 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
         return _choice(annotation, choices)
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in {list, Sequence} and len(arguments) == 1:
-        return {"type": "array", "items": _held(arguments[0], inside)}
+        return {"type": "array", "items": _element_schema(arguments[0], inside)}
     if origin is tuple and len(arguments) == 2 and arguments[1] is Ellipsis:
-        return {"type": "array", "items": _held(arguments[0], inside)}
+        return {"type": "array", "items": _element_schema(arguments[0], inside)}
     if origin is tuple and arguments:
-        places = [_held(each, inside) for each in arguments]
+        places = [_element_schema(each, inside) for each in arguments]
         return {"type": "array", "items": places, "minItems": len(places), "maxItems": len(places)}
     if origin in {dict, Mapping} and len(arguments) == 2 and arguments[0] is str:
         free = arguments[1] in (Any, object)
-        return {"type": "object"} | ({} if free else {"additionalProperties": _held(arguments[1], inside)})
+        return {"type": "object"} | (
+            {} if free else {"additionalProperties": _element_schema(arguments[1], inside)}
+        )
     if annotation in inside:
         raise TypeError(
             _("a robot's value can't contain itself: {annotation}").format(annotation=shown(annotation))
@@ -146,7 +148,7 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
     )
 
 
-def _held(annotation: object, inside: tuple[object, ...]) -> Schema:
+def _element_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
     # Elements of a list or map: None is not allowed.
     if without_none(bare(annotation)[0])[1]:
         raise TypeError(
@@ -178,17 +180,17 @@ def _object(fields: Mapping[str, tuple[object, bool]], inside: tuple[object, ...
         for name, (kind, _) in fields.items()
     }
     required = [name for name, (kind, must) in fields.items() if must and not without_none(bare(kind)[0])[1]]
-    return _given({"type": "object", "required": required or None, "properties": properties})
+    return _without_none({"type": "object", "required": required or None, "properties": properties})
 
 
-def _noted(note: object, schema: Schema) -> Schema:
+def _note_schema(note: object, schema: Schema) -> Schema:
     if isinstance(note, Range):
         _check_unit(note.unit)
         step = "multipleOf" if schema.get("type") == "integer" else "rb:step"
         found = {"minimum": note.minimum, "maximum": note.maximum, step: note.step, "unit": note.unit}
-        return _given(found | {"rb:widget": note.widget})
+        return _without_none(found | {"rb:widget": note.widget})
     if isinstance(note, Text):
-        return _given({"minLength": note.min_length or None, "maxLength": note.max_length})
+        return _without_none({"minLength": note.min_length or None, "maxLength": note.max_length})
     if isinstance(note, Words):
         values = schema.pop("enum", None)
         if values is None:
@@ -209,7 +211,7 @@ def _noted(note: object, schema: Schema) -> Schema:
     raise TypeError(_("{note} is not a valid annotation for a robot's value").format(note=repr(note)))
 
 
-def _given(found: Mapping[str, object]) -> Schema:
+def _without_none(found: Mapping[str, object]) -> Schema:
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -220,10 +222,10 @@ def _check_unit(unit: object) -> None:
         raise TypeError(
             _("a unit is a text like 'm', not {unit}; write Range(0, 1, unit='m')").format(unit=repr(unit))
         )
-    sign = _UNIT_WORDS.get(unit.lower())
+    sign = _UNIT_SPELLINGS.get(unit.lower())
     if sign is not None:
         raise TypeError(_("unknown unit {unit}; write {sign}").format(unit=repr(unit), sign=repr(sign)))
-    if not unit or len(unit) > _LONGEST_UNIT or not unit.isprintable() or " " in unit:
+    if not unit or len(unit) > _MAX_UNIT_LENGTH or not unit.isprintable() or " " in unit:
         raise TypeError(
             _("unknown unit {unit}; use UCUM: 'm', 'deg', 's', 'm/s', '%'").format(unit=repr(unit))
         )
@@ -288,7 +290,7 @@ def input_schema(function: Callable[..., object]) -> Schema | None:
         properties[name] = schema
     if not properties:
         return None
-    return _given({"type": "object", "required": required or None, "properties": properties})
+    return _without_none({"type": "object", "required": required or None, "properties": properties})
 
 
 def _default(kind: object, default: object, name: str) -> object:

@@ -17,14 +17,14 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from app.errors import RobotValueError
 from nep.i18n import _, lazy, listed
 
-_LONGEST_SHOWN = 40
-_SIMPLE = {
+_MAX_SHOWN_LENGTH = 40
+_TYPE_MESSAGES = {
     bool: lazy("{place} must be True or False, not {value}"),
     str: lazy("{place} must be text, not {value}"),
     int: lazy("{place} must be a whole number, not {value}"),
     float: lazy("{place} must be a number, not {value}"),
 }
-_DEEPEST = 40
+_MAX_DEPTH = 40
 
 
 def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
@@ -67,11 +67,11 @@ def fields_of(annotation: object) -> Mapping[str, tuple[object, bool]] | None:
     if is_typeddict(annotation):
         required: frozenset[str] = getattr(annotation, "__required_keys__", frozenset())
         hints = get_type_hints(annotation, include_extras=True)
-        return {name: _present(kind, name in required) for name, kind in hints.items()}
+        return {name: _field_type(kind, name in required) for name, kind in hints.items()}
     return None
 
 
-def _present(kind: object, must: bool) -> tuple[object, bool]:
+def _field_type(kind: object, must: bool) -> tuple[object, bool]:
     # Required and NotRequired take precedence over `__required_keys__`, which misses them in modules with
     # string annotations.
     word = str(get_origin(kind))
@@ -162,7 +162,7 @@ def told(annotation: object, value: object) -> object:
     fields = fields_of(kind)
     if fields is not None:
         return told_fields({name: each for name, (each, _must) in fields.items()}, value, _required(fields))
-    return _many(kind, value)
+    return _collection(kind, value)
 
 
 def told_fields(
@@ -204,7 +204,7 @@ def plain(value: object, depth: int = 0) -> object:
         return int(value)
     if isinstance(value, numbers.Real):
         return float(value)
-    if depth > _DEEPEST:
+    if depth > _MAX_DEPTH:
         raise RobotValueError(lazy("{place} is nested too deeply"))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
@@ -235,7 +235,7 @@ def same(allowed: object, value: object) -> bool:
 
 
 def _simple(kind: object, value: object) -> object:
-    wanted, words = next((each, words) for each, words in _SIMPLE.items() if each is kind)
+    wanted, words = next((each, words) for each, words in _TYPE_MESSAGES.items() if each is kind)
     if wanted is bool or wanted is str:
         good = isinstance(value, wanted)
     else:
@@ -254,14 +254,14 @@ def _number(value: object) -> int | float | None:
     return int(value) if isinstance(value, numbers.Integral) else float(value)
 
 
-def _many(kind: object, value: object) -> object:
+def _collection(kind: object, value: object) -> object:
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in {dict, Mapping}:
         if not isinstance(value, Mapping):
             raise RobotValueError(
                 lazy("{place} must be an object with named values, not {value}"), value=_shown_value(value)
             )
-        return {str(name): _placed(arguments[1], item, str(name)) for name, item in value.items()}
+        return {str(name): _told_at(arguments[1], item, str(name)) for name, item in value.items()}
     if not isinstance(value, (list, tuple)):
         raise RobotValueError(lazy("{place} must be a list, not {value}"), value=_shown_value(value))
     if origin is tuple and arguments[1:] != (Ellipsis,):
@@ -270,13 +270,13 @@ def _many(kind: object, value: object) -> object:
                 lazy("{place} must have {count} values, not {given}"), count=len(arguments), given=len(value)
             )
         return [
-            _placed(each, item, place)
+            _told_at(each, item, place)
             for place, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
         ]
-    return [_placed(arguments[0], item, place) for place, item in enumerate(value, 1)]
+    return [_told_at(arguments[0], item, place) for place, item in enumerate(value, 1)]
 
 
-def _placed(kind: object, value: object, place: int | str) -> object:
+def _told_at(kind: object, value: object, place: int | str) -> object:
     try:
         return told(kind, value)
     except RobotValueError as error:
@@ -296,4 +296,4 @@ def _out_of_numpy(value: object) -> object:
 
 def _shown_value(value: object) -> str:
     words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
-    return words if len(words) <= _LONGEST_SHOWN else f"{words[:_LONGEST_SHOWN]}…"
+    return words if len(words) <= _MAX_SHOWN_LENGTH else f"{words[:_MAX_SHOWN_LENGTH]}…"

@@ -12,7 +12,7 @@ from nep.i18n import _
 from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
-_JOIN_S = 0.5
+_JOIN_TIMEOUT_S = 0.5
 _log = logging.getLogger(__name__)
 
 
@@ -68,7 +68,7 @@ class StopThread:
         self._is_closing = True
         self._wake.set()
         if self._thread.ident is not None:
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
 
     def _new_thread(self) -> threading.Thread:
         return threading.Thread(target=self._supervise, name=f"{self._name} stop", daemon=True)

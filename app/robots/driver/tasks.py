@@ -31,13 +31,13 @@ silent (`app.core.run.control.STOP_TIMEOUT_S`).
 """
 _GRACE_S = 1.0
 """Time in which a function may clean up after a cancel, a time-out or a replacement."""
-_LONGEST_QUEUE = 50
-_MOST_RUNNING = 50
+_MAX_QUEUED = 50
+_MAX_RUNNING = 50
 """Actions without resources run in parallel, each in its own thread."""
 THE_STOP = lazy("the stop itself")
 NOTHING_RUNS = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
 
 
@@ -126,15 +126,17 @@ class Tasks:
     ) -> None:
         self._name, self._clock, self._beat = name, clock, beat
         self._next_beat_s = 0.0
-        self._told_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
+        self._reported_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
-        self._not_stopped: str | None = None  # the failure of the last stop that had nobody to answer to
+        self._unasked_stop_error: str | None = (
+            None  # the failure of the last stop that had nobody to answer to
+        )
         self._patience_s = max(STOP_ANSWER_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._dispatcher = Dispatcher(
             f"{name} commands",
             clock,
-            tick=self._look_at_clock,
+            tick=self._tick,
             next_due_s=self._next_due,
             on_restart=self._restarted,
         )
@@ -200,7 +202,7 @@ class Tasks:
         stopped = threading.Event()
 
         def take(answer: Answer) -> None:
-            self._take_unasked(answer)
+            self._note_unasked_stop(answer)
             stopped.set()
 
         self.stop(take, _("the driver is ending"))
@@ -213,37 +215,37 @@ class Tasks:
     def submit(self, task: Task) -> None:
         """Run a task as soon as its resources are free; reject it, or end others, by its busy policy."""
         if task.epoch is not None and task.epoch < self._epoch:
-            self._tell(task.finish, _stopped_before())
+            self._give_answer(task.finish, _stopped_before())
             return
         refused = self._refusal()
         if refused is not None:
-            self._tell(task.finish, Answer("failed", error=f"{task.action}: {refused}"))
+            self._give_answer(task.finish, Answer("failed", error=f"{task.action}: {refused}"))
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
             busy = _("{action}: {robot} is busy with {other}").format(
                 action=task.action, robot=self._name, other=clashing[0].title or clashing[0].action
             )
-            self._tell(task.finish, Answer("failed", error=busy))
+            self._give_answer(task.finish, Answer("failed", error=busy))
             return
-        if len(self._running) >= _MOST_RUNNING:
+        if len(self._running) >= _MAX_RUNNING:
             full = _("{action}: {count} other actions are already running").format(
-                action=task.action, count=_MOST_RUNNING
+                action=task.action, count=_MAX_RUNNING
             )
-            self._tell(task.finish, Answer("failed", error=full))
+            self._give_answer(task.finish, Answer("failed", error=full))
             return
-        if len(self._queue) >= _LONGEST_QUEUE:
+        if len(self._queue) >= _MAX_QUEUED:
             full = _("{action}: {count} other actions are already waiting").format(
-                action=task.action, count=_LONGEST_QUEUE
+                action=task.action, count=_MAX_QUEUED
             )
-            self._tell(task.finish, Answer("failed", error=full))
+            self._give_answer(task.finish, Answer("failed", error=full))
             return
         ended = []
         if task.on_busy == "replace":
             ended = [other for other in clashing if other.cancellable or other in self._queue]
         waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
         replaces = tuple(dict.fromkeys(other.action for other in ended))
-        self._tell(task.answer, Answer("accepted", waits_for=waits_for, replaces=replaces))
+        self._give_answer(task.answer, Answer("accepted", waits_for=waits_for, replaces=replaces))
         replaced = Answer(
             "canceled", error=_("replaced by {action}").format(action=task.title or task.action)
         )
@@ -290,16 +292,16 @@ class Tasks:
             self._stop_ended(self._ended_run, self._ended_error)
 
     def _restarted(self) -> None:
-        self.stop(self._take_unasked, _("its driver had an internal error"))
+        self.stop(self._note_unasked_stop, _("its driver had an internal error"))
 
-    def _tell(self, answer: Callable[[Answer], None], told: Answer) -> None:
+    def _give_answer(self, answer: Callable[[Answer], None], told: Answer) -> None:
         self._dispatcher.call(partial(answer, told))
 
     def _next_due(self) -> float | None:
         due = [task.due_s for task in self._running if task.due_s is not None]
         due += [pending.limit_s for pending in self._pending_stops]
         due += self._watchdog.due()
-        if self._beat is not None and self._has_to_tell:
+        if self._beat is not None and self._needs_beat:
             due.append(self._next_beat_s)
         return max(0.0, min(due) - self._clock.now()) if due else None
 
@@ -312,8 +314,8 @@ class Tasks:
         return self._stop_thread.requested > self._ended_run
 
     @property
-    def _has_to_tell(self) -> bool:
-        return self._is_busy or self._not_stopped is not None
+    def _needs_beat(self) -> bool:
+        return self._is_busy or self._unasked_stop_error is not None
 
     def _refusal(self) -> str | None:
         stopped = [task for task in self._running if task.stopped]
@@ -329,19 +331,19 @@ class Tasks:
         not_ended = self._not_ended()
         if not_ended:
             return not_ended, still_moving(self._name, not_ended)
-        return ((THE_STOP,) if self._not_stopped is not None else ()), self._not_stopped
+        return ((THE_STOP,) if self._unasked_stop_error is not None else ()), self._unasked_stop_error
 
-    def _tell_beat(self) -> None:
+    def _send_beat(self) -> None:
         if self._beat is None:
             return
         now = self._clock.now()
         told = self._still_moving()
-        if (self._has_to_tell and now >= self._next_beat_s) or told != self._told_not_ended:
-            self._next_beat_s, self._told_not_ended = now + BEAT_S, told
+        if (self._needs_beat and now >= self._next_beat_s) or told != self._reported_not_ended:
+            self._next_beat_s, self._reported_not_ended = now + BEAT_S, told
             self._beat(*told)
 
-    def _look_at_clock(self) -> None:
-        for step in (self._end_overdue, self._answer_late_stops, self._watch_programs, self._tell_beat):
+    def _tick(self) -> None:
+        for step in (self._end_overdue, self._answer_late_stops, self._watch_programs, self._send_beat):
             self._dispatcher.call(step)
 
     def _end_overdue(self) -> None:
@@ -357,23 +359,25 @@ class Tasks:
         if any(pending.run > self._ended_run for pending in late):
             self._stop_is_late = True
         for pending in late:
-            self._tell(pending.answer, Answer("failed", error=still_moving(self._name, self._not_ended())))
+            self._give_answer(
+                pending.answer, Answer("failed", error=still_moving(self._name, self._not_ended()))
+            )
 
     def _watch_programs(self) -> None:
         acting = [task.program for task in (*self._running, *self._queue)]
         if self._watchdog.bites(self._clock.now(), acting):
             self.stop(
-                self._take_unasked,
+                self._note_unasked_stop,
                 _("its program has been silent for {seconds} s").format(
                     seconds=number(self._watchdog.patience_s or 0.0)
                 ),
             )
 
-    def _take_unasked(self, answer: Answer) -> None:
+    def _note_unasked_stop(self, answer: Answer) -> None:
         if answer.state == "failed":
-            if answer.error != self._not_stopped:  # log repeated failures once
+            if answer.error != self._unasked_stop_error:  # log repeated failures once
                 _log.error("%s", answer.error)
-            self._not_stopped = answer.error
+            self._unasked_stop_error = answer.error
 
     def _end(self, task: Task, how: Answer) -> None:
         # A function that keeps running is reported after `_GRACE_S`.
@@ -396,12 +400,12 @@ class Tasks:
         task.due_s = None
         why = "" if task.stopped or task.ending.error is None else f" ({task.ending.error})"
         goes_on = still_moving(self._name, [task.action])
-        self._tell(task.finish, Answer("failed", error=f"{goes_on}{why}"))
+        self._give_answer(task.finish, Answer("failed", error=f"{goes_on}{why}"))
 
     def _drop(self, tasks: list[Task], how: Answer) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
         for task in tasks:
-            self._tell(task.finish, how)
+            self._give_answer(task.finish, how)
 
     def _start_ready(self) -> None:
         taken = {used for task in self._running for used in task.uses}
@@ -422,11 +426,11 @@ class Tasks:
                 task.call = call
                 self._running.append(task)
         if is_stopped:
-            self._tell(task.finish, _stopped_before())
+            self._give_answer(task.finish, _stopped_before())
             return
         task.due_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
         self._watchdog.begins(task)
-        self._tell(task.answer, Answer("running"))
+        self._give_answer(task.answer, Answer("running"))
         name = f"{self._name} {task.action}"
         task.thread = threading.Thread(target=self._work, args=(task, call), name=name, daemon=True)
         try:
@@ -437,7 +441,7 @@ class Tasks:
 
     def _progress(self, task: Task, values: dict[str, object]) -> None:
         if not task.answered:
-            self._tell(task.answer, Answer("running", feedback=values))
+            self._give_answer(task.answer, Answer("running", feedback=values))
 
     def _work(self, task: Task, call: Call) -> None:
         done = Answer("failed", error=task.action)
@@ -466,7 +470,7 @@ class Tasks:
 
     def _ended(self, task: Task, done: Answer) -> None:
         if task.thread is not None:
-            task.thread.join(_JOIN_S)
+            task.thread.join(_JOIN_TIMEOUT_S)
         with self._lock:
             self._running.remove(task)
         if done.state == "succeeded" and task.ending is None:
@@ -478,7 +482,7 @@ class Tasks:
             self._stop_thread.wake()
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
         # A function that was asked to end may return normally; the requested ending counts.
-        self._tell(task.finish, done if task.ending is None or done.state == "failed" else task.ending)
+        self._give_answer(task.finish, done if task.ending is None or done.state == "failed" else task.ending)
         self._start_ready()
         self._settle()
 
@@ -490,18 +494,18 @@ class Tasks:
         self._ended_run, self._ended_error = run, error
         self._stop_is_late = False
         if error is None:
-            self._not_stopped = None
+            self._unasked_stop_error = None
             self._settle()
             return
         failed = Answer("failed", error=error)
         waiting = [pending for pending in self._pending_stops if pending.run <= run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
         if not waiting:
-            self._take_unasked(failed)  # the requester already got the answer that it had not ended
-        elif self._not_stopped is not None:
-            self._not_stopped = error
+            self._note_unasked_stop(failed)  # the requester already got the answer that it had not ended
+        elif self._unasked_stop_error is not None:
+            self._unasked_stop_error = error
         for pending in waiting:
-            self._tell(pending.answer, failed)
+            self._give_answer(pending.answer, failed)
 
     def _settle(self) -> None:
         # Answers the stops whose run of the stop function has ended, once no task runs.
@@ -510,7 +514,7 @@ class Tasks:
         stopped = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > self._ended_run]
         for pending in stopped:
-            self._tell(pending.answer, Answer("succeeded"))
+            self._give_answer(pending.answer, Answer("succeeded"))
 
 
 def _stopped_before() -> Answer:

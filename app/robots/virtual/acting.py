@@ -89,17 +89,17 @@ class Acting(Senses):
     start_room: ClassVar[Room] = Room()
 
     def __init__(self, link: Link) -> None:
-        self._life = Simulation(Body(room=self.start_room), link, MonotonicClock())
-        link.on_world(self._life.act)
-        self._life.start()
+        self._simulation = Simulation(Body(room=self.start_room), link, MonotonicClock())
+        link.on_world(self._simulation.act)
+        self._simulation.start()
 
     def close(self) -> None:
         """Stop its threads."""
-        self._life.close()
+        self._simulation.close()
 
     def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
-        with self._life.changed:
-            motion = start(self._life.body)
+        with self._simulation.changed:
+            motion = start(self._simulation.body)
         try:
             while not call.until(lambda: motion.done, for_s=FEEDBACK_S):
                 call.feedback(to_go=round(abs(motion.remaining), 2))
@@ -110,34 +110,34 @@ class Acting(Senses):
         return motion
 
     def _brake(self, motion: Motion) -> None:
-        with self._life.changed:
+        with self._simulation.changed:
             motion.halt()
-        self._life.wait_for(lambda: motion.done, timeout_s=1.0)
+        self._simulation.wait_for(lambda: motion.done, timeout_s=1.0)
 
     def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
-        with self._life.changed:
-            self._life.body.head_yaw.aim(yaw)
-            self._life.body.head_pitch.aim(pitch)
-        self._until(call, lambda: self._life.body.joints_still, self._life.body.hold_joints)
+        with self._simulation.changed:
+            self._simulation.body.head_yaw.aim(yaw)
+            self._simulation.body.head_pitch.aim(pitch)
+        self._until(call, lambda: self._simulation.body.joints_still, self._simulation.body.hold_joints)
 
     def _direction_of(self, target: str) -> tuple[float, float]:
         if target in _HEAD:
             return _HEAD[target]
-        found = self._life.seen.get("faces" if target == "face" else "balls", [])
+        found = self._simulation.seen.get("faces" if target == "face" else "balls", [])
         if not found:
             raise Failed(
                 _("look at: no face in the picture")
                 if target == "face"
                 else _("look at: no ball in the picture")
             )
-        left, down = angles_to(lens_of(self._life.body), found[0].middle)
-        body = self._life.body
+        left, down = angles_to(lens_of(self._simulation.body), found[0].middle)
+        body = self._simulation.body
         return body.head_yaw.angle + left, body.head_pitch.angle + down
 
     def _until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
         try:
             call.until(done)
         except Canceled:
-            with self._life.changed:
+            with self._simulation.changed:
                 halt()
             raise

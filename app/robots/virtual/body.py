@@ -17,9 +17,9 @@ START_PITCH = 8.0
 EYES = "#35b0fa"
 SHOULDERS = "#3ab5ff"
 FULL_RANGE = 5.0
-_SECONDS_PER_LETTER = 0.06
-_SHORTEST_SPEECH_S = 0.6
-_LONGEST_STEP_S = 0.02
+_SECONDS_PER_CHARACTER = 0.06
+_MIN_SPEECH_S = 0.6
+_MAX_STEP_S = 0.02
 TOUCH_LEAST_S = 0.3
 """Minimum duration of a touch, so that programs that poll see a tap."""
 HEARD_FOR_S = 4.0
@@ -48,7 +48,7 @@ class Speech:
     @classmethod
     def of(cls, text: str, speed_percent: float = 100.0) -> Speech:
         """Return a speech whose duration depends on its length."""
-        return cls(text, max(_SHORTEST_SPEECH_S, len(text) * _SECONDS_PER_LETTER) * 100.0 / speed_percent)
+        return cls(text, max(_MIN_SPEECH_S, len(text) * _SECONDS_PER_CHARACTER) * 100.0 / speed_percent)
 
     @property
     def word(self) -> str:
@@ -95,7 +95,7 @@ class Body:
     _sounds: int = field(default=0, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
-    _leaving: set[str] = field(default_factory=set, repr=False)
+    _ending_touches: set[str] = field(default_factory=set, repr=False)
 
     # ---- commands ---------------------------------------------------------------------------
 
@@ -213,19 +213,19 @@ class Body:
     def touch(self, place: str, *, down: bool) -> None:
         """Start or end a touch; a tap lasts at least `TOUCH_LEAST_S`."""
         if down:
-            self._leaving.discard(place)
+            self._ending_touches.discard(place)
             if place not in self.touched:
                 self.touched[place] = 0.0
                 self.happenings.append(BodyEvent("touched", {"place": place}))
         elif place in self.touched:
-            self._leaving.add(place)
-            self._let_go()
+            self._ending_touches.add(place)
+            self._end_touches()
 
-    def _let_go(self) -> None:
+    def _end_touches(self) -> None:
         # Ends touches that have lasted long enough.
-        for place in sorted(self._leaving):
+        for place in sorted(self._ending_touches):
             if self.touched[place] >= TOUCH_LEAST_S:
-                self._leaving.discard(place)
+                self._ending_touches.discard(place)
                 del self.touched[place]
                 self.happenings.append(BodyEvent("released", {"place": place}))
 
@@ -254,7 +254,7 @@ class Body:
     def step(self, seconds: float) -> None:
         """Simulate time in small steps, so that it can't pass through objects."""
         while seconds > 1e-9:
-            dt = min(seconds, _LONGEST_STEP_S)
+            dt = min(seconds, _MAX_STEP_S)
             seconds -= dt
             self._step(dt)
 
@@ -273,7 +273,7 @@ class Body:
         for joint in self._joints():
             joint.step(dt)
         self.touched = {place: for_s + dt for place, for_s in self.touched.items()}
-        self._let_go()
+        self._end_touches()
         if self._speech is not None:
             self._speech.spoken_s += dt
             if self._speech.spoken_s >= self._speech.seconds:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, TypeVar
 
 T = TypeVar("T")
-_NEAR_WALL, _BEFORE_WALL = 0.3, 0.01
+_WALL_SNAP_M, _WALL_GAP_M = 0.3, 0.01
 Wall = Literal["north", "south", "east", "west"]
 WALLS: tuple[Wall, ...] = ("north", "south", "east", "west")
 
@@ -251,7 +251,9 @@ class Room:
                 put = replace(thing, x=at[0], y=at[1])
                 return replace(self, boxes=_exchanged(self.boxes, thing, put))
             case Marker():
-                return replace(self, markers=_exchanged(self.markers, thing, self._hung(thing, x, y)))
+                return replace(
+                    self, markers=_exchanged(self.markers, thing, self._attached_to_wall(thing, x, y))
+                )
         return self
 
     def pushed_ball(self, x: float, y: float, radius: float) -> Room:
@@ -268,17 +270,17 @@ class Room:
             room = room.moved(ball.name, x + away_x / gap * reach, y + away_y / gap * reach)
         return room
 
-    def _hung(self, card: Marker, x: float, y: float) -> Marker:
+    def _attached_to_wall(self, card: Marker, x: float, y: float) -> Marker:
         half = card.size / 2
-        x, y = self.inside(x, y, _BEFORE_WALL)
+        x, y = self.inside(x, y, _WALL_GAP_M)
         walls = (
-            (x - self.x_min, 0.0, (self.x_min + _BEFORE_WALL, y)),
-            (self.x_max - x, 180.0, (self.x_max - _BEFORE_WALL, y)),
-            (y - self.y_min, 90.0, (x, self.y_min + _BEFORE_WALL)),
-            (self.y_max - y, -90.0, (x, self.y_max - _BEFORE_WALL)),
+            (x - self.x_min, 0.0, (self.x_min + _WALL_GAP_M, y)),
+            (self.x_max - x, 180.0, (self.x_max - _WALL_GAP_M, y)),
+            (y - self.y_min, 90.0, (x, self.y_min + _WALL_GAP_M)),
+            (self.y_max - y, -90.0, (x, self.y_max - _WALL_GAP_M)),
         )
         away, facing, place = min(walls)
-        if away > _NEAR_WALL:
+        if away > _WALL_SNAP_M:
             x, y = self.inside(x, y, half)
             return replace(card, x=x, y=y, facing_deg=None)
         return replace(card, x=place[0], y=place[1], facing_deg=facing)

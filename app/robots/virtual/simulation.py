@@ -23,13 +23,13 @@ from nep.text import bounded_str, quotable
 
 BODY_HZ = 30.0
 CAMERA_HZ = 15.0
-_LOOK_EVERY = 3  # images; people and balls don't change faster
-_SLOW_EVERY = 3  # steps between two values of pose and distance
-_CALM_EVERY = 30  # steps between two values of slowly changing sensors
-_LONGEST_STEP_S = 0.25  # after a suspend the simulation continues from where it was
+_DETECTION_PERIOD_IMAGES = 3  # images; people and balls don't change faster
+_SLOW_PERIOD_STEPS = 3  # steps between two values of pose and distance
+_CALM_PERIOD_STEPS = 30  # steps between two values of slowly changing sensors
+_MAX_STEP_S = 0.25  # after a suspend the simulation continues from where it was
 _SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
-_STOP_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 ITSELF = "robot"
 """Name of the robot itself in a move by a person."""
 PLACES = ("head", "left_hand", "right_hand")
@@ -63,8 +63,8 @@ class Simulation:
         self._face: str | None = None
         self._face_seen_s = 0.0
         self._threads = [
-            threading.Thread(target=self._move, name=f"{link.name} body", daemon=True),
-            threading.Thread(target=self._look, name=f"{link.name} camera", daemon=True),
+            threading.Thread(target=self._run_body, name=f"{link.name} body", daemon=True),
+            threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
         ]
 
     def start(self) -> None:
@@ -77,35 +77,35 @@ class Simulation:
         """Stop both threads."""
         self._ended.set()
         for thread in self._threads:
-            thread.join(_STOP_S)
+            thread.join(_JOIN_TIMEOUT_S)
 
     def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until a condition on the body is true; return False after the timeout."""
         limit = self._clock.now() + timeout_s
         with self.changed:
             while self._clock.now() < limit:
-                self._advance()
+                self._advance_locked()
                 if true():
                     return True
                 self.changed.wait(_SMALL_STEP_S)
         return False
 
-    def _advance(self) -> None:
+    def _advance_locked(self) -> None:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
         self._shared.take_over()
-        self.body.step(min(max(0.0, now - self._stepped_s), _LONGEST_STEP_S))
+        self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
         self._shared.follow()
         self._stepped_s = now
 
     # ---- body thread --------------------------------------------------------------------------------
 
-    def _move(self) -> None:
+    def _run_body(self) -> None:
         with self.changed:
             self._stepped_s = self._clock.now()
         for step, _ in enumerate(self._beat(BODY_HZ)):
             with self.changed:
-                self._advance()
+                self._advance_locked()
                 happenings = list(self.body.happenings)
                 self.body.happenings.clear()
                 self.changed.notify_all()
@@ -124,20 +124,20 @@ class Simulation:
             state, distance = drawable(self.body), self.body.distance
             pose = {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]}
         self._link.tell("state", state)
-        if step % _SLOW_EVERY == 0:
+        if step % _SLOW_PERIOD_STEPS == 0:
             self._link.sense("pose", pose)
             self._link.sense("distance", round(distance, 2))
-        if step % _CALM_EVERY == 0:
+        if step % _CALM_PERIOD_STEPS == 0:
             self._link.sense("battery", int(self.body.battery))
             self._link.sense("head_touched", "head" in self.body.touched)
             self._link.sense("heard_word", self.body.heard)
 
     # ---- camera thread --------------------------------------------------------------------------------
 
-    def _look(self) -> None:
+    def _run_camera(self) -> None:
         for count, _ in enumerate(self._beat(CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
-            is_turn = count % _LOOK_EVERY == 0
+            is_turn = count % _DETECTION_PERIOD_IMAGES == 0
             # subscribers get boxes that belong to the same image
             if is_watched or is_turn:
                 self.look(publish=is_watched)
@@ -210,11 +210,11 @@ class Simulation:
             if "start" in change:
                 self._shared.to_start(change["start"])
         if isinstance(change.get("happen"), str):
-            self._let_happen(change)
+            self._simulate_event(change)
 
-    def _let_happen(self, change: Mapping[str, object]) -> None:
+    def _simulate_event(self, change: Mapping[str, object]) -> None:
         event, given = told_event(change)
-        data = {**self._made_up(event), **given}
+        data = {**self._default_event_data(event), **given}
         if not may_happen(self._link, event, data):
             return
         with self.changed:
@@ -227,7 +227,7 @@ class Simulation:
                 return
         self._link.happen(event, **data)
 
-    def _made_up(self, event: str) -> dict[str, object]:
+    def _default_event_data(self, event: str) -> dict[str, object]:
         people = self.body.room.people
         return {"name": people[0].name if people else "Aiko"} if "face" in event else {}
 

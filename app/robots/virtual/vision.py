@@ -18,9 +18,9 @@ from app.robots.virtual.canvas import Picture
 from app.robots.virtual.lens import NEAR, Lens
 from app.robots.virtual.room import Person, Room
 
-_SMALLEST_BALL = 24  # pixels of area
-_SMALLEST_FACE = 8  # pixels across
-_ENOUGH_OF_A_FACE = 0.6
+_MIN_BALL_AREA_PX = 24  # pixels of area
+_MIN_FACE_WIDTH_PX = 8  # pixels across
+_MIN_VISIBLE_FACE = 0.6
 
 LEAST_AREA = 0.004
 _HUES: dict[str, tuple[tuple[int, int], ...]] = {
@@ -28,7 +28,7 @@ _HUES: dict[str, tuple[tuple[int, int], ...]] = {
     "green": ((45, 85),),
     "blue": ((98, 125),),
 }
-_LEAST_SATURATION, _LEAST_VALUE = 95, 60
+_MIN_SATURATION, _MIN_VALUE = 95, 60
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class ObjectDetector:
         found = []
         for x, y, width, height, area in stats[1:count].tolist():
             roundness = area / (np.pi / 4 * max(width, height) ** 2)
-            if area >= _SMALLEST_BALL and roundness > 0.72:
+            if area >= _MIN_BALL_AREA_PX and roundness > 0.72:
                 found.append(Detection("ball", min(0.99, roundness), (x, y, width, height)))
         return found
 
@@ -112,10 +112,10 @@ def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     inside_low = np.maximum(low, 0.0)
     inside_high = np.minimum(high, (lens.width, lens.height))
-    if (inside_high <= inside_low).any() or high[0] - low[0] < _SMALLEST_FACE:
+    if (inside_high <= inside_low).any() or high[0] - low[0] < _MIN_FACE_WIDTH_PX:
         return None
     part = float(np.prod(inside_high - inside_low) / np.prod(high - low))
-    if part < _ENOUGH_OF_A_FACE:
+    if part < _MIN_VISIBLE_FACE:
         return None
     sure = part * min(1.0, 0.7 + 0.009 * float(high[0] - low[0]))
     return Detection(person.name, min(0.99, sure), _box_of(np.stack([inside_low, inside_high])))
@@ -152,7 +152,7 @@ def colours_in(picture: Picture) -> dict[str, ColourPatch]:
     for name, ranges in _HUES.items():
         mask = np.zeros((height, width), np.uint8)
         for low, high in ranges:
-            least = np.array([low, _LEAST_SATURATION, _LEAST_VALUE], np.uint8)
+            least = np.array([low, _MIN_SATURATION, _MIN_VALUE], np.uint8)
             cv2.bitwise_or(mask, cv2.inRange(hsv, least, np.array([high, 255, 255], np.uint8)), dst=mask)
         count, _, parts, middles = cv2.connectedComponentsWithStats(mask)
         if count < 2:

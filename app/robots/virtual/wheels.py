@@ -15,7 +15,7 @@ LIGHT = "#35c26b"
 FULL_RANGE = 4.0
 ACCELERATION, BRAKING = 1.5, 20.0  # m/s²
 TURNING, TURN_BRAKING = 360.0, 4000.0  # °/s²
-_LONGEST_STEP_S = 0.01
+_MAX_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _ASIDE_DEG = 50.0
 PRESS_S = 0.3
@@ -36,7 +36,7 @@ class WheelBody:
     battery: float = 91.3
     bumped: str = ""
     happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
-    _wanted: tuple[float, float] = (0.0, 0.0)
+    _target: tuple[float, float] = (0.0, 0.0)
     held: bool = False
     """True while a person holds it up, so that it doesn't move."""
     driven: float = 0.0
@@ -45,12 +45,12 @@ class WheelBody:
 
     def drive(self, speed: float, turn_speed: float) -> None:
         """Set the target speed (m/s, forwards positive) and turn (°/s, left positive); 0, 0 brakes."""
-        self._wanted = (speed, turn_speed)
+        self._target = (speed, turn_speed)
 
     @property
     def still(self) -> bool:
         """True when nothing moves and the target speeds are 0."""
-        return self._wanted == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
+        return self._target == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
     @property
     def distance(self) -> float:
@@ -60,13 +60,13 @@ class WheelBody:
 
     def press(self, side: str) -> None:
         """Press a bumper: it stops as after a collision."""
-        self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)
+        self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
         self.bumped, self._pressed_s = side, PRESS_S
         self.happenings.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
         """Return to the start in this room."""
-        self.room, self._wanted, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
+        self.room, self._target, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
         self.x, self.y = room.nearest_free(*START[:2], RADIUS)
         self.theta_deg, self.light, self.bumped, self.held = START[2], LIGHT, "", False
 
@@ -88,14 +88,14 @@ class WheelBody:
     def step(self, seconds: float) -> None:
         """Simulate time in small steps, so that it can't pass through objects."""
         while seconds > 1e-9:
-            dt = min(seconds, _LONGEST_STEP_S)
+            dt = min(seconds, _MAX_STEP_S)
             seconds -= dt
             self._step(dt)
 
     def _step(self, dt: float) -> None:
-        speed, turn_speed = (0.0, 0.0) if self.held else self._wanted
-        self.speed = _towards(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
-        self.turn_speed = _towards(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
+        speed, turn_speed = (0.0, 0.0) if self.held else self._target
+        self.speed = _approach(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
+        self.turn_speed = _approach(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
         if self._pressed_s > 0.0:
             self._pressed_s -= dt
             self.bumped = self.bumped if self._pressed_s > 0.0 else ""
@@ -114,7 +114,7 @@ class WheelBody:
             self.bumped = self.bumped if self._pressed_s > 0.0 else ""
             self.room = self.room.pushed_ball(x, y, RADIUS)
             return
-        self.speed, self.turn_speed, self._wanted = 0.0, 0.0, (0.0, 0.0)
+        self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
         side = self._side(way)
         if side != self.bumped:
             self.bumped = side
@@ -137,7 +137,7 @@ class WheelBody:
         return self.room.free(x, y, RADIUS)
 
 
-def _towards(now: float, wanted: float, faster: float, slower: float) -> float:
+def _approach(now: float, wanted: float, faster: float, slower: float) -> float:
     # Braking (also to reverse) uses the larger rate.
     brakes = abs(wanted) < abs(now) or now * wanted < 0
     change = slower if brakes else faster
