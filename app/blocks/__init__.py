@@ -1,7 +1,7 @@
-"""Blocks as data, and the compiler that turns a workspace into a Python program.
+"""Blocks as data, and the compiler from a workspace to a Python program.
 
-What compiles a behaviour is exported here; programs import `app.blocks.commands`.
-`editor/` is the editor's page in TypeScript.
+This package exports the compiler; exported programs import `app.blocks.commands`. `editor/` is the editor's
+page in TypeScript.
 """
 
 from __future__ import annotations

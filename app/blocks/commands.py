@@ -1,7 +1,21 @@
-"""What a program file calls: ``from app.blocks.commands import robot, run, wait``.
+"""Commands of an exported program: ``from app.blocks.commands import robot, run, wait``.
 
-The same functions as in Studio, for the one program of this process. ``run("Greeting")`` at the end of the
-file finds the robots, runs all scripts and tells the robots to stop when it ends, also at Ctrl+C.
+They are the same functions as in Studio, for the single program of this process. ``run("Greeting")`` at the
+end of the file finds the robots, runs all scripts and stops the robots at the end, also after Ctrl+C.
+
+Example:
+    ::
+
+        from app.blocks.commands import on_start, robot, run, wait
+
+
+        @on_start
+        def greet():
+            robot("Pepper").do("say", text="Hello")
+            wait(2)
+
+
+        run("Greeting")
 """
 
 from __future__ import annotations
@@ -150,8 +164,15 @@ STOP_ANSWER_S = 1.0
 
 
 def run(name: str) -> None:
-    """Run all scripts until they end or Ctrl+C; SystemExit with a sentence when a block fails."""
-    prepare_streams()  # what a script writes may have letters that a pipe of Windows has not
+    """Run all scripts until they end or Ctrl+C is pressed, then stop the robots.
+
+    Args:
+        name: Name of the program, shown to others.
+
+    Raises:
+        SystemExit: A block failed; the message is a sentence for people.
+    """
+    prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:
         found = find_robots(node, LOOK_S)
         for claim in found.claims:

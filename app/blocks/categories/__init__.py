@@ -1,4 +1,5 @@
-"""The categories of blocks: one module each, binding ``CATEGORY``; found by `nep.system.plugins`.
+"""Categories of blocks: one module each, which binds ``CATEGORY``; discovered by `nep.system.plugins`.
 
-The category `robot` makes its blocks from robots' descriptions; docs/blocks.md says how to add a category.
+The category `robot` creates its blocks from robot descriptions; docs/blocks.md describes how to add a
+category.
 """

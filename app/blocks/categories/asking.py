@@ -1,4 +1,4 @@
-"""Ask: questions to the person in front of Studio."""
+"""Category Ask: questions to the person in front of Studio."""
 
 from __future__ import annotations
 

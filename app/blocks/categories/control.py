@@ -1,4 +1,4 @@
-"""Control: waiting, repeating, choosing, stopping."""
+"""Category Control: waiting, loops, conditions, stopping."""
 
 from __future__ import annotations
 

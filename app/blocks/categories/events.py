@@ -1,4 +1,4 @@
-"""Events: what starts a script."""
+"""Category Events: hats that start scripts, and broadcasts."""
 
 from __future__ import annotations
 

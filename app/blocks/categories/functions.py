@@ -1,4 +1,4 @@
-"""Functions: blocks of one's own, with a name and inputs."""
+"""Category Functions: user-defined blocks with a name and inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lists: several values under one name, numbered from 1."""
+"""Category Lists: ordered values under one name, numbered from 1."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ _WHERE = ChoiceField("WHERE", _PLACES_OR_ANY)
 
 
 def _at(call: str, places: tuple[tuple[str, str], ...] = _PLACES_OR_ANY) -> dict[str, str]:
-    """The Python for each place; ``@`` in the call is where it stands."""
     return {place: call.replace("@", "%NUMBER" if place == "number" else f"'{place}'") for _, place in places}
 
 

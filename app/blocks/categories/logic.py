@@ -1,4 +1,4 @@
-"""Logic: true and false, comparing, and, or, not."""
+"""Category Logic: true and false, comparisons, and, or, not."""
 
 from __future__ import annotations
 

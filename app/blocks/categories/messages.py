@@ -1,4 +1,4 @@
-"""Messages: publishing on topics and reading what others publish."""
+"""Category Messages: publishing on topics and reading messages."""
 
 from __future__ import annotations
 

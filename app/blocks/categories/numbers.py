@@ -1,4 +1,4 @@
-"""Numbers: what can be worked out from them."""
+"""Category Numbers: arithmetic and mathematical functions."""
 
 from __future__ import annotations
 

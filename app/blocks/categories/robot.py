@@ -1,7 +1,4 @@
-"""The blocks of robots, made from their descriptions.
-
-What they can do, what they tell, what happens to them.
-"""
+"""Category Robots: blocks created from robot descriptions, for actions, sensors and events."""
 
 from __future__ import annotations
 
@@ -23,7 +20,7 @@ _ICONS = {
     "Sensors": "eye",
 }
 GROUPS = tuple(_ICONS)
-"""The titles of groups, in their order; a description may have more."""
+"""Titles of groups in display order; a description may add more."""
 _TITLES = {
     "": "Movement",
     "actions": "Movement",
@@ -36,7 +33,10 @@ _NUMBERS = ("number", "integer")
 
 
 def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
-    """All blocks of a robot; `known` are all robots, so that its drop-down can name those of its model."""
+    """Return all blocks of a robot.
+
+    `known` are all robots: the drop-down lists those of the same model.
+    """
     alike = [other.name for other in known if other.model == robot.model] or [robot.name]
     blocks = [_action(robot, action, alike) for action in robot.actions]
     blocks += [_sensor(robot, sensor, alike) for sensor in robot.sensors if _has_block(sensor)]
@@ -45,7 +45,7 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
 
 
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
-    """The categories under a robot's heading, its sensors and events last."""
+    """Return the groups under a robot's heading, sensors and events last."""
     titles = {action.name: _group_title(action) for action in robot.actions}
     groups: dict[str, list[ToolboxEntry]] = {title: [] for title in GROUPS}
     for block in robot_blocks(robot, known):
@@ -173,7 +173,6 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
 
 
 def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
-    """The two hats for sensors: “when battery changes” and “when distance goes below 0.5”."""
     told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _TELLS]
     numbers = [sensor for sensor in told if sensor.kind in _NUMBERS]
     hats = []
@@ -225,7 +224,6 @@ def _sensor_field(sensors: Sequence[Sensor]) -> ChoiceField:
 
 
 def _returned(robot: Robot, action: Action) -> str | None:
-    """The field of an action's output that its block gives back, if the description names one."""
     look = _member(robot, "actions", action.name).get("rb:block")
     returns = look.get("returns") if isinstance(look, Mapping) else None
     return returns if isinstance(returns, str) and returns else None
@@ -238,7 +236,6 @@ def _member(robot: Robot, kind: str, name: str) -> Mapping[str, object]:
 
 
 def _types(robot: Robot, kind: str, name: str) -> tuple[str, ...]:
-    """What a description says that it is, beside its name: ``iot:TurnOn``."""
     told = _member(robot, kind, name).get("@type")
     return (told,) if isinstance(told, str) else names(told)
 

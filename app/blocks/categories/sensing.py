@@ -1,4 +1,4 @@
-"""Time: the timer, and the date and time of now."""
+"""Category Time: the timer, and the current date and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text: putting it together, taking it apart, comparing it."""
+"""Category Text: joining, splitting and comparing texts."""
 
 from __future__ import annotations
 

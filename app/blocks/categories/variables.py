@@ -1,4 +1,4 @@
-"""Variables: names for values, shared by all scripts. Blockly's own variables, with its fields' names."""
+"""Category Variables: values shared by all scripts, as Blockly variables with its field names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a workspace to a program: templates filled with syntax trees, rendered for people and to run.
+"""Compiler from a workspace to a program: templates filled with syntax trees, rendered as source and to run.
 
-`compiler.compile_behaviour` is the way in; `problems` has the sentences that people see before Run.
+`compiler.compile_behaviour` is the entry point; `problems` has the sentences shown before Run.
 """

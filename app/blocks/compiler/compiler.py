@@ -1,4 +1,4 @@
-"""From a workspace to a program: each block's template, its holes filled with the trees of what is in it."""
+"""Compiler: each block's template, with its holes filled by the trees of the blocks inside."""
 
 from __future__ import annotations
 
@@ -42,16 +42,13 @@ COMMANDS = frozenset(
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
-"""What a program may call (`app.blocks.commands`); no variable gets one of these names."""
+"""Names that a program may call (`app.blocks.commands`); variables never get one of them."""
 
 RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
 
 
 class _Uses:
-    """What a program needs before its first block: robots, their sensors and events, topics.
-
-    Collects what blocks name, each thing once and in the order of the blocks (dicts keep it).
-    """
+    """Robots, sensors, events and topics that the blocks use, in the order of the blocks."""
 
     def __init__(self) -> None:
         self.robots: dict[str, None] = {}
@@ -62,7 +59,6 @@ class _Uses:
         self.moves: dict[str, None] = {}
 
     def remember(self, placed: Placed, block: Block) -> None:
-        """Add what this block names; its fields are sound."""
         use = block.robot
         if use is not None:
             robot = placed.field_id("ROBOT") or _first_robot(block)
@@ -79,7 +75,7 @@ class _Uses:
 
 
 def saved_value(block: Block, placed: Placed, name: str) -> object:
-    """What a file says in a field of a block; FieldError if the block can't use it, None for no field."""
+    """Return the saved value of a block's field, or None if it has no such field. Raises FieldError."""
     argument = block.argument(name)
     return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
 
@@ -89,8 +85,8 @@ def _first_robot(block: Block) -> str:
     return str(field.read(None)) if isinstance(field, ChoiceField) else ""
 
 
-class _Skip(Exception):  # noqa: N818 (no error: the block is left out, and its problem is noted)
-    """This block can't be compiled; whoever holds it is left out, and the problem is noted already."""
+class _Skip(Exception):  # noqa: N818 (control flow, not an error)
+    """Block that can't be compiled: its problem is reported, and the block around it is skipped, too."""
 
 
 def compile_behaviour(
@@ -100,10 +96,13 @@ def compile_behaviour(
     absent: Sequence[Robot] = (),
     name: str = "Behaviour",
 ) -> Program:
-    """The program of Blockly's JSON.
+    """Compile Blockly's JSON to a program. Never raises for invalid files: they give problems.
 
-    `robots` are connected; blocks of others are skipped, and `absent` (as last known) only helps to name
-    them. Never raises for what a file holds: it becomes problems.
+    Args:
+        workspace: Saved workspace.
+        robots: Connected robots; blocks of others are skipped.
+        absent: Disconnected robots as last known, to name their blocks.
+        name: Name of the behaviour.
     """
     catalogue = Catalogue(robots, absent)
     parsed = parse_workspace(workspace)
@@ -117,8 +116,8 @@ class _Compiler:
         self._names = Names(RESERVED)
         self._shaping = Lowering(workspace, catalogue, self._names)
         self._workspace = workspace = self._shaping.workspace
-        self._function: Function | None = None  # the one that is being compiled
-        self._calls: set[str] = set()  # the blocks that run a function
+        self._function: Function | None = None  # the function being compiled
+        self._calls: set[str] = set()  # blocks that call a function
         self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
         self._marks: dict[ast.AST, str] = {}
         self._notes = ProblemCollector(catalogue, workspace)
@@ -128,7 +127,7 @@ class _Compiler:
         self._uses = _Uses()
         self._ends = LooseEnds()
         self._in_message = False
-        self._numbers: set[str] = set()  # the blocks that must give a number
+        self._numbers: set[str] = set()  # blocks that must return a number
 
     def program(self) -> Program:
         own = self._definitions()
@@ -146,7 +145,7 @@ class _Compiler:
             *own,
             *functions,
         ]
-        actions = asked_actions(body)  # before the trees are changed
+        actions = asked_actions(body)  # before `instrumented` changes the trees
         source, lines = readable([*imports(body), *body, *ending(self._name)], self._marks)
         return Program(
             name=self._name,
@@ -170,7 +169,6 @@ class _Compiler:
         )
 
     def _all_variables(self) -> tuple[Variable, ...]:
-        """The behaviour's variables as they were made, those that no script uses, too."""
         own, shown = self._shaping.variables, self._workspace.variables
         names = dict(own) | {id: shown.get(id, id) for id in self._variables}
         return tuple(Variable(id, name, self._variables.get(id, "")) for id, name in names.items())
@@ -178,7 +176,6 @@ class _Compiler:
     # ---- scripts and statements
 
     def _script(self, script: tuple[Placed, ...]) -> ast.stmt | None:
-        """The function of a script that something starts; None, with a note, for all others."""
         first = script[0]
         if not first.enabled:
             return None
@@ -211,7 +208,6 @@ class _Compiler:
         return function
 
     def _definitions(self) -> list[ast.stmt]:
-        """The functions that people made."""
         made: list[ast.stmt] = []
         for script in self._workspace.scripts:
             self._function = self._shaping.function(script[0])
@@ -235,7 +231,6 @@ class _Compiler:
         return made
 
     def _declare(self, function: ast.FunctionDef) -> None:
-        """``global`` for the variables that the function sets: all scripts share them."""
         own = set(self._variables.values())
         stored = {
             node.id
@@ -287,7 +282,6 @@ class _Compiler:
         return self._marked(made, placed)
 
     def _move(self, placed: Placed, block: Block) -> None:
-        """A block that publishes on a robot's own topic moves that robot, like any of its blocks."""
         topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
         for topic in (str(saved_value(block, placed, name)) for name in topics):
             names = moved_by(topic, self._catalogue.connected.values())
@@ -296,7 +290,6 @@ class _Compiler:
             self._notes.moves(placed, block, topic, names)
 
     def _is_at_home(self, block: Block) -> bool:
-        """Whether the function that is being compiled is of the kind that the block needs."""
         if not block.needs_function:
             return True
         return self._function is not None and self._function.gives == (block.needs_function == "result")
@@ -308,7 +301,6 @@ class _Compiler:
     # ---- values
 
     def _expressions(self, placed: Placed, block: Block) -> dict[str, ast.expr]:
-        """A tree for each hole; _Skip when one of them can't be had."""
         made = {name: literal(constant) for name, constant in block.constants.items()} | dict(block.trees)
         for argument in block.arguments:
             if isinstance(argument, ValueInput):
@@ -374,10 +366,9 @@ class _Compiler:
             self._variables[id] = self._names.new(words, "variable")
         return self._variables[id]
 
-    # ---- what is known about a block
+    # ---- block look-up
 
     def _known(self, placed: Placed, holder: Placed | None = None) -> Block | None:
-        """The block's description; None, with a note, when nobody here can do it."""
         if placed.too_deep:
             self._notes.too_deep(placed)
             return None
@@ -400,7 +391,7 @@ class _Compiler:
 
 
 def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
-    """Arguments by name; a name that Python could not write goes in as ``**{"a-b": …}``."""
+    """Return keyword arguments; names that aren't valid identifiers are passed as ``**{"a-b": …}``."""
     made: dict[str, list[ast.keyword]] = {}
     for hole, pairs in block.keywords.items():
         plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_plain(name)]
@@ -413,7 +404,7 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
 
 
 def template(block: Block, placed: Placed, *, in_function: bool) -> str:
-    """The Python template of a block as it was placed."""
+    """Return the Python template of a placed block."""
     if in_function and block.python_in_function:
         return block.python_in_function
     if isinstance(block.python, str):
@@ -423,14 +414,13 @@ def template(block: Block, placed: Placed, *, in_function: bool) -> str:
 
 
 def _is_plain(name: str) -> bool:
-    """Whether Python can write this name before an equals sign."""
     return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
 
 
 def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
-    """What a program asks of each robot; None when that can't be told from it: then it may be anything.
+    """Return the actions that a program requests of each robot, or None if that is not statically known.
 
-    It is read from the very tree that runs, so no block can ask for more than it says.
+    It is read from the tree that runs, so a block can't request more than it declares.
     """
     found: dict[str, dict[str, None]] = {}
     for call in (node for statement in body for node in ast.walk(statement)):
@@ -446,13 +436,12 @@ def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None
 
 
 def _first_text(node: ast.expr) -> str | None:
-    """The text that is the first argument of a call."""
     first = node.args[0] if isinstance(node, ast.Call) and node.args else None
     return first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else None
 
 
 def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
-    """What a program file begins with."""
+    """Return the import statement of a program file."""
     names = {
         node.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Name)
     } & COMMANDS
@@ -460,5 +449,5 @@ def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
 
 
 def ending(name: str) -> list[ast.stmt]:
-    """What a program file ends with."""
+    """Return the last statement of a program file."""
     return statements("run(%NAME)", {"NAME": literal(name)})

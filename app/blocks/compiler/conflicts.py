@@ -1,9 +1,8 @@
-"""Scripts that fight for a part of a robot, as far as their blocks show it.
+"""Static detection of scripts that use the same resource of a robot at the same time.
 
-Two “when started” scripts run side by side; when both move the base of one robot, one ends what the other
-does. Only what surely comes at the same time is told: what stands behind a condition or a wait may be
-arranged so that it fits, and scripts of events may interrupt on purpose. Those are told when it happens
-(`app.blocks.runtime.robot_handle`).
+Two “when started” scripts run in parallel; if both move the base of one robot, one action replaces the other.
+Only certain conflicts are reported: actions behind a condition or a wait may be arranged to fit, and event
+scripts may interrupt on purpose. Those are reported when they happen (`app.blocks.runtime.robot_handle`).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _REPLACES = "replace"
 
 @dataclass(frozen=True)
 class UsedPart:
-    """A block that lets a robot do something; ``when`` it comes, and whether again and again."""
+    """Action block of a robot; ``when`` it runs, and whether it is in an endless loop."""
 
     placed: Placed
     robot: str
@@ -38,10 +37,10 @@ class UsedPart:
 
 @dataclass(frozen=True)
 class Conflict:
-    """Two blocks of two scripts, each below its hat, that use the same part of a robot at the same time.
+    """Two blocks of two scripts that use the same resource of a robot at the same time.
 
-    ``put`` are the hat of the script that can come below the other one's end, and that one's; None when both
-    go on for ever.
+    ``put`` are the hat of the script that can be moved to the end of the other one, and the other one's hat;
+    None if both run forever.
     """
 
     first: UsedPart
@@ -51,16 +50,15 @@ class Conflict:
 
 
 class ConflictFinder:
-    """Walks through the started scripts of one workspace, and through the functions that they call."""
+    """Search through the start scripts of a workspace and the functions that they call."""
 
     def __init__(
         self, workspace: Workspace, catalogue: Catalogue, function: Callable[[Placed], Function | None]
     ) -> None:
-        """``function`` gives what a block calls."""
         self._workspace, self._catalogue, self._function = workspace, catalogue, function
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Each pair of scripts once for each part of a robot that they fight for."""
+        """Yield each pair of scripts once per resource of a robot that they both use."""
         scripts = [
             script for script in self._workspace.scripts if script[0].type == STARTED and script[0].enabled
         ]
@@ -83,7 +81,6 @@ class ConflictFinder:
         endless: bool = False,
         deep: tuple[str, ...] = (),
     ) -> tuple[list[UsedPart], int]:
-        """What these blocks use, and when the block below them comes."""
         used: list[UsedPart] = []
         for placed in chain:
             if not placed.enabled:
@@ -91,7 +88,7 @@ class ConflictFinder:
             found = self._part(placed)
             if found is not None:
                 used.append(UsedPart(placed, *found, when, endless))
-                when = max(when, LATER)  # it takes its time
+                when = max(when, LATER)  # actions take time
             is_condition = placed.type.partition(":")[0] in _CONDITIONS
             loops = endless or placed.type in _ENDLESS
             for inner in placed.inputs.values():
@@ -107,7 +104,6 @@ class ConflictFinder:
         return used, when
 
     def _part(self, placed: Placed) -> tuple[str, Action] | None:
-        """The robot and what it does, of a block whose action uses a part of a robot that is there."""
         block = self._catalogue.blocks.get(placed.type)
         if block is None or block.robot is None or block.robot.kind != "action":
             return None
@@ -117,26 +113,23 @@ class ConflictFinder:
         return (name, action) if action is not None and action.uses else None
 
     def _order(self, one: Sequence[Placed], other: Sequence[Placed]) -> tuple[str, str] | None:
-        """Which script can come below the end of which."""
         if not self._is_endless(one):
             return other[0].id, one[0].id
         return None if self._is_endless(other) else (one[0].id, other[0].id)
 
     def _is_endless(self, script: Sequence[Placed]) -> bool:
-        """Whether nothing can hang below its last block."""
         block = self._catalogue.blocks.get(script[-1].type)
         return block is None or block.shape == "cap"
 
 
 def _fought_for(first: UsedPart, second: UsedPart) -> Sequence[str]:
-    """The parts for which these two surely fight."""
     if first.robot != second.robot or not _at_same_time(first, second):
         return ()
     if not any(
         winner.action.on_busy == _REPLACES and loser.action.cancellable
         for winner, loser in ((first, second), (second, first))
     ):
-        return ()  # the robot does one after the other by itself
+        return ()  # the robot runs them one after the other
     return [part for part in first.action.uses if part in second.action.uses]
 
 

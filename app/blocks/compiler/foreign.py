@@ -1,4 +1,4 @@
-"""Blocks of Blockly's standard set and of Scratch, and which of ours does the same."""
+"""Blocks of Blockly's standard set and of Scratch, and our equivalents."""
 
 from __future__ import annotations
 
@@ -84,4 +84,4 @@ OURS: Mapping[str, str] = {
     "operator_subtract": "values_arithmetic",
     "sensing_askandwait": "asking_ask",
 }
-"""Our block by the other program's. Types that are also ours are not listed."""
+"""Our block type by the other program's; identical types are not listed."""

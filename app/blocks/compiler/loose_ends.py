@@ -1,4 +1,4 @@
-"""What a program names in one place only: variables that nothing sets, messages that nothing receives."""
+"""Variables that are never set, and broadcasts that are never sent or received."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ _READS, _CHANGES, _RECEIVES = "variables_get", "variables_change", "events_recei
 
 
 class LooseEnds:
-    """Collects, block by block of what will run, what reads and sets, sends and receives."""
+    """Collector of reads, assignments, sends and receives of all blocks that will run."""
 
     def __init__(self) -> None:
-        self._read: dict[str, tuple[Placed, Block]] = {}  # the first block that reads a variable
+        self._read: dict[str, tuple[Placed, Block]] = {}  # first block that reads a variable
         self._set: set[str] = set()
-        self._changed: set[str] = set()  # a number can be counted up from the 0 that it begins with
+        self._changed: set[str] = set()  # counting up from the initial 0 is fine
         self._as_list: set[str] = set()
         self._sent: dict[str, tuple[Placed, Block]] = {}
         self._received: dict[str, tuple[Placed, Block]] = {}
 
     def remember(self, placed: Placed, block: Block) -> None:
-        """Add what this block does."""
+        """Add the reads, assignments, sends and receives of a block."""
         for argument in block.arguments:
             if isinstance(argument, ValueInput) and (argument.check == "List" or argument.variable == "list"):
                 inner = placed.inputs.get(argument.name, ())
@@ -45,7 +45,7 @@ class LooseEnds:
             self._set.add(id)
 
     def tell(self, notes: ProblemCollector, workspace: Workspace) -> None:
-        """Note what has no other end."""
+        """Report names without a counterpart."""
         for id, (placed, block) in self._read.items():
             is_list = id in self._as_list
             if id not in self._set and (is_list or id not in self._changed):
@@ -59,7 +59,6 @@ class LooseEnds:
 
 
 def _variable(placed: Placed) -> str:
-    """The id of the variable that the block names; "" when a file holds something else there."""
     try:
         return str(VariableField("VAR").read(placed.fields.get("VAR")))
     except FieldError:

@@ -1,7 +1,7 @@
-"""Lowering: lists of n items, ifs of n branches and calls of functions become plain blocks.
+"""Lowering: lists of n items, ifs with n branches and function calls are rewritten to plain blocks.
 
-A workspace is rewritten once before it is compiled: each such block gets a type of its own, which the
-catalogue then describes like any other block.
+A workspace is rewritten once before compilation: each such block gets its own type, which the catalogue
+describes like any other block.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _GIVES = {PLAIN: False, RESULT: True}
 
 @dataclass(frozen=True)
 class Function:
-    """A function of the behaviour; ``parameters`` are Python's names by the ids of its inputs."""
+    """Function of the behaviour; ``parameters`` maps the ids of its inputs to Python names."""
 
     placed: Placed
     name: str
@@ -37,12 +37,11 @@ class Function:
 
 
 class Lowering:
-    """What people made: functions, and the ``workspace`` with plain blocks only."""
+    """Functions of a workspace, and the rewritten ``workspace``."""
 
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
-        """Find the functions, describe their calls in the catalogue."""
         self._catalogue = catalogue
-        self.variables = workspace.variables  # without the inputs of functions
+        self.variables = workspace.variables  # excludes inputs of functions
         self._by_id: dict[str, Function] = {}
         for script in workspace.scripts:
             if script[0].type in _GIVES and script[0].enabled:
@@ -53,11 +52,11 @@ class Lowering:
         self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
 
     def function(self, definition: Placed) -> Function | None:
-        """The function that this block defines; None if it is switched off."""
+        """Return the function that this block defines; None if it is disabled."""
         return self._by_id.get(definition.id)
 
     def called(self, placed: Placed) -> Function | None:
-        """The function that this block of the ``workspace`` runs; None for one that runs none."""
+        """Return the function that this block of the ``workspace`` calls, or None."""
         kind = placed.type.partition(":")[0]
         found = self._called(placed) if kind in (CALL, CALL_RESULT) else None
         if found is None:
@@ -66,7 +65,6 @@ class Lowering:
         return next((replace(found, placed=each) for each in definitions if each.id == found.placed.id), None)
 
     def _called(self, placed: Placed) -> Function | None:
-        """By id; a call that came from another behaviour finds a function of the same name."""
         found = self._by_id.get(str(placed.extra.get("function")))
         found = found or self._by_name.get(name_of(placed))
         return None if found is None or (placed.type == CALL_RESULT and not found.gives) else found
@@ -98,7 +96,6 @@ class Lowering:
         return self._as(placed, made)
 
     def _branched(self, placed: Placed, block: Block) -> Placed:
-        """“if … else if … else …” as its plus and minus have made it."""
         branches = Branches.of(placed.extra, has_else=block.argument("ELSE") is not None)
         text, python = block.text.partition("%BODY")[0] + "%BODY", "if %CONDITION:\n    %BODY"
         for number in range(1, branches.else_ifs + 1):
@@ -118,7 +115,6 @@ class Lowering:
         return self._as(placed, made)
 
     def _defined(self, placed: Placed, block: Block) -> Placed:
-        """A definition in words: “to greet name times”."""
         shown = " ".join(each.name for each in inputs_of(placed.extra))
         text = block.text.replace("%NAME", _plain(name_of(placed))).replace("%INPUTS", _plain(shown))
         kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
@@ -168,7 +164,6 @@ def _function(placed: Placed, names: Names) -> Function:
 def _gaps(
     placed: Placed, inputs: tuple[FunctionInput, ...]
 ) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[Placed, ...]]]:
-    """The gaps of a call under names that templates take, and what is in them."""
     gaps: list[tuple[FunctionInput, Argument]] = []
     filled: dict[str, tuple[Placed, ...]] = {}
     for number, (each, gap) in enumerate(Inputs("INPUTS").gaps(inputs)):
@@ -178,5 +173,4 @@ def _gaps(
 
 
 def _plain(words: str) -> str:
-    """Words of people in a block's text, where a per cent sign begins a hole."""
-    return words.replace("%", "％")  # noqa: RUF001 (looks the same, is no hole)
+    return words.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)

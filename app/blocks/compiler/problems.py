@@ -1,4 +1,4 @@
-"""What people should know before Run: the problems of a workspace, in words."""
+"""Problems of a workspace, as sentences shown before Run."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _PARTS = {
     "lights": lazy("the lights"),
     "light": lazy("the light"),
 }
-"""What our robots call their parts; others' parts have the name that their description gives."""
+"""Names of our robots' resources; those of other robots are shown as described."""
 _STARTER = "events_started"
 
 
 class ProblemCollector:
-    """Collects problems while a program is compiled; each block is told of once."""
+    """Collector of problems during compilation; each sentence is reported once per block."""
 
     def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:
         self._catalogue = catalogue
@@ -45,15 +45,15 @@ class ProblemCollector:
         self._problems: dict[tuple[str | None, str], Problem] = {}
 
     def problems(self) -> tuple[Problem, ...]:
-        """All problems, worst first."""
+        """Return all problems, worst first."""
         return tuple(sorted(self._problems.values(), key=lambda problem: _ORDER[problem.severity]))
 
     def label(self, placed: Placed, block: Block | None) -> str:
-        """The words that name a block in a sentence."""
+        """Return the words that name a block in a sentence."""
         return label_of_unknown(placed) if block is None else label(placed, block)
 
     def check_starts(self, starts: int) -> None:
-        """Nothing starts: an empty workspace is no problem, blocks without a start are."""
+        """Report blocks without a start; an empty workspace is fine."""
         if starts or not self._workspace.scripts:
             return
         subject = pgettext("block", "when started")
@@ -64,7 +64,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def unattached(self, placed: Placed, block: Block) -> None:
-        """Blocks that hang under nothing."""
+        """Report blocks that are not below a hat."""
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
             words = _("{block} isn't used. Drag it into an empty slot of another block.")
@@ -75,13 +75,13 @@ class ProblemCollector:
         self._note("info", placed, block, name, sentence.format(block=name, start=start))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
-        """A block where it can't stand; the editor does not let this happen, a file may."""
+        """Report a block in an impossible place; the editor prevents this, but a file may have it."""
         name = self.label(placed, block)
         sentence = _("{block} can't be used here. It is kept but skipped.")
         self._note("warning", placed, block, name, sentence.format(block=name))
 
     def too_deep(self, placed: Placed) -> None:
-        """Nested too deep for Python."""
+        """Report nesting that is too deep for Python."""
         block = self._catalogue.blocks.get(placed.type)
         name = self.label(placed, block)
         self._note(
@@ -92,7 +92,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def no_message(self, placed: Placed, block: Block) -> None:
-        """The message of a script that no message starts."""
+        """Report the message block in a script that no message starts."""
         name = self.label(placed, block)
         self._note(
             "warning", placed, block, name,
@@ -100,20 +100,20 @@ class ProblemCollector:
         )  # fmt: skip
 
     def no_input(self, placed: Placed, block: Block) -> None:
-        """An input of a function outside of it, or one that was taken away."""
+        """Report an input of a function outside of it, or a removed one."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
         sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
         self._note("warning", placed, block, name, sentence)
 
     def undefined(self, placed: Placed, block: Block) -> None:
-        """A call of a function that nobody defined here."""
+        """Report a call of an undefined function."""
         self._note(
             "error", placed, block, self.label(placed, block), block.undefined,
             mend=_("Define it"), mend_action=f"define:{placed.id}",
         )  # fmt: skip
 
     def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
-        """A variable that blocks read and nothing sets: it stays 0, and is no list."""
+        """Report a variable that is read but never set: it stays 0, and is not a list."""
         subject = f"“{name}”"
         self._note(
             "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
@@ -122,7 +122,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def never_received(self, placed: Placed, block: Block, name: str) -> None:
-        """A broadcast that starts nothing."""
+        """Report a broadcast that no script receives."""
         subject = f"“{name}”"
         self._note(
             "warning", placed, block, subject, _("Nothing receives {name}.").format(name=subject),
@@ -130,13 +130,13 @@ class ProblemCollector:
         )  # fmt: skip
 
     def never_sent(self, placed: Placed, block: Block, name: str) -> None:
-        """A script that waits for a broadcast which no block sends."""
+        """Report a script that waits for a broadcast that is never sent."""
         subject = f"“{name}”"
         sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
         self._note("info", placed, block, subject, sentence)
 
     def conflict(self, found: Conflict) -> None:
-        """Two scripts that fight for a part of a robot; it stands at the second one's block."""
+        """Report two scripts that use the same resource of a robot, at the second one's block."""
         placed, name = found.second.placed, found.second.action.title
         part = _PARTS.get(found.part)
         words = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
@@ -156,13 +156,13 @@ class ProblemCollector:
         )  # fmt: skip
 
     def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
-        """A field with something that its block can't use."""
+        """Report an invalid field value."""
         name = self.label(placed, block)
         sentence = _("{block} {what_is_wrong}. It is kept but skipped.")
         self._note("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
-        """Whether nobody here can do this block; then it is noted."""
+        """Report a block that no connected robot supports; return whether it is one."""
         robot = placed.fields.get("ROBOT")
         name = self.label(placed, block)
         skipped = name
@@ -190,7 +190,6 @@ class ProblemCollector:
         return False
 
     def _unknown(self, placed: Placed, name: str) -> None:
-        """A block of a robot, a program or a version that is not here."""
         own = self._catalogue.blocks.get(OURS.get(placed.type, ""))
         prefixes = {each.partition("_")[0] for each in self._catalogue.blocks}
         if placed.type.startswith("robot_"):
@@ -216,14 +215,13 @@ class ProblemCollector:
             self._note("warning", placed, None, name, sentence.format(block=name))
 
     def check_unknown(self) -> None:
-        """Tell of unknown blocks inside blocks that are skipped themselves."""
+        """Report unknown blocks inside blocks that are skipped themselves."""
         told = {id for id, _sentence in self._problems}
         for placed in self._enabled_blocks():
             if placed.type not in self._catalogue.blocks and placed.id not in told:
                 self._unknown(placed, self.label(placed, None))
 
     def _enabled_blocks(self) -> Iterator[Placed]:
-        """Yield the blocks that nobody switched off, in the order of the page."""
         waiting = [placed for script in reversed(self._workspace.scripts) for placed in reversed(script)]
         while waiting:
             placed = waiting.pop()
@@ -233,7 +231,7 @@ class ProblemCollector:
                 waiting += reversed(inner)
 
     def check_names(self) -> None:
-        """Tell of variables whose names the file does not say."""
+        """Report variables whose names are missing in the file."""
         told: set[str] = set()
         for placed in self._enabled_blocks() if self._workspace.nameless else ():
             block = self._catalogue.blocks.get(placed.type)
@@ -253,7 +251,7 @@ class ProblemCollector:
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
-        """Every block of a robot that is not connected, also in scripts and bodies that can't run."""
+        """Return the ids of all blocks of disconnected robots, also in scripts that can't run."""
         return tuple(
             placed.id
             for placed in self._workspace.all_blocks()
@@ -277,10 +275,7 @@ class ProblemCollector:
         return known is not None
 
     def missing(self, placed: Placed, block: Block) -> str | None:
-        """The sentence about a gap with nothing in it, noted.
-
-        None when every gap is filled or has a default.
-        """
+        """Report an empty gap without default and return its sentence; None if there is none."""
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue
@@ -296,7 +291,7 @@ class ProblemCollector:
         return None
 
     def look(self, placed: Placed, block: Block) -> None:
-        """What is worth saying about a block that will run."""
+        """Report hints about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._note(
                 "info", placed, block, self.label(placed, block), self._for_ever(placed, block),
@@ -308,7 +303,7 @@ class ProblemCollector:
             self._check_input(placed, block, action)
 
     def moves(self, placed: Placed, block: Block, topic: str, robots: Sequence[str]) -> None:
-        """A block that moves robots by publishing on their topics."""
+        """Report a block that moves robots by publishing on their topics."""
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
             who, name = listed(real), self.label(placed, block)
@@ -324,13 +319,12 @@ class ProblemCollector:
         return _("{block} waits forever if that never happens.").format(block=name)
 
     def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
-        """What the robot would refuse, as far as it is written in the block."""
         given: dict[str, object] = {}
         for at, name in block.keywords.get("X_INPUT", ()):
             found = _written(placed, block, at)
             if found is not None:
                 given[name] = found
-        # What is wrong without these values too is not these values' fault: they come when the program runs.
+        # Skip problems that exist without these values: the missing ones are computed at run time.
         without = set(action.problems(action.complete({})))
         for problem in action.problems(action.complete(given)):
             if problem not in without:
@@ -371,7 +365,6 @@ def _is_literal(placed: Placed, name: str) -> bool:
 
 
 def _variable(argument: Argument, placed: Placed) -> str:
-    """The id of the variable in a field; "" for a field of another kind, and for what is no variable."""
     if not isinstance(argument, VariableField):
         return ""
     try:
@@ -381,7 +374,7 @@ def _variable(argument: Argument, placed: Placed) -> str:
 
 
 def _written(placed: Placed, block: Block, name: str) -> object:
-    """The plain value that stands in a field or gap; None when it is worked out only when it runs."""
+    # None for a value that is computed at run time.
     argument = block.argument(name)
     if isinstance(argument, Field):
         try:

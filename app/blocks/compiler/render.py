@@ -1,4 +1,4 @@
-"""One tree, two renderings: the program that people read, and the one that runs and tells where it is."""
+"""Rendering of one syntax tree as readable source and as instrumented code that reports its position."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.blocks.model.template import literal
 from nep.system.syntax import parse_module
 
 Marks = Mapping[ast.AST, str]
-"""Which node is the beginning of which block."""
+"""Block ids by the node with which each block begins."""
 
 
 def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
-    """The text for people, and the block of each of its lines that begins one."""
+    """Return the source for people, and the block ids of lines that begin a block."""
     parts: list[str] = []
     for before, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
@@ -32,9 +32,9 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
 def instrumented(
     body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]
 ) -> str:
-    """The text that runs; it changes the tree, so `readable` comes first.
+    """Return the code that runs. Changes the tree, so call `readable` first.
 
-    `numbers` are the blocks that must give a number, `calls` those that run a function.
+    `numbers` are the blocks that must return a number, `calls` those that call a function.
     """
     stepper = _Stepper(marks, numbers, calls)
     steps: list[ast.stmt] = []
@@ -44,14 +44,12 @@ def instrumented(
 
 
 def _gap(before: ast.stmt | None, statement: ast.stmt) -> str:
-    """Blank lines between two statements of a file."""
     if before is None or (isinstance(before, ast.Assign) and isinstance(statement, ast.Assign)):
         return ""
     return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
 
 
 def _together(ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, ast.stmt]]:
-    """The statements of a tree beside those of its text parsed again: both have the same form."""
     for one, other in zip(ours, theirs, strict=True):
         yield one, other
         for name in ("body", "orelse"):
@@ -61,10 +59,10 @@ def _together(ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]) -> Iterator[
 
 
 class _Stepper(ast.NodeTransformer):
-    """Puts ``step(id)`` before each block and at the end of each round of a loop, and a block around values.
+    """Transformer that inserts ``step(id)`` before blocks and at the end of loop rounds, and wraps values.
 
-    The step at a loop's end shows the loop while its condition is looked at, and lets Stop into a loop that
-    is empty.
+    The step at the end of a loop shows the loop while its condition is evaluated, and lets Stop interrupt an
+    empty loop.
     """
 
     def __init__(self, marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
@@ -87,7 +85,7 @@ class _Stepper(ast.NodeTransformer):
         return [_step(id), made]
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
-        """Visit expressions only: statements inside are `statement`'s own matter."""
+        # Visits expressions only; `statement` handles nested statements.
         for name, value in ast.iter_fields(node):
             if isinstance(value, list):
                 if not any(isinstance(item, ast.stmt) for item in value):
@@ -97,7 +95,6 @@ class _Stepper(ast.NodeTransformer):
         return node
 
     def visit(self, node: ast.AST) -> ast.AST:
-        """A value block's expression becomes ``value(id, lambda: …)``: an error in it knows its block."""
         made = self.generic_visit(node)
         id = self._marks.get(node)
         if id is None or not isinstance(made, ast.expr):

@@ -1,6 +1,6 @@
-"""One stack of a behaviour as a program of its own: to try it at once, without the rest.
+"""Single stack of a behaviour as a program, to try it without the rest.
 
-It runs as if it hung below “when started”, with the variables and functions of the behaviour.
+It runs as if it were below “when started”, with the variables and functions of the behaviour.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from app.blocks.model.workspace import saved_blocks
 Saved = Mapping[str, object]
 _HAT = {"type": "events_started", "id": "try hat"}
 SHOW = "try value"
-"""The id of the block that writes a tried value."""
+"""Id of the block that writes a tried value."""
 
 
 @dataclass(frozen=True)
 class Stack:
-    """What a person wants to try: a block of the behaviour by its ``id``, one of the toolbox by ``state``.
+    """Stack to try: a block of the behaviour by its ``id``, or one of the toolbox by ``state``.
 
-    A ``value`` is written, of a ``hat`` the blocks below it are run, any other block with those below it.
+    A ``value`` is written, the blocks below a ``hat`` are run, and any other block with those below it.
     """
 
     id: str
@@ -31,12 +31,12 @@ class Stack:
 
     @property
     def is_value(self) -> bool:
-        """Whether it is a value, which nothing runs."""
+        """True for a value block."""
         return self.kind == "value"
 
     @classmethod
     def from_json(cls, told: object) -> Stack:
-        """What the editor's page tells; what is none is a stack that is nowhere."""
+        """Parse a request of the editor's page; an invalid one refers to no block."""
         known: Saved = told if isinstance(told, Mapping) else {}
         state = known.get("state")
         return cls(
@@ -44,7 +44,7 @@ class Stack:
         )
 
     def workspace(self, behaviour: Saved) -> dict[str, object] | None:
-        """The behaviour with nothing but this stack, and its functions; None when there is no such block."""
+        """Return the behaviour reduced to this stack and its functions; None if the block doesn't exist."""
         made: dict[str, object] = copy.deepcopy(dict(behaviour))
         blocks = made.get("blocks")
         tops = blocks.get("blocks") if isinstance(blocks, dict) else None
@@ -59,12 +59,12 @@ class Stack:
         return made
 
     def type_in(self, behaviour: Saved) -> str:
-        """The type of its first block; "" when there is no such block."""
+        """Return the type of its first block, or "" if it doesn't exist."""
         found = self.state if self.state is not None else self._found(behaviour)
         return str(found.get("type")) if found is not None else ""
 
     def variable_in(self, behaviour: Saved) -> str | None:
-        """The id of the variable whose value it is, and nothing else; None for all others."""
+        """Return the id of the variable whose value it is; None for anything else."""
         found = self.state if self.state is not None else self._found(behaviour)
         if not self.is_value or found is None or found.get("type") != "variables_get":
             return None
@@ -76,7 +76,7 @@ class Stack:
         return next((block for block in saved_blocks(workspace) if block.get("id") == self.id), None)
 
     def _below(self, found: dict[str, object]) -> dict[str, object] | None:
-        """What hangs below the hat: the block and what follows it, of a hat only what follows."""
+        # For a hat only the blocks below it.
         if self.is_value:
             return {"type": "messages_write", "id": SHOW, "inputs": {"VALUE": {"block": found}}}
         if self.kind != "hat":

@@ -1,5 +1,4 @@
-"""What a problem's button does to the blocks: pure functions from one workspace to the next.
+"""Fixes behind the buttons of problems: pure functions from one workspace to the next.
 
-The problems are found by `app.blocks.compiler` and listed, with their buttons, by
-`app.core.documents.problems`.
+`app.blocks.compiler` finds the problems, `app.core.documents.problems` lists them with their buttons.
 """

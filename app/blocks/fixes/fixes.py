@@ -1,4 +1,4 @@
-"""What a problem's button does to the blocks: pure functions from one workspace to the next."""
+"""Fixes behind the buttons of problems: pure functions from one workspace to the next."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from app.blocks.toolbox.catalogue import categories
 LIMIT_S = 10
 LEFT, TOP = 40, 40
 ASIDE = 420
-"""How far to the right of the others a new script stands: most are not wider."""
+"""Horizontal distance of a new script from the others; most are not wider."""
 
 
 def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """The workspace after a problem's ``mend_action``; None for an action that is no matter of blocks.
+    """Return the workspace after a problem's ``mend_action``; None for an action that isn't about blocks.
 
-    ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script that
-    nothing starts, ``define:<id>`` makes the function that a block calls, ``begin:list:<id>`` and
-    ``begin:number:<id>`` set a variable where the behaviour starts, ``receive:<name>`` makes a script that
-    receives a message, ``after:<hat>:<hat>`` hangs the script of the first hat below the end of the second
-    one's.
+    ``limit:<id>`` gives a "wait until" a time limit, ``add:<type>`` puts a block above the first script
+    without a start, ``define:<id>`` creates the function that a block calls, ``begin:list:<id>`` and
+    ``begin:number:<id>`` set a variable at the start of the behaviour, ``receive:<name>`` creates a script
+    that receives a broadcast, ``after:<hat>:<hat>`` moves the script of the first hat to the end of the
+    second one's.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))
@@ -40,7 +40,6 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
 
 
 def _of_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
-    """What makes, begins or joins whole scripts."""
     if verb == "begin":
         kind, _, variable = object_.partition(":")
         return _begun(made, variable, is_list=kind == "list")
@@ -54,7 +53,6 @@ def _of_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, o
 
 
 def _begun(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
-    """The first script that the start of the behaviour starts sets the variable first."""
     empty: dict[str, object] = {"block": {"type": "lists_empty"}}
     zero: dict[str, object] = {"shadow": {"type": "values_number", "fields": {"NUMBER": 0}}}
     setting: dict[str, object] = {
@@ -72,14 +70,12 @@ def _begun(workspace: dict[str, object], variable: str, *, is_list: bool) -> dic
 
 
 def _tops(workspace: dict[str, object]) -> list[object]:
-    """The blocks that hang under nothing, as the workspace holds them."""
     blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
     tops = blocks.setdefault("blocks", []) if isinstance(blocks, dict) else None
     return tops if isinstance(tops, list) else []
 
 
 def _added(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
-    """With one more script, to the right of the others."""
     tops = _tops(workspace)
     places = [top.get("x") for top in tops if isinstance(top, dict)]
     right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - ASIDE)
@@ -95,7 +91,6 @@ def _limit(block: dict[str, object]) -> None:
 
 
 def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
-    """A function with the name and the inputs that the call has."""
     extra = call.get("extraState")
     known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
     placed = Placed("", "", {}, extra=known)
@@ -116,10 +111,8 @@ def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[s
 
 
 def _one_after_other(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
-    """The blocks below one hat come below the end of another script; the hat, which starts nothing, goes.
-
-    ``hats`` are the ids of both with a colon between them; ids have colons in them, too.
-    """
+    # Removes the hat, which then starts nothing. ``hats`` are two ids joined by a colon; ids may contain
+    # colons.
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):
@@ -155,7 +148,6 @@ def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]
 
 
 def _can_follow(block_type: str) -> bool:
-    """Whether a block of this type hangs under others; one that nobody knows is taken for such a block."""
     known = {block.type: block.shape for category in categories() for block in category.blocks}
     if block_type in known:
         return known[block_type] in ("statement", "cap")

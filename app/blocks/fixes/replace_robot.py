@@ -1,4 +1,4 @@
-"""Let another robot do what a behaviour asks of one that is not there: its blocks, for another name."""
+"""Replacement of a disconnected robot in a behaviour by another one."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from app.robots.description.description import Robot
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
-    """Every block that names the robot, the outermost first."""
+    """Return all blocks that name the robot, outermost first."""
     return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
 def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
-    """The types of the blocks that name each robot."""
+    """Return the types of the blocks that name each robot."""
     found: dict[str, set[str]] = {}
     for block in saved_blocks(workspace):
         robot = _robot_of(block)
@@ -27,7 +27,7 @@ def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
 
 
 def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
-    """How many of these blocks name each robot."""
+    """Return the number of these blocks per robot."""
     wanted = frozenset(ids)
     found: dict[str, int] = {}
     for block in saved_blocks(workspace) if wanted else ():
@@ -38,21 +38,21 @@ def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[s
 
 
 def types_of(robot: Robot) -> frozenset[str]:
-    """The types of all blocks of a robot."""
+    """Return the types of all blocks of a robot."""
     return frozenset(block.type for block in robot_blocks(robot, [robot]))
 
 
 def can_do(asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None) -> bool:
-    """Whether a robot can do everything that blocks of these types ask of one of this model.
+    """Return whether a robot supports all blocks of these types for a robot of this model.
 
-    `known` are the types of its own blocks, when they are at hand.
+    `known` are the types of its own blocks, if already known.
     """
     known = types_of(robot) if known is None else known
     return bool(asked) and all(_translated(each, model, robot) in known for each in asked)
 
 
 def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> dict[str, object]:
-    """The workspace in which the robot does what the missing one was asked to do."""
+    """Return the workspace with all blocks of the missing robot changed to another one."""
     made: dict[str, object] = copy.deepcopy(dict(workspace))
     for block in blocks_of(made, missing):
         block["type"] = _translated(str(block.get("type")), model, robot)
@@ -63,7 +63,6 @@ def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: 
 
 
 def _translated(block_type: str, model: str, robot: Robot) -> str:
-    """The same block of the other robot's model."""
     ours, theirs = (type_of(each, "", "", plain=True) for each in (model, robot.model))
     return theirs + block_type.removeprefix(ours) if block_type.startswith(ours) else block_type
 

@@ -1,5 +1,4 @@
-"""Blocks as data: a block's description, its fields and gaps, the workspace they form, the program.
+"""Data model of blocks: block descriptions, fields and gaps, the workspace, the program.
 
-Block, field and category are what plug-ins declare; workspace and program are what the compiler reads and
-makes.
+Plug-ins declare blocks, fields and categories; the compiler reads workspaces and creates programs.
 """

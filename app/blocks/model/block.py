@@ -1,4 +1,4 @@
-"""A block: one description from which come its look in the editor, its Python and its words."""
+"""Block description, from which its appearance in the editor, its Python code and its texts are derived."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
 
 @dataclass(frozen=True)
 class RobotUse:
-    """What a robot's block asks of its robot: which of its actions, sensors or events."""
+    """Action, sensor or event that a robot's block uses."""
 
     kind: Kind
     name: str
@@ -29,12 +29,12 @@ class RobotUse:
 
 @dataclass(frozen=True)
 class Block:
-    """One kind of block.
+    """Kind of block.
 
-    ``text`` is what people read, with ``%NAME`` where an argument stands. ``python`` is a template
-    (`app.blocks.model.template`), or one template for each value of the field ``variant``; for a hat it is
-    the decorator. ``constants`` are values for holes that are no arguments, ``keywords`` are holes that take
-    arguments by name: hole -> (argument, Python's keyword).
+    ``text`` is the text for people, with ``%NAME`` for an argument. ``python`` is a template
+    (`app.blocks.model.template`), or one template per value of the field ``variant``; for a hat it is the
+    decorator. ``constants`` are values of holes that aren't arguments, ``keywords`` are holes that take
+    keyword arguments: hole -> (argument, Python keyword).
     """
 
     type: str
@@ -46,40 +46,38 @@ class Block:
     python: str | Mapping[str, str]
     arguments: tuple[Argument, ...] = ()
     variant: str | None = None
-    check: str | None = None  # what a value is: "Number", "String", or None for anything
+    check: str | None = None  # type of a value: "Number", "String", or None for any
     constants: Mapping[str, object] = field(default_factory=dict)
-    trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are trees already
+    trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are syntax trees
     keywords: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     robot: RobotUse | None = None
-    parameters: tuple[str, ...] = ()  # a hat's: names that its function gets
-    fails: bool = True  # a value's: may its Python raise?
+    parameters: tuple[str, ...] = ()  # hats: parameters of the function
+    fails: bool = True  # values: the Python code may raise
     needs_message: bool = False  # reads the message that started its script
-    publishes: bool = False  # its topics are published on, not listened to
-    python_in_function: str = ""  # its Python inside a function, when that differs
-    mutator: str = ""  # how the editor lets people change its gaps: "items", "branches", "function", "call"
-    extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of that, in the toolbox
-    needs_function: str = ""  # stands only inside a function: "result" or "plain" ones
-    calls: bool = False  # runs blocks of another place
-    undefined: str = ""  # why it can't run: nobody defined what it calls
+    publishes: bool = False  # publishes on its topics instead of subscribing
+    python_in_function: str = ""  # Python code inside a function, if different
+    mutator: str = ""  # how people change its gaps: "items", "branches", "function", "call"
+    extra: Mapping[str, object] = field(default_factory=dict)  # initial extraState in the toolbox
+    needs_function: str = ""  # only allowed in a function: "result" or "plain"
+    calls: bool = False  # runs blocks elsewhere
+    undefined: str = ""  # why it can't run: the function is undefined
     in_toolbox: bool = True
-    about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> its name, more about it
-    help: str = ""  # for people who ask: more than the tooltip, with an example
-    words: str = (
-        ""  # other words that people look for it by, with commas between; after one with ! it comes first
-    )
-    english_words: str = ""  # the English ones, where its words are in another language
+    about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
+    help: str = ""  # longer than the tooltip, with an example
+    words: str = ""  # search words separated by commas; those with ! rank first
+    english_words: str = ""  # English search words, if the language differs
 
     def argument(self, name: str) -> Argument | None:
-        """The argument of that name."""
+        """Return the argument of that name, or None."""
         return next((argument for argument in self.arguments if argument.name == name), None)
 
     @property
     def templates(self) -> tuple[str, ...]:
-        """All its Python templates."""
+        """All Python templates of the block."""
         return (self.python,) if isinstance(self.python, str) else tuple(self.python.values())
 
     def problems(self) -> tuple[str, ...]:
-        """What is wrong with the description itself; empty when it is sound."""
+        """Return the errors of the description itself; empty if it is consistent."""
         known = {argument.name for argument in self.arguments} | {
             *self.constants,
             *self.trees,
@@ -99,9 +97,9 @@ class Block:
         return tuple(found)
 
     def translated(self, say: Say) -> Block:
-        """The same block with the words that `say` gives for its English ones; type and Python stay.
+        """Return the block with its English texts translated by `say`; type and Python stay.
 
-        `say` is called for every word that a person reads: ``tools/words.py`` collects them by it.
+        `say` is called for every text that a person reads: ``tools/words.py`` uses this to collect them.
         """
         words = say(f"words to find {self.type}", self.words) if self.words else ""
         return replace(
@@ -115,7 +113,7 @@ class Block:
         )
 
     def to_blockly(self) -> dict[str, object]:
-        """Blockly's JSON definition; statement inputs stand on lines of their own."""
+        """Return Blockly's JSON definition; statement inputs get their own lines."""
         definition: dict[str, object] = {"type": self.type, "style": self.style, "tooltip": self.tooltip}
         definition.update(_messages(self))
         definition["inputsInline"] = True
@@ -130,7 +128,7 @@ class Block:
         return definition
 
     def to_toolbox(self, fields: Mapping[str, object] | None = None) -> dict[str, object]:
-        """Its entry in the toolbox, with a shadow in each gap that has a default."""
+        """Return the toolbox entry, with a shadow block in each gap that has a default."""
         entry: dict[str, object] = {"kind": "block", "type": self.type}
         if fields:
             entry["fields"] = dict(fields)
@@ -145,12 +143,11 @@ class Block:
 
 
 def _plain(text: str) -> str:
-    """The words between its gaps."""
     return " ".join(_HOLE.sub(" ", text).split())
 
 
 def _messages(block: Block) -> dict[str, object]:
-    """``message0``, ``args0``, ...: a new line after each statement input."""
+    # Starts a new line after each statement input.
     lines: list[tuple[str, list[Mapping[str, object]]]] = [("", [])]
     if block.icon:
         lines[0] = ("%1 ", [{"type": "field_icon", "name": "ICON", "icon": block.icon}])
@@ -168,7 +165,7 @@ def _messages(block: Block) -> dict[str, object]:
             continue
         text, arguments = lines[-1]
         if isinstance(argument, ValueInput) and argument.only is not None:
-            # Words and fields before a gap belong to it and would go with it.
+            # An optional gap must not remove the words and fields before it.
             words = f"{words}%{len(arguments) + 1} "
             arguments = [*arguments, {"type": "input_dummy", "name": f"BEFORE_{argument.name}"}]
         lines[-1] = (f"{text}{words}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])
@@ -187,5 +184,5 @@ def _numbered(lines: Sequence[tuple[str, list[Mapping[str, object]]]]) -> dict[s
 
 
 def _escaped(words: str) -> str:
-    """Words as Blockly's messages want them: a bare per cent sign before a digit would be an argument."""
+    # Blockly would treat a per cent sign before a digit as an argument.
     return words.replace("%", "%%")

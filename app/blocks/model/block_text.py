@@ -1,4 +1,4 @@
-"""Blocks in words: "wait 2 s", "say “Touch my head.”"."""
+"""Blocks as text: "wait 2 s", "say “Touch my head.”"."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _LONGEST = 80
 def reading(
     placed: Placed, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
 ) -> str:
-    """The block with what stands in it.
+    """Return the block with its arguments as one line of limited length.
 
-    `robot` False leaves the robot's name out. One line, never too long.
+    `robot` False omits the robot's name.
     """
     block = blocks.get(placed.type)
     if block is None:
@@ -57,7 +57,7 @@ def reading(
 
 
 def label(placed: Placed, block: Block) -> str:
-    """The words that name a block: "wait until", "is below", "turn"; those before its first gap."""
+    """Return the words that name a block: "wait until", "is below", "turn"; those before its first gap."""
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
     pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words
@@ -75,7 +75,7 @@ def label(placed: Placed, block: Block) -> str:
 
 
 def label_of_type(block_type: str) -> str:
-    """The words for a block that nobody describes: ``robot_nao_do_wave`` is "wave"."""
+    """Return a text for a block without description: ``robot_nao_do_wave`` is "wave"."""
     for verb in ("_do_", "_get_", "_when_"):
         if block_type.startswith("robot_") and verb in block_type:
             return block_type.partition(verb)[2].replace("_", " ")
@@ -83,7 +83,7 @@ def label_of_type(block_type: str) -> str:
 
 
 def label_of_unknown(placed: Placed) -> str:
-    """Return the words on a block that nobody describes, as the editor writes them on its grey block."""
+    """Return the text of a block without description, as on the editor's grey block."""
     if placed.type.startswith("robot_"):
         return label_of_type(placed.type)
     words = re.sub(r"[_\s]+", " ", placed.type).strip()

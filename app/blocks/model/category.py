@@ -1,4 +1,4 @@
-"""A category of the toolbox: a plug-in is one module of `app.blocks.categories` that binds ``CATEGORY``."""
+"""Category of the toolbox: a plug-in is one module of `app.blocks.categories` that binds ``CATEGORY``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.robots.description.description import Robot
 
 @dataclass(frozen=True)
 class ToolboxEntry:
-    """One block in the toolbox, with fields that are set there already."""
+    """Block in the toolbox, with preset fields."""
 
     block: Block
     fields: Mapping[str, object] = field(default_factory=dict)
@@ -20,7 +20,7 @@ class ToolboxEntry:
 
 @dataclass(frozen=True)
 class Group:
-    """A part of the toolbox under a robot's heading: "Speech" with its blocks."""
+    """Part of the toolbox under a robot's heading, such as "Speech"."""
 
     title: str
     icon: str
@@ -30,11 +30,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Category:
-    """Blocks that belong together.
+    """Category of blocks.
 
-    ``order`` is its place in the toolbox, ``button`` words and key of a button above its blocks.
-    ``make`` gives the blocks of a robot (all robots that are known are passed, so that its drop-down can name
-    those of the same model), ``groups`` where they stand under the robot's heading.
+    ``order`` is its position in the toolbox, ``button`` text and key of a button above its blocks. ``make``
+    returns the blocks of a robot (all known robots are passed, whose names fill the drop-down of the same
+    model), ``groups`` their groups under the robot's heading.
     """
 
     name: str
@@ -45,13 +45,13 @@ class Category:
     blocks: tuple[Block, ...] = ()
     button: tuple[str, str] | None = None
     make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
-    dynamic: str = ""  # the editor adds what people made themselves: "functions"
-    headings: Mapping[str, str] = field(default_factory=dict)  # type of a block -> what stands above it
-    within: str = ""  # the category whose blocks these stand among, under their title
+    dynamic: str = ""  # the editor adds user-defined blocks: "functions"
+    headings: Mapping[str, str] = field(default_factory=dict)  # block type -> heading above it
+    within: str = ""  # category that includes these blocks, under their title
     groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
     def translated(self, say: Say) -> Category:
-        """The same with the words that `say` gives for the English ones, see `Block.translated`."""
+        """Return the category with its English texts translated by `say`, see `Block.translated`."""
         button = None if self.button is None else (say(None, self.button[0]), self.button[1])
         return replace(
             self,

@@ -1,6 +1,6 @@
-"""The arguments of blocks: gaps for other blocks, and fields that hold a value themselves.
+"""Arguments of blocks: gaps for other blocks, and fields with a value.
 
-A field reads what a file says (`read`) and gives back a plain value or says in words what is wrong.
+A field reads its saved value (`read`) and returns a plain value, or raises with the reason in words.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Literal
 from nep.i18n import _
 
 Say = Callable[[str | None, str], str]
-"""(context, English) -> what a person reads, see `app.blocks.model.block.Block.translated`."""
+"""(context, English) -> translation, see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -23,39 +23,39 @@ _TOPIC_LIMIT = 200
 
 
 class FieldError(ValueError):
-    """A field holds something that its block can't use; ``str(error)`` is the end of a sentence."""
+    """Field value that its block can't use; the message is the end of a sentence."""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """One place in a block's text; ``name`` is Blockly's name of the field or input."""
+    """Argument in a block's text; ``name`` is Blockly's name of the field or input."""
 
     name: str
 
     @property
     def silent(self) -> bool:
-        """Whether it is for the eye only and has no part in the Python."""
+        """True if it is only displayed and not part of the Python code."""
         return False
 
     def to_blockly(self) -> dict[str, object]:
-        """Its entry in Blockly's ``args``."""
+        """Return its entry in Blockly's ``args``."""
         raise NotImplementedError
 
     def fillings(self) -> dict[str, object]:
-        """What is in its gaps when the block comes out of the toolbox, by the gaps' names."""
+        """Return the initial content of its gaps in the toolbox, by the gaps' names."""
         return {}
 
     def translated(self, say: Say) -> Argument:  # noqa: ARG002 (most have no words)
-        """The same in a person's language: its words and what it holds at first; names and values stay."""
+        """Return the argument with translated texts and initial values; names and values stay."""
         return self
 
 
 @dataclass(frozen=True)
 class ValueInput(Argument):
-    """A gap for a value block; ``default`` is what its shadow block says, None leaves the gap empty.
+    """Gap for a value block; ``default`` is the value of its shadow block, None leaves it empty.
 
-    ``only`` is a field and a value: the gap is there only while the field has that value. ``variable`` is
-    what the toolbox puts into the gap: a variable of that name.
+    ``only`` is a field and a value: the gap exists only while the field has that value. ``variable`` is the
+    name of a variable that the toolbox puts into the gap.
     """
 
     check: Check | None = None
@@ -65,7 +65,7 @@ class ValueInput(Argument):
     variable: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """A value input, with its type check."""
+        """Return a value input with its type check."""
         entry: dict[str, object] = {"type": "input_value", "name": self.name}
         if self.check is not None:
             entry["check"] = self.check
@@ -74,17 +74,17 @@ class ValueInput(Argument):
         return entry
 
     def is_there(self, fields: Mapping[str, object]) -> bool:
-        """Whether the gap is there, with these saved fields."""
+        """Return whether the gap exists with these saved fields."""
         return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
 
     def translated(self, say: Say) -> Argument:
-        """What is in the gap at first."""
+        """Return the gap with its initial content translated."""
         variable = None if self.variable is None else say("variable", self.variable)
         default = say("example", self.default) if isinstance(self.default, str) else self.default
         return replace(self, variable=variable, default=default)
 
     def fillings(self) -> dict[str, object]:
-        """A variable, or a shadow block."""
+        """Return a variable block, or a shadow block."""
         if self.variable is not None:
             variable = {"VAR": {"name": self.variable, "type": ""}}
             return {self.name: {"block": {"type": "variables_get", "fields": variable}}}
@@ -92,7 +92,7 @@ class ValueInput(Argument):
         return {} if shadow is None else {self.name: {"shadow": shadow}}
 
     def shadow(self) -> dict[str, object] | None:
-        """The shadow block that fills the gap until somebody puts a block in."""
+        """Return the shadow block that fills the empty gap."""
         if self.default is None or isinstance(self.default, bool):
             return None
         if isinstance(self.default, str):
@@ -102,32 +102,32 @@ class ValueInput(Argument):
 
 @dataclass(frozen=True)
 class StatementInput(Argument):
-    """A gap for statements."""
+    """Gap for statements."""
 
     def to_blockly(self) -> dict[str, object]:
-        """A statement input."""
+        """Return a statement input."""
         return {"type": "input_statement", "name": self.name}
 
 
 @dataclass(frozen=True)
 class Field(Argument):
-    """A value that stands in the block itself."""
+    """Value in the block itself."""
 
     def read(self, saved: object) -> object:
-        """The plain value of what a file says; FieldError if the block can't use it."""
+        """Return the plain value of a saved one. Raises FieldError if it is invalid."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class NumberField(Field):
-    """A number typed into the block."""
+    """Number typed into the block."""
 
     value: float = 0
     minimum: float | None = None
     maximum: float | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Blockly's number field."""
+        """Return Blockly's number field."""
         entry: dict[str, object] = {"type": "field_number", "name": self.name, "value": self.value}
         if self.minimum is not None:
             entry["min"] = self.minimum
@@ -136,7 +136,7 @@ class NumberField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """A finite number inside the limits; text that reads as one is taken too."""
+        """Return a finite number within the limits; text that contains one is accepted."""
         number = _number(self.value if saved is None else saved)
         if self.minimum is not None and number < self.minimum:
             raise FieldError(_("needs a number of at least {minimum:g}").format(minimum=self.minimum))
@@ -152,30 +152,30 @@ class TextField(Field):
     value: str = ""
 
     def to_blockly(self) -> dict[str, object]:
-        """Blockly's text field."""
+        """Return Blockly's text field."""
         return {"type": "field_input", "name": self.name, "text": self.value}
 
     def translated(self, say: Say) -> Argument:
-        """The text that it holds at first."""
+        """Return the field with its initial text translated."""
         return replace(self, value=say("example", self.value))
 
     def read(self, saved: object) -> object:
-        """Any text."""
+        """Return the text."""
         return self.value if saved is None else str(saved)
 
 
 @dataclass(frozen=True)
 class ChoiceField(Field):
-    """A drop-down. ``options`` are (words, value) pairs; values are plain values, Blockly sees them as text.
+    """Drop-down. ``options`` are (text, value) pairs; Blockly stores the values as text.
 
-    ``source`` says where the editor finds more of them ("robots:<model>"); then any text is taken.
+    ``source`` is where the editor finds more options ("robots:<model>"); then any text is valid.
     """
 
     options: tuple[tuple[str, object], ...] = ()
     source: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Our drop-down, which keeps a value that is not among its options."""
+        """Return our drop-down, which keeps a value that is not among its options."""
         entry: dict[str, object] = {
             "type": "field_choice",
             "name": self.name,
@@ -186,7 +186,7 @@ class ChoiceField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """The chosen value; FieldError if it is none of the options."""
+        """Return the chosen value. Raises FieldError if it is not an option."""
         if saved is None and self.options:
             return self.options[0][1]
         for _words, value in self.options:
@@ -197,28 +197,28 @@ class ChoiceField(Field):
         raise FieldError(_("has no option “{saved}”").format(saved=saved))
 
     def translated(self, say: Say) -> Argument:
-        """What people choose from, unless these are names of robots."""
+        """Return the field with translated options, except names of robots."""
         if self.source is not None:
             return self
         return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
 
     def words(self, value: object) -> str:
-        """What people read for a value."""
+        """Return the text of a value."""
         return next((words for words, option in self.options if option == value), str(value))
 
 
 @dataclass(frozen=True)
 class TopicField(Field):
-    """A topic's name, typed or chosen from those that are live."""
+    """Name of a topic, typed or chosen from the live ones."""
 
     value: str = "/blackboard"
 
     def to_blockly(self) -> dict[str, object]:
-        """Our topic field."""
+        """Return our topic field."""
         return {"type": "field_topic", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
-        """A valid topic name (`WIRE`: no white space, control characters or "{", 1 to 200 bytes)."""
+        """Return a valid topic name (`WIRE`: no white space, control characters or "{", 1 to 200 bytes)."""
         topic = self.value if saved is None else str(saved)
         if not topic:
             raise FieldError(_("needs the name of a topic"))
@@ -231,20 +231,20 @@ class TopicField(Field):
 
 @dataclass(frozen=True)
 class BroadcastField(Field):
-    """The name of a message that scripts of one behaviour send each other; chosen, or a new one typed."""
+    """Name of a broadcast within one behaviour, chosen or typed."""
 
     value: str = "start"
 
     def to_blockly(self) -> dict[str, object]:
-        """Our drop-down of the names that are used in the behaviour."""
+        """Return our drop-down of the broadcast names of the behaviour."""
         return {"type": "field_broadcast", "name": self.name, "value": self.value}
 
     def translated(self, say: Say) -> Argument:
-        """The name that it holds at first."""
+        """Return the field with its initial name translated."""
         return replace(self, value=say("example", self.value))
 
     def read(self, saved: object) -> object:
-        """A name on one line; spaces around it do not count."""
+        """Return a name on one line, without surrounding spaces."""
         name = " ".join((self.value if saved is None else str(saved)).split())
         if not name:
             raise FieldError(_("needs the name of a message"))
@@ -253,32 +253,32 @@ class BroadcastField(Field):
 
 @dataclass(frozen=True)
 class PathField(Field):
-    """The path of a field inside a topic's messages, such as ``faces.0.name``; typed or chosen."""
+    """Path of a field in a topic's messages, such as ``faces.0.name``, typed or chosen."""
 
     value: str = "value"
     topic: str = "TOPIC"
 
     def to_blockly(self) -> dict[str, object]:
-        """Our topic field in its second role: it suggests fields of the topic that ``of`` names."""
+        """Return our topic field in its second role: it suggests fields of the topic in ``of``."""
         return {"type": "field_topic", "name": self.name, "value": self.value, "of": self.topic}
 
     def read(self, saved: object) -> object:
-        """Any text; empty is the whole message."""
+        """Return the path; empty means the whole message."""
         return self.value if saved is None else str(saved)
 
 
 @dataclass(frozen=True)
 class ColourField(Field):
-    """A colour, "#rrggbb"."""
+    """Colour, "#rrggbb"."""
 
     value: str = "#37b6ff"
 
     def to_blockly(self) -> dict[str, object]:
-        """Our colour chip."""
+        """Return our colour chip."""
         return {"type": "field_colour_chip", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
-        """Six digits after a number sign."""
+        """Return a number sign and six digits."""
         colour = self.value if saved is None else str(saved)
         if not _COLOUR.fullmatch(colour):
             raise FieldError(_("needs a colour"))
@@ -287,20 +287,20 @@ class ColourField(Field):
 
 @dataclass(frozen=True)
 class VariableField(Field):
-    """One of the behaviour's variables; the compiler looks its name up."""
+    """Variable of the behaviour; the compiler resolves its name."""
 
     value: str = "count"
 
     def to_blockly(self) -> dict[str, object]:
-        """Blockly's own variable field."""
+        """Return Blockly's variable field."""
         return {"type": "field_variable", "name": self.name, "variable": self.value}
 
     def translated(self, say: Say) -> Argument:
-        """The variable's name at first."""
+        """Return the field with the initial name translated."""
         return replace(self, value=say("variable", self.value))
 
     def read(self, saved: object) -> object:
-        """The variable's id; Blockly saves ``{"id": …}``, older files a name."""
+        """Return the variable's id; Blockly saves ``{"id": …}``, older files a name."""
         if isinstance(saved, Mapping):
             saved = saved.get("id", saved.get("name"))
         if not isinstance(saved, str) or not saved:
@@ -310,24 +310,23 @@ class VariableField(Field):
 
 @dataclass(frozen=True)
 class LiveField(Field):
-    """Shows a sensor's newest value; the editor fills it, files do not hold it."""
+    """Display of a sensor's newest value, filled by the editor and not saved."""
 
     @property
     def silent(self) -> bool:
-        """It has no part in the Python."""
+        """True: it is not part of the Python code."""
         return True
 
     def to_blockly(self) -> dict[str, object]:
-        """Our live field."""
+        """Return our live field."""
         return {"type": "field_live", "name": self.name}
 
-    def read(self, saved: object) -> object:  # noqa: ARG002 (whatever a file says)
-        """Nothing."""
+    def read(self, saved: object) -> object:  # noqa: ARG002 (saved values are ignored)
+        """Return None."""
         return None
 
 
 def _key(value: object) -> str:
-    """A value as Blockly's drop-downs hold it: text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value)
@@ -346,10 +345,10 @@ def _number(saved: object) -> int | float:
 
 
 def robot_field(model: str, names: Sequence[str]) -> ChoiceField:
-    """The drop-down with which a robot's block starts: all robots of its model."""
+    """Return the drop-down of all robots of a model, with which a robot's block starts."""
     return _robot_field(model, tuple(names))
 
 
-@lru_cache(maxsize=64)  # all blocks of all robots of a model have the same one
+@lru_cache(maxsize=64)  # shared by all blocks of all robots of a model
 def _robot_field(model: str, names: tuple[str, ...]) -> ChoiceField:
     return ChoiceField("ROBOT", tuple((name, name) for name in names), source=f"robots:{model}")

@@ -1,4 +1,4 @@
-"""Names for a program: what people call things, as names that Python takes, each given out once."""
+"""Unique Python names derived from texts of people."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ _GAPS = re.compile(r"\W+")
 
 
 class Unique:
-    """Hands out each text once: one that is taken gets a number behind it, from 2 on."""
+    """Generator of unique texts: duplicates get a number, from 2 on."""
 
     def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
-        """`before_number` stands between text and number; `taken` are given out already."""
         self._before_number = before_number
         self._taken = set(taken)
-        self._next: dict[str, int] = {}  # the number to go on with: 4000 scripts may have one name
+        self._next: dict[str, int] = {}  # next number to try: 4000 scripts may share a name
 
     def of(self, text: str) -> str:
-        """The text, or the first of its numbers that nobody has."""
+        """Return the text, or the text with the first free number."""
         made, number = text, self._next.get(text, 2)
         while made in self._taken:
             made, number = f"{text}{self._before_number}{number}", number + 1
@@ -31,18 +30,14 @@ class Unique:
 
 
 class Names:
-    """Hands out names; each one once."""
+    """Generator of unique Python names."""
 
     def __init__(self, taken: frozenset[str]) -> None:
-        """`taken` are names that the program has already, besides Python's own."""
         self._unique = Unique("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
     def new(self, words: str, otherwise: str) -> str:
-        """A name that reads like `words`, such as ``when_started_2``.
-
-        `otherwise` when nothing is left of them.
-        """
-        # Python compares names in this form: two that look different must not become one.
+        """Return a name similar to `words`, such as ``when_started_2``, or `otherwise` if nothing remains."""
+        # Python normalizes names to NFKC: different names must stay different.
         plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
         if not plain.isidentifier():
             longer = f"{otherwise}_{plain}"

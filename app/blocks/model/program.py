@@ -1,4 +1,4 @@
-"""What the compiler makes: a program, and what people should know about it."""
+"""Result of the compiler: a program and its problems."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Severity = Literal["error", "warning", "info"]
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that a person should know before Run.
+    """Problem shown before Run.
 
-    ``sentence`` holds ``subject``, which is shown bold. ``category`` is the style of the block's colour,
-    ``icon`` its icon. ``mend`` are a button's words, ``mend_action`` what it does (`app.blocks.fixes.fixes`,
-    or ``connect:<robot>``). An error means: the program would stop with this sentence at that block.
+    ``sentence`` contains ``subject``, which is shown bold. ``category`` is the style of the block's colour,
+    ``icon`` its icon. ``mend`` is a button's text, ``mend_action`` its effect (`app.blocks.fixes.fixes`, or
+    ``connect:<robot>``). An error means that the program would stop with this sentence at that block.
     """
 
     severity: Severity
@@ -30,9 +30,9 @@ class Problem:
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a behaviour: the editor's ``id``, its ``name``, and what it is called in ``python``.
+    """Variable of a behaviour: the editor's ``id``, its ``name``, and its name in ``python``.
 
-    Nothing when no script that can start uses it.
+    ``python`` is empty if no script that can start uses it.
     """
 
     id: str
@@ -42,14 +42,14 @@ class Variable:
 
 @dataclass(frozen=True)
 class Program:
-    """A behaviour as a program.
+    """Compiled behaviour.
 
-    ``source`` is for people, and runs as a file; ``lines`` gives the block of a line of it. ``runnable`` is
-    the same tree with a ``step`` before each block. ``robots`` are those that its blocks name and that are
-    there, and those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are
-    (robot, name). ``actions`` are what its blocks ask of each robot, None when that can't be told: then it
-    may be anything. ``readings`` are the blocks in words ("wait 2 s"), ``labels`` the words that name them
-    ("wait"). ``variables`` are the behaviour's: its scripts share them.
+    ``source`` is for people and runs as a file; ``lines`` maps its lines to blocks. ``runnable`` is the same
+    tree with a ``step`` before each block. ``robots`` are the connected robots that its blocks name, and
+    those that it moves by publishing on their topics (``moves``); ``sensors`` and ``events`` are (robot,
+    name). ``actions`` are the actions requested of each robot, None if that is not statically known.
+    ``readings`` are the blocks as text ("wait 2 s"), ``labels`` the words that name them ("wait").
+    ``variables`` are shared by its scripts.
     """
 
     name: str
@@ -66,19 +66,19 @@ class Program:
     readings: Mapping[str, str] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[Variable, ...] = ()
-    breakpoints: tuple[str, ...] = ()  # the blocks before which it pauses
-    shows_value: bool = False  # it is a value that a person tries: what it writes is said as people read it
+    breakpoints: tuple[str, ...] = ()  # blocks with breakpoints
+    shows_value: bool = False  # it shows a tried value in short form
     problems: tuple[Problem, ...] = ()
-    starts: int = 0  # how many scripts something can start
-    absent: tuple[str, ...] = ()  # the blocks of robots that are not connected, whether they would run or not
+    starts: int = 0  # number of scripts that can start
+    absent: tuple[str, ...] = ()  # blocks of disconnected robots, also in scripts that can't run
 
     @property
     def errors(self) -> tuple[Problem, ...]:
-        """The problems at which the program would stop."""
+        """Problems at which the program would stop."""
         return tuple(problem for problem in self.problems if problem.severity == "error")
 
     def to_json(self) -> dict[str, object]:
-        """What a child process needs to run it, as JSON can hold it."""
+        """Return the JSON form of what a child process needs to run it."""
         kept = asdict(self)
         for name in ("source", "lines", "problems", "absent", "actions"):
             del kept[name]
@@ -86,7 +86,7 @@ class Program:
 
     @classmethod
     def from_json(cls, saved: Mapping[str, object]) -> Program:
-        """The program that `to_json` wrote; KeyError or TypeError if something else wrote it."""
+        """Restore a program from `to_json`. Raises KeyError or TypeError for other data."""
         return cls(
             name=str(saved["name"]),
             source="",

@@ -1,4 +1,4 @@
-"""From the words of a robot's description to the parts of a block."""
+"""Conversion of texts and parameters of a robot description to parts of a block."""
 
 from __future__ import annotations
 
@@ -24,13 +24,12 @@ _NUMBERS = ("number", "integer", "angle")
 
 
 class TextParts:
-    """A description's text with the names of a block's arguments in it.
+    """Text of a description with the names of block arguments in it.
 
-    ``arguments`` gives the block's name for each parameter, ``shown`` are the parameters that the text has.
+    ``arguments`` maps parameters to argument names, ``shown`` are the parameters in the text.
     """
 
     def __init__(self, text: str, parameters: Sequence[str]) -> None:
-        """Take "%robot say %text" apart."""
         self.arguments: dict[str, str] = {}
         taken = set(_RESERVED)
         for name in parameters:
@@ -45,7 +44,7 @@ class TextParts:
 
     def _place(self, match: re.Match[str]) -> str:
         name = "ROBOT" if match[1] == "robot" else self.arguments.get(match[1])
-        # An unknown place is left out, it would read as an argument of ours; so is one that comes twice.
+        # Drop unknown placeholders, which would be read as block arguments, and duplicates.
         if name is None or name in self._placed:
             return ""
         self._placed.add(name)
@@ -53,16 +52,16 @@ class TextParts:
 
 
 def type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
-    """The block type: ``robot_pepper_do_say``.
+    """Return a block type such as ``robot_pepper_do_say``.
 
-    A plain one, ``robot_pepper_changes``, is no part of a robot's.
+    A `plain` one, ``robot_pepper_changes``, belongs to no action, sensor or event.
     """
     middle = "" if plain else f"{verb}_"
     return f"robot_{_word(model)}_{middle}{_word(name)}"
 
 
 def input_of(parameter: Parameter, name: str) -> Argument:
-    """The gap or field for an action's parameter."""
+    """Return the gap or field for an action's parameter."""
     default = parameter.default
     if parameter.kind in _NUMBERS:
         number = default if isinstance(default, (int, float)) else (parameter.minimum or 0)
@@ -72,12 +71,12 @@ def input_of(parameter: Parameter, name: str) -> Argument:
     if isinstance(default, (list, tuple, Mapping)):
         return ValueInput(name, None, to_words(default))
     text = default if isinstance(default, str) else ""
-    # Whatever is put in becomes text: a number, the newest value of a topic.
+    # Any value is accepted and converted to text.
     return ValueInput(name, None, text)
 
 
 def field_of(parameter: Parameter | None, name: str) -> Field:
-    """The field for a parameter whose values are known, or for an event's filter."""
+    """Return the field for a parameter with known values, or for an event's filter."""
     if parameter is None:
         return TextField(name)
     default = parameter.default
@@ -101,7 +100,7 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
 
 
 def about(parameter: Parameter) -> str:
-    """More about a parameter than its kind: its limits, its unit."""
+    """Return the limits and unit of a parameter as text."""
     unit = f" {pretty_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else pretty_number(parameter.minimum)
     high = None if parameter.maximum is None else pretty_number(parameter.maximum)

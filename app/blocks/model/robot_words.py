@@ -1,4 +1,4 @@
-"""Other words by which people look for the blocks of robots, whatever each robot calls them."""
+"""Search words for robot blocks, independent of each robot's names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 class _Ability(NamedTuple):
-    """What robots can do or tell: parts of names that mean it, and the words that find it."""
+    """Kind of action or sensor: name parts that identify it, and its search words."""
 
     names: frozenset[str]
     words: str
@@ -271,7 +271,7 @@ _USES: Mapping[str, str] = {
     "camera": "photo",
     "audio": "sound",
 }
-"""What most of those do that use this part of a robot, when their name says nothing."""
+"""Ability by the resource of an action whose name is not recognized."""
 
 CHANGES = plazy("words to find “when … changes”", "sensor, change, new value, whenever, event, update")
 PASSES = plazy(
@@ -281,27 +281,30 @@ PASSES = plazy(
 
 
 class SearchWords(NamedTuple):
-    """Words in the language of now, and in English where that is another one."""
+    """Search words in the current language, and in English if that differs."""
 
     words: str
     english: str
 
 
 def words_of_action(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
-    """By what an action is found: `names` are its name, title and types, `uses` what it makes busy."""
+    """Return the search words of an action.
+
+    `names` are its name, title and types, `uses` its resources.
+    """
     parts = _parts(names)
     found = _among(_DOES, parts) or [_DOES[_USES[part]] for part in uses if part in _USES]
     return _found(parts, found)
 
 
 def words_of_sensor(names: Iterable[str]) -> SearchWords:
-    """By what a sensor or an event is found."""
+    """Return the search words of a sensor or event."""
     parts = _parts(names)
     return _found(parts, _among(_TELLS, parts))
 
 
 def in_both(english: str) -> SearchWords:
-    """These words in the language of now, and the English ones."""
+    """Return these words in the current language and in English."""
     return SearchWords(gettext(english), "" if language() == ENGLISH else str(english))
 
 

@@ -1,10 +1,10 @@
-"""Python templates: text with ``%HOLES``, parsed once, filled with syntax trees.
+"""Python templates: text with ``%HOLES``, parsed once and filled with syntax trees.
 
-A template is written by us, in a category. What comes out of a file only ever goes into its holes, as a tree
-(`literal`), never as text: so no text of a file can become code.
+Templates are written in categories, by us. Values from files only go into holes as trees (`literal`), never
+as text, so no text of a file can become code.
 
-``%NAME`` where an expression may stand takes an expression, ``%NAME`` alone on a line takes statements,
-``**%NAME`` takes keyword arguments.
+``%NAME`` in an expression takes an expression, ``%NAME`` alone on a line takes statements, ``**%NAME`` takes
+keyword arguments.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ Node = TypeVar("Node", bound=ast.AST)
 
 
 def literal(value: object) -> ast.expr:
-    """The expression for a plain value (None, bool, int, float, str, lists and dicts of them).
+    """Return the expression for a plain value (None, bool, int, float, str, lists and dicts of them).
 
-    ValueError for anything else, and for numbers that are not finite.
+    Raises:
+        ValueError: The value has another type, or is not finite.
     """
     if isinstance(value, str) or value is None or isinstance(value, bool):
         return ast.Constant(value)
     if isinstance(value, (int, float)):
         if not math.isfinite(value):
             raise ValueError(f"{value} is not a number that a program can hold")
-        # -1 as one constant would be written "-1 ** 2", which is another number: parse what Python writes.
+        # ast.Constant(-1) would unparse to "-1 ** 2", which differs: parse its repr instead.
         return parse_expression(repr(value)).body
     if isinstance(value, (list, tuple)):
         return ast.List([literal(item) for item in value], ast.Load())
@@ -49,7 +50,7 @@ def statements(
     bodies: Mapping[str, Sequence[ast.stmt]] | None = None,
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> list[ast.stmt]:
-    """The statements of a template with its holes filled; KeyError names a hole that got nothing."""
+    """Return the statements of a template with its holes filled. Raises KeyError for an unfilled hole."""
     filled: list[ast.stmt] = []
     filler = _Filler(expressions, bodies or {}, keywords or {})
     for statement in _parsed(text).body:
@@ -63,7 +64,7 @@ def expression(
     expressions: Mapping[str, ast.expr],
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> ast.expr:
-    """The expression of a template with its holes filled."""
+    """Return the expression of a template with its holes filled."""
     (statement,) = statements(text, expressions, None, keywords)
     if isinstance(statement, ast.Expr):
         return statement.value
@@ -71,7 +72,7 @@ def expression(
 
 
 def holes(text: str) -> frozenset[str]:
-    """The names of a template's holes."""
+    """Return the names of a template's holes."""
     return frozenset(_HOLE.findall(text))
 
 
@@ -81,7 +82,6 @@ def _parsed(text: str) -> ast.Module:
 
 
 def _copied(node: Node) -> Node:
-    """A copy of a tree; ten times as fast as `copy.deepcopy`, which most of a compilation would go to."""
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
@@ -120,7 +120,7 @@ class _Filler(ast.NodeTransformer):
         if name is None:
             return node
         filling = self._expressions[name]
-        # A variable may stand in several holes, read here and written there: each gets a node of its own.
+        # A variable may fill several holes with different contexts: create one node each.
         return ast.Name(filling.id, node.ctx) if isinstance(filling, ast.Name) else filling
 
     def visit_Call(self, node: ast.Call) -> ast.Call:

@@ -1,6 +1,6 @@
-"""A workspace: Blockly's JSON, parsed once into typed blocks.
+"""Workspace: Blockly's JSON parsed into typed blocks.
 
-A file may hold anything. What has not the right form is left out; nothing raises.
+Files may contain anything: invalid parts are dropped, nothing raises.
 """
 
 from __future__ import annotations
@@ -19,33 +19,29 @@ _MANUAL = "MANUALLY_DISABLED"
 
 @dataclass(frozen=True)
 class Placed:
-    """A block as it was placed.
-
-    Its fields as saved, and what is in its inputs (a list: statements follow).
-    """
+    """Placed block: its saved fields, and the blocks in its inputs (statements follow each other)."""
 
     id: str
     type: str
     fields: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, tuple[Placed, ...]] = field(default_factory=dict)
     enabled: bool = True
-    pauses: bool = False  # a person wants the program to pause before it
+    pauses: bool = False  # has a breakpoint
     shadow: bool = False
-    extra: Mapping[str, object] = field(default_factory=dict)  # what the editor keeps of its own shape
-    too_deep: bool = False  # something inside was left out because it is nested too deep
+    extra: Mapping[str, object] = field(default_factory=dict)  # the editor's extraState
+    too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
     def field_id(self, name: str) -> str:
-        """The saved text of a field, "" when it has none."""
+        """Return the saved text of a field, or ""."""
         saved = self.fields.get(name)
         return saved if isinstance(saved, str) else ""
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """All scripts (the blocks that hang together from each top block) and the variables: id -> name.
+    """Scripts (chains of blocks) and variables (id -> name).
 
-    ``nameless`` are the ids of variables that blocks use and whose names the file does not say; they have a
-    placeholder among the names.
+    ``nameless`` are the ids of used variables without a name in the file; they get a placeholder.
     """
 
     scripts: tuple[tuple[Placed, ...], ...]
@@ -53,7 +49,7 @@ class Workspace:
     nameless: frozenset[str] = frozenset()
 
     def all_blocks(self) -> list[Placed]:
-        """Every block, shadows too."""
+        """Return every block, including shadows."""
         found: list[Placed] = []
         waiting = [block for script in self.scripts for block in script]
         while waiting:
@@ -65,7 +61,7 @@ class Workspace:
 
 
 def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
-    """Every block of a saved workspace as it was saved, shadows too, the outermost first."""
+    """Yield every block of a saved workspace, including shadows, outermost first."""
     blocks = saved.get("blocks")
     waiting = deque(_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
     while waiting:
@@ -80,7 +76,7 @@ def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
 
 
 def parse_workspace(saved: Mapping[str, object]) -> Workspace:
-    """The workspace of Blockly's JSON, whatever it holds."""
+    """Parse Blockly's JSON, whatever it contains."""
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     ids = Unique("~")
@@ -93,7 +89,6 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
 
 
 def _with_unlisted(workspace: Workspace) -> Workspace:
-    """Add the variables that blocks use and the list of variables lacks."""
     names = dict(workspace.variables)
     nameless: set[str] = set()
     for block in workspace.all_blocks():
@@ -116,7 +111,7 @@ def _list(saved: object) -> Sequence[object]:
 
 
 def _chain(saved: object, depth: int, ids: Unique, *, shadow: bool) -> tuple[Placed, ...]:
-    """A block and all that follow it; a loop, because a script may be long."""
+    # A loop instead of recursion, because a script may be long.
     chain: list[Placed] = []
     while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
         chain.append(_block(saved, depth, ids, shadow=shadow))
@@ -152,7 +147,6 @@ def _block(saved: Mapping[str, object], depth: int, ids: Unique, *, shadow: bool
 
 
 def _pauses(saved: Mapping[str, object]) -> bool:
-    """Whether its data, which Blockly keeps as text, say ``{"pause": true}``."""
     data = saved.get("data")
     if not isinstance(data, str) or '"pause"' not in data:
         return False
@@ -164,7 +158,7 @@ def _pauses(saved: Mapping[str, object]) -> bool:
 
 
 def is_enabled(saved: Mapping[str, object]) -> bool:
-    """Whether a person switched the block off; other reasons (an absent robot) are ours to judge."""
+    """Return whether the block is enabled by the person; other reasons (an absent robot) are ignored."""
     if saved.get("enabled") is False:
         return False
     return _MANUAL not in _list(saved.get("disabledReasons"))

@@ -1,4 +1,4 @@
-"""A program while it runs, in a process of its own: scripts that take turns, robots, topics, values.
+"""Execution of a program in its own process: scripts that take turns, robots, topics, values.
 
-`child` is the process, `scheduler` decides whose turn it is, and only `network` has sockets.
+`child` is the process, `scheduler` decides which script runs, and only `network` has sockets.
 """

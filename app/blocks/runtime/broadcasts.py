@@ -1,7 +1,7 @@
-"""Broadcasts: a message of a program to itself, which starts the scripts that receive its name.
+"""Broadcasts: messages of a program to itself that start the scripts receiving their name.
 
-A script that still runs when its message comes again begins anew, as in Scratch. All of this is done by the
-script that has the turn (`app.blocks.runtime.scheduler`), so nothing here needs a lock.
+A script that still runs when its broadcast comes again is restarted, as in Scratch. All this is done by the
+script that has the turn (`app.blocks.runtime.scheduler`), so no lock is needed.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from app.blocks.runtime.scheduler import EndScript, Scheduler, Script
 
 
 class Delivery:
-    """One message on its way to one script; `done` when the script has run for it, or never will."""
+    """Broadcast on its way to one script; `done` when the script has run for it, or never will."""
 
     def __init__(self, over: Callable[[], None]) -> None:
         self.done = False
         self._over = over
 
     def end(self) -> None:
-        """It has had its effect, or another one took its place."""
+        """Mark as done: the script has run, or another broadcast replaced this one."""
         if not self.done:
             self.done = True
             self._over()
 
 
 class Receiver:
-    """A script that receives a name: what waits for it."""
+    """Script that receives a broadcast, with its pending delivery."""
 
     def __init__(self, name: str, script: Callable[[], None]) -> None:
         self.name, self.script = name, script
@@ -35,7 +35,7 @@ class Receiver:
         self.runs_in: Script | None = None
 
     def serve(self, scheduler: Scheduler) -> None:
-        """Run the script for each message that comes; only the program's end ends this."""
+        """Run the script for each broadcast until the program ends."""
         self.runs_in = scheduler.me()
         while True:
             scheduler.wait_for(lambda: self.waiting is not None, idle=True)
@@ -43,7 +43,7 @@ class Receiver:
             try:
                 with suppress(EndScript):
                     scheduler.begin()
-                    # Now that it has the turn: the same message may have come again while it waited for it.
+                    # Taken with the turn: the broadcast may have come again while waiting for it.
                     taken, self.waiting = self.waiting, None
                     self.script()
             finally:
@@ -54,15 +54,14 @@ class Receiver:
 
 
 class Broadcasts:
-    """The receivers of one program."""
+    """Receivers of one program."""
 
     def __init__(self, scheduler: Scheduler, began: Callable[[], None], over: Callable[[], None]) -> None:
-        """`began` and `over` are called for each message that is on its way to a script."""
         self._scheduler, self._began, self._over = scheduler, began, over
         self.receivers: list[Receiver] = []
 
     def send(self, name: str) -> tuple[Delivery, ...]:
-        """Start every script that receives the name, or start it anew; how far they are."""
+        """Start or restart every script that receives the name; return the deliveries."""
         return tuple(self._deliver(each) for each in self.receivers if each.name == name)
 
     def _deliver(self, receiver: Receiver) -> Delivery:

@@ -1,13 +1,13 @@
-"""The process of a program: ``python -m app.blocks.runtime.child``. It talks JSON lines with the runner.
+"""Process of a program: ``python -m app.blocks.runtime.child``. It exchanges JSON lines with the runner.
 
-In, one per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node's id},
-"master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
+Input, one object per line: ``{"do": "start", "program": …, "robots": [descriptions], "owners": {robot: node
+id}, "master": …, "name": …, "paused": bool, "pace_s": seconds}``, then ``{"do": "pause" | "go" | "step" |
 "stop"}``, ``{"do": "pace", "pace_s": seconds}`` (slow motion), ``{"do": "variable", "python": name, "value":
-…}`` (a person gives it another value), ``{"do": "breakpoints", "blocks": [ids]}`` (a person marks others),
-``{"do": "answer", "question": number, "text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic:
-[robots]}}`` when robots came or were started anew. Out: ``{"is": "ready" | "running" | "paused" | "error" |
-"warning" | "print" | "variables" | "ask" | "ended", …}``; question 0 of "ask" is none any more. When its
-input ends, the program ends, and its robots are told.
+…}`` (set a variable), ``{"do": "breakpoints", "blocks": [ids]}``, ``{"do": "answer", "question": number,
+"text": …}``, or ``{"do": "robots", "owners": …, "guarded": {topic: [robots]}}`` when robots connected or
+restarted. Output: ``{"is": "ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" |
+"ask" | "ended", …}``; question 0 of "ask" means that no question is open. When the input ends, the program
+ends and its robots are stopped.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from nep.system.crash_trace import say_where_it_crashes
 
 SAMPLE_S = 1 / 30
 VARIABLES_EVERY = 3
-"""Samples between two looks at the variables: ten looks a second."""
+"""Samples between two reads of the variables: ten reads a second."""
 STOP_ANSWER_S = 1.0
 FLUSH_S = 0.03
 LONGEST_LINE = 2000
@@ -51,7 +51,7 @@ LINES_PER_SAMPLE = 50
 
 
 class Out:
-    """The lines to the runner. What the program prints is bounded: long lines are cut, too many left out."""
+    """Output lines to the runner. Printed lines are bounded: long lines are cut, excess lines dropped."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -59,11 +59,11 @@ class Out:
         self._printed: queue.Queue[str] = queue.Queue(LINES_PER_SAMPLE)
         self._left = MOST_LINES
         self.told: Callable[[str], object] = lambda _line: None
-        """Is given each line that the program prints."""
+        """Callback for each line that the program prints."""
         self._dropped = 0
 
     def send(self, kind: str, **content: object) -> None:
-        """One line; when nobody reads any more, nothing."""
+        """Write one line; do nothing if the pipe is closed."""
         line = json.dumps({"is": kind, **content}, default=str)
         with self._lock:
             try:
@@ -73,7 +73,7 @@ class Out:
                 return
 
     def print(self, text: str) -> None:
-        """Keep a line of the program until the next sample."""
+        """Queue a printed line until the next sample."""
         for line in text[: LONGEST_LINE * 4].splitlines() or [""]:
             try:
                 self._printed.put_nowait(line[:LONGEST_LINE])
@@ -82,7 +82,7 @@ class Out:
             self.told(line[:LONGEST_LINE])
 
     def send_printed(self) -> None:
-        """Send what was kept."""
+        """Send the queued lines."""
         while self._left > 0:
             try:
                 self.send("print", text=self._printed.get_nowait())
@@ -104,23 +104,22 @@ class Out:
 
 
 class Printed(io.TextIOBase):
-    """What the program prints, as lines of the protocol."""
+    """Replacement of stdout that sends printed lines to the runner."""
 
     def __init__(self, out: Out) -> None:
         self._out = out
 
     def write(self, text: str) -> int:
-        """One line, without its end."""
+        """Queue one line without its line end."""
         if text.strip("\n"):
             self._out.print(text.strip("\n"))
         return len(text)
 
 
 class Run:
-    """One program from start to end."""
+    """Execution of one program."""
 
     def __init__(self, order: Mapping[str, object], out: Out) -> None:
-        """Parse the order; KeyError, TypeError or AppError if it is none."""
         program = order["program"]
         robots = order["robots"]
         if not isinstance(program, Mapping) or not isinstance(robots, list):
@@ -149,7 +148,7 @@ class Run:
             self._runtime.scheduler.pause()
 
     def orders(self) -> dict[str, Callable[[], None]]:
-        """What can be asked of it while it runs."""
+        """Return the commands that the runner can send without arguments."""
         scheduler = self._runtime.scheduler
         return {
             "pause": self.pause,
@@ -159,38 +158,37 @@ class Run:
         }
 
     def pause(self) -> None:
-        """Hold the scripts, what they wait for, and what robots were left doing."""
+        """Pause the scripts, their waits, and the motions of robots."""
         self._runtime.scheduler.pause()
         if self._network is not None:
             self._network.rest()
 
     def go_on(self) -> None:
-        """Go on with all of it."""
+        """Resume scripts, waits and motions."""
         if self._network is not None:
             self._network.go_on()
         self._runtime.scheduler.go_on()
 
     def _asked(self, question: ProgramQuestion | None) -> None:
-        """A question is to be shown, or none any more."""
         if question is None:
             self._out.send("ask", question=0)
         else:
             self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
 
     def answer(self, order: Mapping[str, object]) -> None:
-        """Somebody has answered."""
+        """Deliver a person's answer to a question."""
         question, words = order.get("question"), order.get("text")
         if isinstance(question, int) and isinstance(words, str):
             self._runtime.questions.answered(question, words)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
-        """Slow motion, or none."""
+        """Set the slow motion; 0 is full speed."""
         pace_s = order.get("pace_s")
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
     def know(self, order: Mapping[str, object]) -> None:
-        """Robots have come, or were started anew and may be moved."""
+        """Update connected robots and the topics that move them."""
         topics = order.get("guarded")
         if isinstance(topics, Mapping):
             self._guard.know({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
@@ -198,13 +196,13 @@ class Run:
             self._network.know(_table(order.get("owners")))
 
     def stop(self) -> None:
-        """End the scripts; `run` then ends at once: who asked for it waits for the robots' answers."""
+        """End the scripts and return from `run` at once: the runner waits for the robots' answers."""
         self._stop_answer_s = 0.0
         self._runtime.scheduler.stop()
         self._runtime.finished.set()
 
     def run(self) -> bool:
-        """Run to the end, also the robots' end; whether no block failed."""
+        """Run until the end and stop the robots; return whether no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.told = partial(node.log.info, "%s")
             silent = self._run_on(node)
@@ -221,7 +219,6 @@ class Run:
         return error is None
 
     def _run_on(self, node: nep.Node) -> tuple[str, ...]:
-        """Run, then tell the robots to stop; the names of those that did not answer."""
         network = Network(
             node,
             self._id,
@@ -251,15 +248,13 @@ class Run:
             names["write"] = self._runtime.show
         self._variables = VariableWatch(names, self._program.variables)
         code = compile(self._program.runnable, "<behaviour>", "exec")
-        exec(code, names)  # noqa: S102 (the compiler's own tree: no text of a file is in it but as a literal)
+        exec(code, names)  # noqa: S102 (the compiler's own tree: texts of files are literals only)
         self._began = time.monotonic()
         self._runtime.start(network, self._robots)
 
     def _step(self, network: Network, block: str) -> None:
-        """A block begins; in slow motion robots do not drive on while it waits for its turn.
-
-        Before one with a breakpoint everything is held, as a person would pause it.
-        """
+        # In slow motion robots must not keep driving while the block waits for its turn. Before a breakpoint
+        # everything is paused.
         if block in self._breakpoints and not self._runtime.scheduler.is_paused:
             self.pause()
         if self._runtime.scheduler.pace_s:
@@ -269,25 +264,23 @@ class Run:
             self._runtime.step(block)
 
     def set_breakpoints(self, order: Mapping[str, object]) -> None:
-        """The blocks before which it pauses from now on."""
+        """Replace the breakpoints."""
         blocks = order.get("blocks")
         if isinstance(blocks, list):
             self._breakpoints = frozenset(map(str, blocks))
 
     def put(self, order: Mapping[str, object]) -> None:
-        """A person gives a variable another value."""
+        """Set a variable on behalf of a person."""
         value = order.get("value")
         if isinstance(value, (str, int, float)):
             self._variables.put(str(order.get("python")), value)
 
     def _send_variables(self) -> None:
-        """Tell the values that have changed."""
         changes = self._variables.changes()
         if changes:
             self._out.send("variables", values=[value.to_json() for value in changes])
 
     def _watch(self) -> None:
-        """Tell 30 times a second what runs, when it changed."""
         runtime, saying, before = self._runtime, self._runtime.saying, None
         looks = itertools.count()
         while not runtime.finished.wait(SAMPLE_S):
@@ -309,18 +302,16 @@ class Run:
                 self._out.send("running", blocks=now.blocks, says=words)
 
     def _send_replaced(self) -> None:
-        """Tell which blocks lost their robot to another script since the last sample."""
         for each in self._runtime.replaced.take_news():
             self._out.send("warning", block=each.block, sentence=each.sentence, count=each.count)
 
 
 def _table(told: object) -> dict[str, str]:
-    """A table of texts; what is none is empty."""
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
 
 
 def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
-    """The runner's orders until its end of the pipe closes; what is none is left out."""
+    """Yield the runner's commands until the pipe closes; invalid ones are ignored."""
     for line in stream:
         try:
             order = json.loads(line)
@@ -331,7 +322,7 @@ def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
 
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Run one program; 0 if it ended well, 1 if not."""
+    """Run one program; return 0 if it ended well, 1 if not."""
     out = Out(stdout or sys.stdout)
     incoming = orders(stdin or sys.stdin)
     sys.stdout = Printed(out)
@@ -369,14 +360,14 @@ def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
         do = obeyed.get(str(order.get("do")))
         if do is not None:
             do()
-    run.stop()  # the runner is gone, or wants us gone
+    run.stop()  # the runner has exited or closed the pipe
 
 
 if __name__ == "__main__":
-    # Ctrl+C in a terminal reaches us too; what it means is for the runner to decide.
+    # Ctrl+C in a terminal also reaches this process; the runner decides what happens.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     say_where_it_crashes()
     code = main()
-    # Scripts may still hang in something of their own; nothing of them is worth waiting for.
+    # Scripts may hang in blocking calls; don't wait for them.
     sys.stderr.flush()
     os._exit(code)

@@ -1,4 +1,4 @@
-"""What went wrong, in a sentence for people."""
+"""Errors of a running program as sentences for people."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ _ANOTHER = lazy("something else")
 
 
 class BehaviourError(AppError):
-    """A block can't go on. ``block`` is its id once it is known.
+    """Error at a block. ``block`` is its id once it is known.
 
-    ``unknown`` says that only a value is missing.
+    ``unknown`` is True if only a value is missing so far.
     """
 
     def __init__(self, sentence: str, block: str | None = None, *, unknown: bool = False) -> None:
-        """Keep the sentence that appears on the block."""
         super().__init__(sentence)
         self.block = block
         self.unknown = unknown
 
 
 def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
-    """The error of a block in words; `label` names the block."""
+    """Convert an exception in a block to a sentence; `label` names the block."""
     if isinstance(error, BehaviourError):
         error.block = error.block or block
         return error
@@ -56,11 +55,10 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
 
 
 def kind(value: object) -> str:
-    """What a value is, in words: "a text"."""
+    """Return the type of a value in words: "a text"."""
     return _(_KINDS.get(type(value).__name__, _ANOTHER))
 
 
 def _kinds(sentence: str) -> str:
-    """The kinds that Python names in its sentence: "a text and a number"."""
     words = [word for quoted, word in _KINDS.items() if f"'{quoted}'" in sentence]
     return listed([_(word) for word in dict.fromkeys(words)]) or _("these values")

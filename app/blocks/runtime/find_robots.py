@@ -1,4 +1,4 @@
-"""The robots that are there: found in the graph by their type, never by a topic's name."""
+"""Discovery of robots in the graph by message type, never by a topic's name."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ MOST_TOLD = 8
 
 
 class Subscription(Protocol):
-    """What is needed of NEP's subscriber."""
+    """Subscriber as needed here."""
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """The next message."""
+        """Return the next message, or None."""
         ...
 
     def close(self) -> None:
-        """Stop subscribing."""
+        """Unsubscribe."""
         ...
 
 
 class GraphNode(Protocol):
-    """What is needed of NEP's node."""
+    """Node as needed here."""
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Who publishes what."""
+        """Return the graph."""
         ...
 
     def new_sub(self, topic: str, msg_type: str = "json") -> Subscription:
-        """A subscriber."""
+        """Return a subscriber."""
         ...
 
 
 @dataclass(frozen=True)
 class FoundRobots:
-    """The robots that are there, by name; ``owners`` are the programs that they are.
+    """Robots found, by name; ``owners`` are their programs.
 
-    ``claims`` say what programs tell of themselves and is not believed, as sentences.
+    ``claims`` are sentences about claims of programs that were rejected.
     """
 
     robots: tuple[Robot, ...] = ()
@@ -68,7 +68,7 @@ class FoundRobots:
 
 @dataclass
 class _Topic:
-    """A description topic: whose it is, and what was heard there."""
+    """Description topic: its owner, and the messages received there."""
 
     subscription: Subscription
     owner: Identity
@@ -88,10 +88,17 @@ def find_robots(
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> FoundRobots:
-    """The robots that announce themselves, each on its own topic, by the program that was first.
+    """Return the robots that announce themselves on their own topics, each by the first program that did.
 
-    With `wanted` it waits until those are there, `timeout_s` at most; else it takes who is there at once.
-    Robots of RIZE announce nothing: those of `known` count as there when somebody listens to their commands.
+    RIZE robots announce nothing: those of `known` count as present if their command topic has a subscriber.
+
+    Args:
+        node: Node for the graph and subscriptions.
+        timeout_s: Maximum wait.
+        wanted: Names to wait for; else the robots present at once are returned.
+        known: Robots known from before.
+        clock: Monotonic clock.
+        wait: Sleep function.
     """
     wait = wait or threading.Event().wait
     until = clock() + timeout_s
@@ -121,7 +128,6 @@ def find_robots(
 
 
 def _follow(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
-    """Subscribe new descriptions; whoever announces one first is the robot while it does so."""
     for topic, info in view.topics.items():
         nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
         if not nodes or (topic not in asked and len(asked) >= MOST_ROBOTS):
@@ -135,7 +141,6 @@ def _follow(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
 
 
 def _hear(each: _Topic, topic: str, senders: Senders) -> None:
-    """Take over what was told on a description topic by the program whose it is."""
     message = each.subscription.receive(SLICE_S if each.robot is None else 0.0)
     while message is not None:
         each.told = [*each.told[1 - MOST_TOLD :], message]
@@ -148,14 +153,13 @@ def _hear(each: _Topic, topic: str, senders: Senders) -> None:
     try:
         robot = announced(newest)
     except (NepError, DescriptionError) as error:
-        each.wrong = f"{topic}: {error}"  # what it said before still counts
+        each.wrong = f"{topic}: {error}"  # the previous description stays valid
         return
     each.wrong = wrong_topic(robot, topic) or ""
     each.robot = None if each.wrong else robot
 
 
 def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobots:
-    """The result, with what is not believed in words; a robot with another one's topics is left out."""
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
         _(

@@ -1,4 +1,4 @@
-"""What Ctrl+C may not cut short: who presses it again and again still hears whether the robots stopped."""
+"""Protection of the final robot stop from Ctrl+C, so that its result is always shown."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["without_interrupts"]
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:
-    """Ctrl+C does nothing meanwhile; what is done here must end by itself."""
+    """Ignore Ctrl+C in the block, which must end by itself."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # no signal is handled in this thread
+        yield  # signals are handled in the main thread only
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

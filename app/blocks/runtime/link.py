@@ -1,4 +1,4 @@
-"""What a running program needs of the network; `app.blocks.runtime.network` is the real one."""
+"""Network interface of a running program, implemented by `app.blocks.runtime.network`."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ STATES = ("accepted", "running", *LAST_STATES)
 
 @dataclass
 class RobotCall:
-    """One command to a robot and what it answered; written by the network's thread, read by a script."""
+    """Command to a robot and its answers; written by the network's thread, read by a script."""
 
     id: str
     robot: str
     action: str
     state: str = "sent"  # then accepted, running, succeeded, failed, canceled
     output: Mapping[str, object] = field(default_factory=dict)
-    feedback: Mapping[str, object] = field(default_factory=dict)  # the newest that said anything
+    feedback: Mapping[str, object] = field(default_factory=dict)  # the newest non-empty one
     error: str = ""
-    began: bool = False  # the robot has begun to do it
-    held: bool = False  # a pause has taken it back
-    waits_for: tuple[str, ...] = ()  # the actions that the robot does first
-    heard_s: float = field(default_factory=time.monotonic)  # when its robot last said anything
+    began: bool = False  # the robot has started it
+    held: bool = False  # canceled by a pause
+    waits_for: tuple[str, ...] = ()  # actions that the robot finishes first
+    heard_s: float = field(default_factory=time.monotonic)  # time of its robot's last answer
 
     @property
     def done(self) -> bool:
-        """Whether the robot has given its last answer."""
+        """True after the robot's final answer."""
         return self.state in LAST_STATES
 
 
 class ProgramLink(Protocol):
-    """Robots and topics, as a program sees them. Callbacks come from the network's thread."""
+    """Robots and topics as a program uses them. Callbacks run in the network's thread."""
 
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        """Call `poke` for each answer and message, `stopped_outside` when somebody else stops a robot."""
+        """Call `poke` for each answer and message, `stopped_outside` when another program stops a robot."""
         ...
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
@@ -45,19 +45,19 @@ class ProgramLink(Protocol):
         ...
 
     def cancel(self, call: RobotCall) -> None:
-        """Take a command back."""
+        """Cancel a command."""
         ...
 
     def sensor(self, robot: str, name: str) -> object:
-        """A sensor's newest value; None until it is known."""
+        """Return a sensor's newest value; None until it is known."""
         ...
 
     def newest(self, topic: str) -> object:
-        """The newest message of a topic; None until there is one."""
+        """Return the newest message of a topic; None until there is one."""
         ...
 
     def publish(self, topic: str, payload: object) -> None:
-        """Send a message."""
+        """Publish a message."""
         ...
 
     def on_sensor(self, robot: str, name: str, told: Callable[[object], None]) -> None:

@@ -1,6 +1,7 @@
-"""What robots go on doing when its command has ended (a speed): a pause holds it, Go on asks for it again.
+"""Motions that continue after their command has ended (a speed): paused and resumed with the program.
 
-So does slow motion while the script that asked for it stays at a block: it would drive too far.
+Slow motion also pauses them while the script that started them stays at a block, because the robot would
+drive too far.
 """
 
 from __future__ import annotations
@@ -20,11 +21,17 @@ class _Motion:
     action: str
     input: Mapping[str, object]
     uses: frozenset[str]
-    script: int  # the thread of the script that asked for it
+    script: int  # thread of the script that started it
 
 
 class Motions:
-    """Remembers motions that were begun; `rest` and `go_on` come from another thread than the answers."""
+    """Tracker of continuing motions. Thread-safe: `rest` and `go_on` run in another thread than the answers.
+
+    Args:
+        stop: Ends everything a robot does.
+        stand: Ends only a robot's motion.
+        invoke: Sends a command again.
+    """
 
     def __init__(
         self,
@@ -32,17 +39,16 @@ class Motions:
         stand: Callable[[Robot], None],
         invoke: Callable[[str, str, Mapping[str, object]], object],
     ) -> None:
-        """`stop` makes a robot end all it does, `stand` only its motion, `invoke` gives a command anew."""
         self._stop, self._stand, self._invoke = stop, stand, invoke
         self._lock = threading.Lock()
-        self._asked: dict[str, _Motion] = {}  # by the id of its command, until it is answered
+        self._asked: dict[str, _Motion] = {}  # by command id, until it is answered
         self._motions: dict[tuple[str, str], _Motion] = {}  # by robot and action
         self._resting = False
-        self._slow: set[int] = set()  # scripts that stay at a block
+        self._slow: set[int] = set()  # scripts waiting at a block
         self._for = threading.local()
 
     def asked(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
-        """A command goes out: what it uses is not in the earlier motion any more."""
+        """Note a new command: its resources no longer belong to an earlier motion."""
         action = robot.action(call.action)
         if action is None:
             return
@@ -57,12 +63,12 @@ class Motions:
                 self._asked[call.id] = motion
 
     def is_motion(self, call: RobotCall) -> bool:
-        """Whether a command that is not answered yet begins a motion."""
+        """Return whether an unanswered command starts a motion."""
         with self._lock:
             return call.id in self._asked
 
     def ended(self, call: RobotCall) -> None:
-        """A command has had its last answer."""
+        """Note the final answer of a command."""
         with self._lock:
             motion = self._asked.pop(call.id, None)
             if motion is None:
@@ -72,13 +78,13 @@ class Motions:
                 return
             self._motions[motion.robot.name, motion.action] = motion
             rests = self._resting
-        if rests:  # a single step of a paused program began it
+        if rests:  # started by a single step of a paused program
             self._stop(motion.robot)
         elif slow:
             self._stand(motion.robot)
 
     def rest(self) -> tuple[str, ...]:
-        """The program is paused: whatever goes on stands still. The names of the robots that are told."""
+        """Stop all motions because the program is paused; return the names of the stopped robots."""
         with self._lock:
             self._resting = True
             moving = {motion.robot.name: motion.robot for motion in self._motions.values()}
@@ -87,7 +93,7 @@ class Motions:
         return tuple(moving)
 
     def go_on(self) -> None:
-        """The program goes on, and so do the motions."""
+        """Resume all motions because the program continues."""
         with self._lock:
             if not self._resting:
                 return
@@ -97,7 +103,7 @@ class Motions:
 
     @contextmanager
     def slow(self) -> Iterator[None]:
-        """The calling script stays at a block in slow motion: what it lets drive stands still meanwhile."""
+        """Stop the calling script's motions while it stays at a block in slow motion."""
         script = self._script()
         with self._lock:
             moving = {
@@ -111,7 +117,7 @@ class Motions:
             if not rests:
                 self._stand(robot)
         yield
-        # Not when the program was stopped meanwhile: then nothing is to drive again.
+        # Not reached if the program was stopped, so that nothing starts again.
         with self._lock:
             self._slow.discard(script)
             rests = self._resting
@@ -128,5 +134,5 @@ class Motions:
                 del self._for.script
 
     def _script(self) -> int:
-        """The script for which this thread asks: its own, but in `go_on`."""
+        # Another script than the thread's own while motions are resumed.
         return getattr(self._for, "script", None) or threading.get_ident()

@@ -1,4 +1,4 @@
-"""Robots and topics of a running program, over NEP. Only a program's own process imports this."""
+"""Network of a running program over NEP: its robots and topics. Imported only in the program's process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
 LOOK_S = 0.2
-"""The master is asked so often at most who sent what came from an unknown publisher."""
+"""Minimum interval of graph queries for unknown publishers."""
 MOST_UNKNOWN = 32
 
 Told = Callable[[object], None]
@@ -34,33 +34,33 @@ _log = logging.getLogger(__name__)
 
 
 class ProgramPublisher(Protocol):
-    """What is needed of NEP's publisher."""
+    """Publisher as needed here."""
 
     def publish(self, payload: object) -> None:
-        """Send one message."""
+        """Publish one message."""
         ...
 
 
 class ProgramNode(Protocol):
-    """What is needed of NEP's node."""
+    """Node as needed here."""
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> ProgramPublisher:
-        """A publisher; without `batch` no message waits for another."""
+        """Return a publisher; without `batch` messages are sent at once."""
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> object:
-        """A subscriber whose messages go to `sink`, in the node's thread."""
+        """Return a subscriber whose messages go to `sink`, in the node's thread."""
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Who is there."""
+        """Return the graph."""
         ...
 
 
 def payload_of(message: Message) -> object:
-    """What a message says; None for one that can't be decoded, which is as good as none."""
+    """Return the payload of a message; None if it can't be decoded."""
     try:
         return message.payload
     except NepError:
@@ -68,23 +68,29 @@ def payload_of(message: Message) -> object:
 
 
 def value_of(payload: object) -> object:
-    """The value in a property's ``{"value": …}``, else all of it."""
+    """Return the value in a property's ``{"value": …}``, else the whole payload."""
     if isinstance(payload, Mapping) and set(payload) == {"value"}:
         return payload["value"]
     return payload
 
 
 def new_id(kind: str) -> str:
-    """An id that nobody else has, with its kind in front."""
+    """Return a unique id with its kind as prefix."""
     return f"{kind}-{uuid.uuid4().hex[:12]}"
 
 
 class Network:
-    """The link of a program. All publishers and subscribers that it needs exist when the constructor returns.
+    """Link of a program. All needed publishers and subscribers exist when the constructor returns.
 
-    `sensors` and `events` are (robot, name), `publishes` and `listens` are topics; others are made at first
-    use. `owners` are the nodes that the robots are, by their names (else who announced one first is it): only
-    what these say counts.
+    Args:
+        node: Node of the program.
+        program: Program id of its commands.
+        robots: Robots of the program.
+        sensors: Used sensors as (robot, name).
+        events: Used events as (robot, name).
+        publishes: Topics to publish on; others are created at first use.
+        listens: Topics to subscribe to; others are created at first use.
+        owners: Node ids by robot name (default: the first node that announced it): only their answers count.
     """
 
     def __init__(
@@ -101,11 +107,11 @@ class Network:
     ) -> None:
         self._node = node
         self.guard = PublishGuard({}, ())
-        """Where the program may not publish."""
+        """Guard of topics on which the program may not publish."""
         self._owners = dict(owners or {})
         self._senders = Senders()
         self._view = GraphView(0, 0)
-        self._judging = threading.Lock()  # answers are taken one after the other
+        self._judging = threading.Lock()  # serializes the handling of answers
         self._unknown = HeldMessages(per_publisher=MOST_UNKNOWN)
         self._asks = threading.Event()
         self._finder: threading.Thread | None = None
@@ -116,7 +122,7 @@ class Network:
         self._robot_of |= {event.topic: robot.name for robot in robots for event in robot.events}
         self._lock = threading.RLock()
         self._calls: dict[str, RobotCall] = {}
-        # stop's id -> robot, and the nodes that must answer
+        # id of a stop -> robot, and nodes that must answer
         self._stops: dict[str, tuple[str, set[str]]] = {}
         self._own_stops: set[str] = set()
         self._newest: dict[str, Message] = {}
@@ -136,7 +142,6 @@ class Network:
     def _open(
         self, parts: Iterable[tuple[str, str]], publishes: Iterable[str], listens: Iterable[str]
     ) -> None:
-        """Make what the program is known to need, know who is there, and begin to say that it lives."""
         for robot in self._robots.values():
             self._meet(robot)
         for name, part in parts:
@@ -145,7 +150,7 @@ class Network:
             self._publisher(topic)
         for topic in listens:
             self._subscribe(topic)
-        with suppress(NepError):  # the master has gone since: what is not known yet is looked for later
+        with suppress(NepError):  # the master is down: owners are resolved later
             self._look()
         for robot in self._robots.values():
             if robot.dialect != "rize":
@@ -161,7 +166,7 @@ class Network:
                 self._node.new_sub(topic, type_, sink=self._answers)
 
     def close(self) -> None:
-        """End the heartbeat; the node is closed by who made it."""
+        """Stop the heartbeat; the node belongs to the caller."""
         self._closed.set()
         self._asks.set()
         self._alive.close()
@@ -169,18 +174,18 @@ class Network:
             self._finder.join(timeout=3.0)
 
     def know(self, owners: Mapping[str, str]) -> None:
-        """A robot was started anew and may move: these nodes are the robots now."""
+        """Update the nodes of robots that were restarted."""
         with self._judging:
             self._owners |= owners
 
     # ---- Link
 
     def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        """Tell of every answer and message, and of stops that are not ours."""
+        """Set the callbacks for answers and messages, and for stops by other programs."""
         self._poke, self._stopped_outside = poke, stopped_outside
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
-        """Send a command; the call changes as answers arrive."""
+        """Send a command; the call is updated as answers arrive."""
         described = self._robots[robot]
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
@@ -193,39 +198,39 @@ class Network:
         return call
 
     def cancel(self, call: RobotCall) -> None:
-        """Take a command back; RIZE robots know no such thing."""
+        """Cancel a command; RIZE robots don't support it."""
         described = self._robots[call.robot]
         if described.dialect != "rize":
             self._send(described, self._command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
-        """The newest value, of a property's ``{"value": …}`` or the object itself."""
+        """Return the newest value, of a property's ``{"value": …}`` or the object itself."""
         topic = self._topic(robot, name)
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else value_of(payload_of(message))
 
     def newest(self, topic: str) -> object:
-        """The newest message, decoded only now."""
+        """Return the newest message, decoded on demand."""
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else payload_of(message)
 
     def publish(self, topic: str, payload: object) -> None:
-        """Send a message as JSON; BehaviourError where that moves a robot that nobody was asked about."""
+        """Publish a message as JSON. Raises BehaviourError if it would move a robot without permission."""
         self.guard.check(topic)
         self._publisher(topic).publish(payload)
 
     def on_sensor(self, robot: str, name: str, told: Told) -> None:
-        """Tell each value of a sensor."""
+        """Call `told` with each value of a sensor."""
         self.on_message(self._topic(robot, name), lambda payload: told(value_of(payload)))
 
     def on_event(self, robot: str, name: str, told: Told) -> None:
-        """Tell the data of each event."""
+        """Call `told` with the data of each event."""
         self.on_message(self._topic(robot, name), told)
 
     def on_message(self, topic: str, told: Told) -> None:
-        """Tell each message."""
+        """Call `told` with each message."""
         with self._lock:
             self._told.setdefault(topic, []).append(told)
         self._subscribe(topic)
@@ -233,25 +238,23 @@ class Network:
     # ---- stopping
 
     def rest(self) -> None:
-        """The program is paused: robots that it left in motion (a speed) stand still until `go_on`."""
+        """Stop robots left in motion (a speed) until `go_on`, because the program is paused."""
         self._motions.rest()
 
     def go_on(self) -> None:
-        """The pause is over: what was in motion is asked for again."""
+        """Resume the motions."""
         self._motions.go_on()
 
     def slow(self) -> AbstractContextManager[None]:
-        """While the calling script stays at a block in slow motion: what it left in motion stands still."""
+        """Stop the calling script's motions while it stays at a block in slow motion."""
         return self._motions.slow()
 
     def _stand(self, robot: Robot) -> None:
-        """Stop a robot that drives; not while it does something else, which a stop would end as well."""
         busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
         if all(self._motions.is_motion(call) for call in busy):
             self._tell_stop(robot)
 
     def _rest(self, robot: Robot) -> None:
-        """Stop one robot; what else it does ends as if the pause had taken it back."""
         for call in list(self._calls.values()):
             call.held = call.held or call.robot == robot.name
         self._tell_stop(robot)
@@ -264,9 +267,9 @@ class Network:
         self._send(robot, self._command(id, "stop", robot.safe_stop.action))
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
-        """Tell every robot to stop and wait; the names of those that are not proven still (RIZE's can't).
+        """Stop all robots and wait; return the names of those not confirmed (RIZE robots never are).
 
-        `stop_words` says what is wrong with each.
+        `stop_words` returns the reason for each.
         """
         self._ending = True
         if timeout_s:
@@ -284,17 +287,17 @@ class Network:
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
     def stop_words(self, name: str) -> str:
-        """What is wrong with the stop of a robot: its own words when it refused, without a full stop."""
+        """Return why a robot's stop is not confirmed, in its own words if it answered; without full stop."""
         return self._refused.get(name) or _("{robot} did not respond").format(robot=name)
 
     def _serving(self, robot: Robot) -> set[str]:
-        """The nodes that must answer a stop: the robot's own, and others that answer its commands."""
+        # The robot's own node, and others that answer its commands, must answer a stop.
         heard = set(hearing(self._view, robot.topics.command))
         others = heard & set(publishing(self._view, robot.topics.answer))
         owner = self._owners.get(robot.name)
         return {owner or "", *others}
 
-    # ---- inside
+    # ---- internals
 
     def _topic(self, robot: str, name: str) -> str:
         described = self._robots[robot]
@@ -317,7 +320,8 @@ class Network:
         self._node.new_sub(topic, sink=self._messages)
 
     def _look(self) -> None:
-        """Ask the master who is there: whose words count. Never in the node's own thread."""
+        # Queries the graph and resolves senders. Never call it in the node's own thread, which it would
+        # block.
         view = self._node.graph()
         topics = {robot.topics.answer for robot in self._robots.values()} | self._robot_of.keys()
         with self._judging:
@@ -333,7 +337,7 @@ class Network:
         self._poke()
 
     def _ask(self) -> None:
-        """Let the master be asked who is there, in a thread of its own."""
+        # Starts the query in a separate thread.
         with self._lock:
             if self._finder is None and not self._closed.is_set():
                 self._finder = threading.Thread(target=self._find, name="program senders", daemon=True)
@@ -341,7 +345,6 @@ class Network:
         self._asks.set()
 
     def _find(self) -> None:
-        """Look for unknown publishers whenever one has answered, until the end."""
         while self._asks.wait() and not self._closed.is_set():
             self._asks.clear()
             with self._errors, suppress(NepError):
@@ -349,10 +352,8 @@ class Network:
             self._closed.wait(LOOK_S)
 
     def _is_robots(self, message: Message) -> bool:
-        """Whether a message on a sensor's or event's topic counts.
-
-        Where the robot's own program publishes, only that does; a camera may be another program.
-        """
+        # If the robot's own program publishes the topic, only its messages count; a camera may be another
+        # program.
         robot = self._robot_of.get(message.topic)
         own = self._owners.get(robot) if robot is not None else None
         if own is None or own not in publishing(self._view, message.topic):
@@ -385,7 +386,7 @@ class Network:
         self._poke()
 
     def _judge(self, message: Message) -> None:
-        """Take an answer; who sent it must be known first. Under `_judging`."""
+        # Call with `_judging` held. The sender must be known before an answer is used.
         node = self._senders.node_of(message)
         native = any(
             robot.dialect != "rize" and robot.topics.answer == message.topic
@@ -396,19 +397,19 @@ class Network:
             self._ask()
             return
         if native and not self._serves(message.topic, node or ""):
-            return  # nothing of it is decoded
+            return  # skip decoding
         payload = payload_of(message)
         if isinstance(payload, Mapping):
             self._answer(message.topic, payload, node or "")
 
     def _serves(self, topic: str, node: str) -> bool:
-        """Whether a node is a robot with this answer topic, or must answer a stop."""
+        # True for a robot's node, and for a node that must answer a stop.
         with self._arrived:
             must_answer = any(node in waiting for _name, waiting in self._stops.values())
         return must_answer or any(self._is_own(robot, topic, node) for robot in self._robots.values())
 
     def _answer(self, topic: str, told: Mapping[str, object], node: str) -> None:
-        """Take an answer of a node: a stop's of all that serve the robot, others only of the robot's own."""
+        # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
         answer = told if "state" in told and "op" in told else rize.from_answer(told)
         if answer is None:
             return
@@ -420,12 +421,12 @@ class Network:
         if answer.get("op") == "stop":
             return
         call = self._calls.get(bounded_str(answer.get("id")))
-        # A cancel is answered with the id of the command it was for; only the command's own answer ends it.
+        # The answer to a cancel has the command's id, but only the command's own answer ends it.
         if call is None or call.done or answer.get("op") not in (None, "invoke"):
             return
         state = bounded_str(answer.get("state"))
         if self._robots[call.robot].topics.answer != topic or state not in STATES:
-            return  # another robot's answer, or no word of a robot
+            return  # another robot's answer, or an invalid state
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
         call.error = said(answer.get("error"))
@@ -440,13 +441,11 @@ class Network:
             self._motions.ended(call)
 
     def _is_own(self, robot: Robot, topic: str, node: str) -> bool:
-        """Whether it is this robot that speaks; robots of RIZE can't be told apart."""
         if robot.topics.answer != topic:
             return False
         return robot.dialect == "rize" or self._owners.get(robot.name) == node
 
     def _hear(self, topic: str) -> None:
-        """A robot has said something: whoever waits for it knows that it lives."""
         now = time.monotonic()
         for call in list(self._calls.values()):
             if self._robots[call.robot].topics.answer == topic:
@@ -459,7 +458,7 @@ class Network:
         robots = [robot.name for robot in self._robots.values() if robot.topics.answer == topic]
         own = [robot.name for robot in self._robots.values() if self._is_own(robot, topic, node)]
         with self._arrived:
-            ours = id in self._own_stops  # also when it is answered twice
+            ours = id in self._own_stops  # also for duplicate answers
             name, waiting = self._stops.get(id, ("", set()))
             if name in robots and node in waiting:
                 if answer["state"] == "failed":

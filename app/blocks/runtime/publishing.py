@@ -1,4 +1,4 @@
-"""Publishing on a robot's own topics is moving that robot: who would be moved, and whether that was asked."""
+"""Protection of topics that move robots: which robots a program's publishing would move."""
 
 from __future__ import annotations
 
@@ -17,20 +17,19 @@ def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
 
 
 def guarded(robots: Iterable[Robot]) -> dict[str, tuple[str, ...]]:
-    """Return the topics with which these robots are moved, each with the names of those that it moves."""
+    """Return the topics that move these robots, with their names."""
     return MovingTopics(map(controls_of, robots)).topics
 
 
 class PublishGuard:
-    """Lets a running program publish anywhere but where it would move a robot that nobody was asked about."""
+    """Guard of a running program: denies publishing that would move a robot without permission."""
 
     def __init__(self, topics: Mapping[str, Collection[str]], allowed: Collection[str]) -> None:
-        """``topics`` move the robots of these names; ``allowed`` are those that a person was asked about."""
         self._allowed = frozenset(allowed)
         self.know(topics)
 
     def know(self, topics: Mapping[str, Collection[str]]) -> None:
-        """These are the robots that are there now."""
+        """Update the connected robots."""
         moved: dict[str, set[str]] = {}
         for topic, names in topics.items():
             for name in names:
@@ -38,7 +37,7 @@ class PublishGuard:
         self._moving = MovingTopics(RobotControls(name, frozenset(each)) for name, each in moved.items())
 
     def check(self, topic: str) -> None:
-        """Raise BehaviourError when a message on this topic would move a robot that is not allowed."""
+        """Raise BehaviourError if a message on this topic would move a robot that is not allowed."""
         names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
         if names:
             who = listed(names)

@@ -1,4 +1,4 @@
-"""Questions of a program to the person in front of it: asked one after the other, in the order of asking."""
+"""Questions of a program to the person in front of it, shown one at a time in order."""
 
 from __future__ import annotations
 
@@ -22,24 +22,23 @@ _NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
 
 @dataclass
 class ProgramQuestion:
-    """One question; ``answer`` is None until somebody answers."""
+    """Question; ``answer`` is None until it is answered."""
 
     id: int
     text: str
     answer: str | None = None
     choices: tuple[str, ...] = ()
-    """What can be chosen; when there is nothing, the answer is typed."""
+    """Possible answers; without any, the answer is typed."""
 
 
 Asked = Callable[[ProgramQuestion | None], None]
-"""Is told which question is to be shown now; None when none is."""
+"""Callback with the question to show now, or None."""
 
 
 class Questions:
-    """What scripts ask and a person answers. Scripts ask; an answer comes from another thread."""
+    """Queue of questions. Scripts ask; answers come from another thread."""
 
     def __init__(self, scheduler: Scheduler, asked: Asked | None) -> None:
-        """`asked` is None where nobody can answer."""
         self._scheduler, self._asked = scheduler, asked
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
@@ -47,15 +46,15 @@ class Questions:
         self.answer: object = ""
 
     def ask(self, words: object) -> None:
-        """Ask and wait for the answer; BehaviourError where nobody can answer."""
+        """Ask and wait for the answer. Raises BehaviourError outside of Studio."""
         if self._asked is None:
             raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
         self.answer = as_value(self._answer_to(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
-        """Ask, with a button for each item of a list; what is chosen is that item, Esc is an empty text.
+        """Ask with a button for each item of a list; the answer is the chosen item, or an empty text for Esc.
 
-        BehaviourError where nobody can answer, and where there is nothing or too much to choose from.
+        Raises BehaviourError outside of Studio, and for an empty or too long list.
         """
         if self._asked is None:
             raise BehaviourError(_("No one can answer: the behaviour runs outside Studio."))
@@ -65,24 +64,22 @@ class Questions:
         self.answer = as_value(value) if isinstance(value, str) else value
 
     def _answer_to(self, words: str, choices: tuple[str, ...] = ()) -> str:
-        """Ask when it is this question's turn, and wait; an empty text when nothing was answered."""
         question = ProgramQuestion(next(self._ids), words[:LONGEST_QUESTION], choices=choices)
         self._change(self._waiting.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
-        finally:  # also when the script ends meanwhile: its question goes
+        finally:  # also if the script ends meanwhile
             self._change(self._waiting.remove, question)
         return question.answer or ""
 
     def answered(self, id: int, words: str) -> None:
-        """Somebody has answered; what was no question any more is nothing."""
+        """Store an answer; ignored if the question is no longer open."""
         with self._lock:
             for question in self._waiting:
                 if question.id == id:
                     question.answer = words[:LONGEST_ANSWER]
 
     def _change(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
-        """Tell which question is the first now, if that is another one."""
         with self._lock:
             before = self._waiting[:1]
             change(question)
@@ -91,7 +88,7 @@ class Questions:
 
 
 def offers(choices: object) -> dict[str, object]:
-    """What is on the buttons, and the item that each stands for: no empty ones, none of them twice."""
+    """Return the items by their button texts, without empty and duplicate ones."""
     if not isinstance(choices, list):
         raise BehaviourError(
             _("A question with choices needs a list of them, not {value}.").format(value=kind(choices))
@@ -112,9 +109,9 @@ def offers(choices: object) -> dict[str, object]:
 
 
 def as_value(words: str) -> str | int | float:
-    """An answer as programs use it: what is typed as a number is one, so it can be counted and compared.
+    """Convert an answer: a typed number becomes a number, so that it can be compared.
 
-    007 stays a text, and so does a number that is longer than a computer keeps exactly.
+    007 stays a text, and so does a number with more digits than a float keeps exactly.
     """
     plain = words.strip()
     if not _NUMBER.fullmatch(plain):

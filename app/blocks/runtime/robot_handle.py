@@ -1,7 +1,7 @@
-"""A robot as a program sees it: do an action and wait for it, read a sensor, begin a script at an event.
+"""Robot as a program uses it: actions, sensors and event scripts.
 
-A pause takes an action back; what is left of it is done when the program goes on. `StatusText` says meanwhile
-what happens now: what a robot does for a block, else the block itself.
+A pause cancels a running action; the rest of it is done when the program continues. `StatusText` describes
+the current activity: a robot's action for a block, else the block itself.
 """
 
 from __future__ import annotations
@@ -29,48 +29,47 @@ FIRST_VALUE_S = 2.0
 LONGEST_S = 60.0
 MARGIN_S = 2.0
 LOOK_S = 0.25
-"""How often a command that is waited for is looked at: has its robot fallen silent, has it begun?"""
+"""Interval at which a pending command is checked: whether its robot is silent, whether it has started."""
 BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
-"""How long a robot may take to end what a pause takes back; its own kit answers within about a second."""
+"""Time a robot has to end an action canceled by a pause; the kit answers within about a second."""
 MOST_KEPT = 64
-"""Commands that are remembered: a robot answers what it has ended before many others were given."""
+"""Number of remembered commands: a robot answers a replaced one soon after."""
 REPLACES = "replace"
 _PLACE = re.compile(r"%([A-Za-z_]\w*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
 LEFT = "to_go"
-"""The feedback with which an action says how much is left, in the unit of one of its parameters."""
+"""Feedback field with the remaining amount, in the unit of one of the action's parameters."""
 
 
 class StatusText:
-    """What happens now, in sentences for the run bar. Scripts tell, another thread reads."""
+    """Sentences about the current activity for the run bar. Written by scripts, read by another thread."""
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:
-        """``block`` is where the calling script is, ``readings`` are the blocks in words."""
         self._block, self._readings = block, readings
         self._told: dict[str | None, str] = {}
         self._warned: dict[str | None, str] = {}
 
     def tell(self, sentence: str) -> None:
-        """What a robot does now for the calling script's block; "" when it is done."""
+        """Set what a robot does for the calling script's block; "" when it is done."""
         _keep(self._told, self._block(), sentence)
 
     def warn(self, sentence: str) -> None:
-        """What a person should know while the calling script is held; "" when it goes on."""
+        """Set a warning while the calling script is paused; "" when it continues."""
         _keep(self._warned, self._block(), sentence)
 
     def says(self, blocks: Sequence[str]) -> str:
-        """The sentence for the run bar: what a robot does now, else the first block in words."""
+        """Return the sentence for the run bar: a robot's activity, else the first block as text."""
         return _first(self._told, blocks) or self.reading(blocks[0] if blocks else None)
 
     def warns(self, blocks: Sequence[str]) -> str:
-        """What a person should know of one of these blocks; "" for nothing."""
+        """Return the warning of one of these blocks, or ""."""
         return _first(self._warned, blocks)
 
     def reading(self, block: str | None) -> str:
-        """A block in words, "" for none."""
+        """Return a block as text; "" for None."""
         return self._readings.get(block or "", "")
 
 
@@ -87,7 +86,7 @@ def _first(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Replacement:
-    """A block's command was ended by that of another script; ``count``: so often in this run."""
+    """Command that was replaced by another script's; ``count`` is how often in this run."""
 
     block: str
     sentence: str
@@ -103,10 +102,10 @@ class _Command:
 
 
 class Replacements:
-    """Whose command took the place of whose: scripts that fight for a part of a robot.
+    """Detector of scripts that replace each other's actions.
 
-    The script that lost goes on with its next block (docs/blocks.md), and a person is told. Scripts tell, one
-    at a time; another thread takes what is new.
+    The script whose action was replaced continues with its next block (docs/blocks.md), and the person is
+    informed. Written by one script at a time, read by another thread.
     """
 
     def __init__(self) -> None:
@@ -116,14 +115,14 @@ class Replacements:
         self._news: dict[tuple[str, str], Replacement] = {}
 
     def asked(self, call: RobotCall, action: Action, block: str | None) -> None:
-        """The calling script gave this command, in this block."""
+        """Note a command of the calling script in this block."""
         self._commands.append(_Command(call, action, block, threading.get_ident()))
 
     def ended(self, call: RobotCall, *, names_robot: bool) -> None:
-        """The robot has ended this command before it was done, and neither a pause nor a stop wanted that.
+        """Note that the robot ended this command early, without a pause or stop.
 
-        Nothing is told unless a later command of another script took its place. ``names_robot``: the
-        sentence says which robot, because there are several.
+        It is reported only if a later command of another script replaced it. With ``names_robot`` the
+        sentence names the robot, because there are several.
         """
         loser = next((each for each in self._commands if each.call is call), None)
         if loser is None or loser.block is None:
@@ -142,7 +141,7 @@ class Replacements:
             self._news[pair] = Replacement(loser.block, said, count)
 
     def take_news(self) -> tuple[Replacement, ...]:
-        """What has happened since this was asked last; what happened several times only with its count."""
+        """Return the replacements since the last call, repeated ones once with their count."""
         with self._lock:
             news, self._news = tuple(self._news.values()), {}
         return news
@@ -157,7 +156,7 @@ def _takes_place(winner: _Command, loser: _Command) -> bool:
 
 
 class ProgramContext(Protocol):
-    """What a robot's handle needs of the program that runs."""
+    """Running program as needed by a robot's handle."""
 
     scheduler: Scheduler
     saying: StatusText
@@ -165,15 +164,15 @@ class ProgramContext(Protocol):
 
     @property
     def robot_count(self) -> int:
-        """How many robots the program has."""
+        """Number of robots of the program."""
         ...
 
     def described(self, name: str) -> Robot:
-        """The description of a robot that is there."""
+        """Return the description of a connected robot."""
         ...
 
     def linked(self) -> ProgramLink:
-        """The network."""
+        """Return the network."""
         ...
 
     def write(self, value: object) -> None:
@@ -181,55 +180,90 @@ class ProgramContext(Protocol):
         ...
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """Begin a script at a robot's event."""
+        """Decorate a script that starts at a robot's event."""
         ...
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """Begin a script at a sensor's change."""
+        """Decorate a script that starts when a sensor changes."""
         ...
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """Begin a script when a sensor passes a limit."""
+        """Decorate a script that starts when a sensor passes a limit."""
         ...
 
 
 class RobotHandle:
-    """``robot("Pepper")``."""
+    """Handle of a robot, returned by ``robot("Pepper")``."""
 
     def __init__(self, name: str, runtime: ProgramContext) -> None:
         self._name = name
         self._runtime = runtime
 
     def do(self, action: str, /, **input: object) -> None:
-        """Let the robot do an action and wait until it is done; BehaviourError with the robot's sentence."""
+        """Run an action and wait until it is done.
+
+        Args:
+            action: Name of the action.
+            input: Its parameters.
+
+        Raises:
+            BehaviourError: The robot can't do it; the message is a sentence for people.
+        """
         self._invoke(action, input)
 
     def ask(self, action: str, field: str, /, **input: object) -> object:
-        """The same for an action that answers: what it says in this field."""
+        """Run an action that returns a result, and return one field of it.
+
+        Args:
+            action: Name of the action.
+            field: Name of the result's field.
+            input: Parameters of the action.
+
+        Raises:
+            BehaviourError: The robot can't do it; the message is a sentence for people.
+        """
         return self._invoke(action, input).output.get(field)
 
     def get(self, sensor: str, field: str | None = None) -> object:
-        """A sensor's newest value, or one field of it; None while it is not known."""
+        """Return a sensor's newest value, or one field of it; None while it is unknown.
+
+        Waits up to 2 s for the first value.
+
+        Args:
+            sensor: Name of the sensor.
+            field: Name of a field of an object sensor.
+        """
         robot = self._runtime.described(self._name)
         link, scheduler = self._runtime.linked(), self._runtime.scheduler
         if robot.sensor(sensor) is None:
             raise BehaviourError(_("{name} has no sensor “{sensor}”.").format(name=self._name, sensor=sensor))
         if link.sensor(self._name, sensor) is None:
-            # Sensors tell their value several times a second: the first one may still be under way.
+            # Sensors publish several times a second: the first value may be in flight.
             scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_S)
         told = link.sensor(self._name, sensor)
         return told if field is None else values.part(told, field)
 
     def on(self, event: str, /, **filters: object) -> Decorator:
-        """The script below runs each time this happens to the robot."""
+        """Decorate a script that runs at each such event of the robot.
+
+        Args:
+            event: Name of the event.
+            filters: Field values that the event must have.
+        """
         return self._runtime.on_event(self._name, event, filters)
 
     def on_change(self, sensor: str) -> Decorator:
-        """The script below runs each time the sensor tells another value."""
+        """Decorate a script that runs each time the sensor's value changes."""
         return self._runtime.on_change(self._name, sensor)
 
     def on_pass(self, sensor: str, side: str, limit: float) -> Decorator:
-        """The script below runs each time the sensor passes the limit: "below" or "above" it."""
+        """Decorate a script that runs each time the sensor passes the limit.
+
+        Args:
+            sensor: Name of the sensor.
+            side: "below" or "above".
+            limit: Limit of the value.
+        """
         return self._runtime.on_pass(self._name, sensor, side, limit)
 
     def _invoke(self, name: str, given: Mapping[str, object]) -> RobotCall:
@@ -255,13 +289,12 @@ class RobotHandle:
         return call
 
     def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
-        """One command, or several when a pause takes it back and what is left is done afterwards."""
         while True:
             call = self._runtime.linked().invoke(self._name, action.name, input)
             self._runtime.replaced.asked(call, action, self._runtime.scheduler.block())
             try:
                 self._await(robot, action, call, words)
-            except EndScript:  # the program goes on, the robot shall not
+            except EndScript:  # the program continues, but the robot must stop
                 self._runtime.linked().cancel(call)
                 raise
             if call.state == "canceled" and not call.held:
@@ -275,7 +308,6 @@ class RobotHandle:
             input = rest
 
     def _stay(self, action: Action, unknown: bool) -> None:
-        """Until the pause ends; a person reads that the rest of a move will be left out, and that it was."""
         names = {"robot": self._name, "action": action.title}
         saying = self._runtime.saying
         ahead = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
@@ -303,7 +335,7 @@ class RobotHandle:
             return call.done or (can_hold and scheduler.holds())
 
         while not scheduler.wait_for(ready, min(LOOK_S, max(0.0, until - time.monotonic()))):
-            if waits:  # its time limit begins with it
+            if waits:  # the time limit starts with the action
                 until = time.monotonic() + limit + MARGIN_S
                 waits = not call.began
                 self._runtime.saying.tell(_waiting(robot, call) if waits else words)
@@ -319,7 +351,6 @@ class RobotHandle:
             self._hold(call)
 
     def _broken(self, robot: Robot, call: RobotCall) -> str | None:
-        """The sentence when a robot that always tells that it lives does so no more."""
         if robot.beat_s is None:
             return None
         silence = time.monotonic() - call.heard_s
@@ -328,7 +359,6 @@ class RobotHandle:
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check(robot))
 
     def _hold(self, call: RobotCall) -> None:
-        """The pause takes the command back; a robot that does not end it is no longer under control."""
         call.held = True
         self._runtime.linked().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
@@ -338,14 +368,13 @@ class RobotHandle:
 
 
 def _waiting(robot: Robot, call: RobotCall) -> str:
-    """What the robot does first: "Pepper waits for “say”"."""
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
     return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=listed(titles))
 
 
 def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
-    """What the robot does now: "Pepper says “Touch my head.”"."""
+    """Return what the robot is doing: "Pepper says “Touch my head.”"."""
 
     def place(match: re.Match[str]) -> str:
         if match[1] == "robot":
@@ -360,7 +389,6 @@ def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
 
 
 def _fitting(action: Action, name: str, value: object) -> object:
-    """A value as the parameter wants it: text of a number, a whole number of 2.0, a list of "yes, no"."""
     parameter = action.parameter(name)
     if parameter is None:
         return value
@@ -389,17 +417,16 @@ def _ended(words: str) -> str:
 
 
 def _check(robot: Robot) -> str:
-    """What a person does about a robot that is silent."""
     if robot.virtual:
         return _("Start the virtual robot again.")
     return _("Check that it is switched on and on the same Wi-Fi.")
 
 
 def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
-    """The input for what is left of a call that was taken back; None when nothing is to be done any more.
+    """Return the input for the rest of a canceled call; None if nothing is left to do.
 
-    An action that tells what is left does the rest, another one begins again. One that moves the robot to
-    another place and does not tell what is left would go too far: the rest is left out.
+    An action that reports its remaining amount does the rest, others start again. An action that drives the
+    robot without reporting the amount would go too far: its rest is skipped.
     """
     if not call.began:
         return dict(input)
@@ -415,7 +442,7 @@ def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dic
 
 
 def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
-    """Whether the robot was on its way to another place, and does not tell how much of it is left."""
+    """Return whether the robot was driving to another place without reporting the remaining amount."""
     name = measured_by(action, input)
     if not call.began or name is None:
         return call.began and action.risk == "locomotes"
@@ -423,7 +450,7 @@ def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> 
 
 
 def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
-    """The parameter of which the action tells what is left: the only number in the same unit."""
+    """Return the parameter to which the remaining amount refers: the only number with the same unit."""
     unit = next((field.unit for field in action.feedback if field.name == LEFT), None)
     same = [
         parameter.name

@@ -1,7 +1,7 @@
-"""What a program may call: robots, waiting, topics, its own functions, and how its scripts begin.
+"""Commands of a running program: robots, waiting, topics, functions, and the start of its scripts.
 
-One `Runtime` runs one program. The compiler's names (`namespace`) are its methods and the functions of
-`app.blocks.runtime.values`.
+One `Runtime` runs one program. Its methods and the functions of `app.blocks.runtime.values` are the names of
+the compiled program (`namespace`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _PURE = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
 )  # fmt: skip
 _PARTS: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
-"""Modules whose ``__all__`` are names of programs."""
+"""Modules whose ``__all__`` are names available to programs."""
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
@@ -43,8 +43,8 @@ Decorator = Callable[[Script], Script]
 MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
 MOST_DEEP = 200
-"""How deep functions may call each other."""
-_FRAMES = 6000  # Python's own limit: a call of ours with its values takes up to a dozen of its calls
+"""Maximum depth of function calls."""
+_FRAMES = 6000  # recursion limit: one function call takes up to a dozen Python frames
 
 
 def stop_script() -> None:
@@ -53,18 +53,18 @@ def stop_script() -> None:
 
 
 class Calls:
-    """Runs the functions of one program: how deep they are, and where the script is after one of them."""
+    """Function calls of one program: their depth, and the script's position afterwards."""
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._mine = threading.local()
 
     def begin(self) -> None:
-        """Let Python go as deep as functions may; for the whole process, which is the program's."""
+        """Raise Python's recursion limit for the process of the program."""
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _FRAMES))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
-        """Call; BehaviourError when functions call each other too deep."""
+        """Call a function. Raises BehaviourError if the calls are nested too deeply."""
         depth = int(getattr(self._mine, "depth", 0))
         if depth >= MOST_DEEP:
             raise BehaviourError(
@@ -82,11 +82,16 @@ class Calls:
 
 
 class Runtime:
-    """A program while it runs.
+    """Running program.
 
-    `printed` gets each line that the program writes, `asked` the question that is to be shown; without it
-    nobody can answer. After `start`, `finished` is set when no script is left or one of them failed; then
-    ``error`` says why.
+    After `start`, `finished` is set when no script is left or one of them failed; then ``error`` has the
+    reason.
+
+    Args:
+        printed: Callback for each line that the program writes.
+        labels: Names of blocks by id.
+        readings: Texts of blocks by id.
+        asked: Callback for the question to show; without it questions raise BehaviourError.
     """
 
     def __init__(
@@ -117,7 +122,7 @@ class Runtime:
         self.error: BehaviourError | None = None
 
     def namespace(self) -> dict[str, object]:
-        """The names that its program may use: methods of this runtime, and pure functions."""
+        """Return the names available to the program: methods of this runtime, and pure functions."""
         return (
             {name: getattr(self, name) for name in _OWN}
             | {name: getattr(values, name) for name in _PURE}
@@ -125,10 +130,10 @@ class Runtime:
             | {"stop_script": stop_script}
         )
 
-    # ---- beginning and end
+    # ---- start and end
 
     def start(self, link: ProgramLink, robots: Sequence[Robot]) -> None:
-        """Begin all scripts; the program's text has run, so its hats are known."""
+        """Start all scripts, after the program's code has registered its hats."""
         self._link = link
         self.reset_timer()
         self._robots = {robot.name: robot for robot in robots}
@@ -144,7 +149,7 @@ class Runtime:
 
     def _start_scripts(self) -> None:
         for receiver in self._broadcasts.receivers:
-            # Not counted: when nothing else runs any more, nobody can send it anything.
+            # Not counted: without other running scripts, it can't receive a broadcast any more.
             self.scheduler.start(receiver.name, self._guarded(partial(receiver.serve, self.scheduler)))
         for script in self._starts:
             body = self._guarded(partial(self._once, script), over=self._one_less)
@@ -159,7 +164,6 @@ class Runtime:
             script()
 
     def _each(self, hat: Hat, script: Script) -> None:
-        """Run a script for each of its events, one after the other."""
         while True:
             arguments = hat.next(self.scheduler)
             with suppress(EndScript):
@@ -180,7 +184,7 @@ class Runtime:
         def run() -> None:
             try:
                 body()
-            except Exception as error:  # noqa: BLE001 (whatever a program does wrong belongs to its block)
+            except Exception as error:  # noqa: BLE001 (every error is reported at its block)
                 block = self.scheduler.block()
                 self._fail(explain(error, self._labels.get(block or "", ""), block))
             finally:
@@ -193,12 +197,11 @@ class Runtime:
             self._running += 1
 
     def _one_less(self) -> None:
-        """A script has ended, or has done what a message asked for; the last one ends the program."""
         with self._count_lock:
             self._running -= 1
             last = self._running == 0
         if last:
-            self.scheduler.stop()  # those that only receive wait for nobody any more
+            self.scheduler.stop()  # ends scripts that only wait for broadcasts
             self.finished.set()
 
     def _fail(self, error: BehaviourError) -> None:
@@ -221,24 +224,24 @@ class Runtime:
         raise Stopped
 
     def stop_others(self) -> None:
-        """End what all other scripts do now; events start them again."""
+        """End the current runs of all other scripts; events can start them again."""
         self.scheduler.end_others()
 
     # ---- blocks
 
     def step(self, block: str) -> None:
-        """A block begins."""
+        """Note that a block begins."""
         self.scheduler.step(block)
 
     def value(self, block: str, work_out: Callable[[], object]) -> object:
-        """What a value block gives; its error knows the block."""
+        """Return the result of a value block; errors are attributed to the block."""
         try:
             return work_out()
         except Exception as error:
             raise explain(error, self._labels.get(block, ""), block) from error
 
     def number(self, block: str, work_out: Callable[[], object]) -> object:
-        """The same for a block that gives a number: text put together by "+" is none."""
+        """Return the result of a block that must give a number; text joined by "+" is an error."""
         result = self.value(block, work_out)
         if result is None or isinstance(result, (int, float)):
             return result
@@ -248,20 +251,25 @@ class Runtime:
         raise BehaviourError(_("{name} needs numbers, not a text.").format(name=name), block)
 
     def called(self, block: str, call: Callable[[], object]) -> object:
-        """What a function gives back; afterwards the script is where it was before."""
+        """Return the result of a function call; the script continues in its previous block."""
         name = self._labels.get(block, "")
         return self.value(block, lambda: self._calls.run(block, name, call))
 
     def fail(self, sentence: str) -> object:
-        """The block that can't run, says why."""
+        """Raise the error of a block that can't run."""
         raise BehaviourError(sentence)
 
     def wait(self, seconds: object) -> None:
-        """Wait that many seconds."""
+        """Wait this many seconds; pauses don't count."""
         self.scheduler.wait(float(values.number(seconds, lazy("“wait”"))))
 
     def wait_until(self, condition: Callable[[], object], at_most_s: object = None) -> None:
-        """Wait until the condition is so; what is not known yet is not so."""
+        """Wait until a condition is true; unknown values count as false.
+
+        Args:
+            condition: Evaluated repeatedly.
+            at_most_s: Maximum wait in seconds; None waits forever.
+        """
         limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
         self.scheduler.wait_until(lambda: _is_so(condition), limit)
 
@@ -270,41 +278,45 @@ class Runtime:
         self._printed(values.text(value))
 
     def show(self, value: object) -> None:
-        """Write a value that a person tries: short, and as people say it; nothing while it is not known."""
+        """Write a tried value in short form; an empty line while it is unknown."""
         self._printed("" if value is None else brief_words(value))
 
     # ---- questions
 
     def ask(self, question: object) -> None:
-        """Ask the person in front of Studio and wait for the answer."""
+        """Ask the person in front of Studio and wait for the answer, which `answer` returns."""
         self.questions.ask(question)
 
     def ask_with_choices(self, question: object, choices: object) -> None:
-        """Ask the person in front of Studio which item of a list it shall be, and wait."""
+        """Ask the person in front of Studio to choose an item of a list, and wait."""
         self.questions.ask_with_choices(question, choices)
 
     def answer(self) -> object:
-        """What was answered last; a number when it reads as one, an empty text before the first answer."""
+        """Return the last answer: a number if it is one, an empty text before the first answer."""
         return self.questions.answer
 
     # ---- time
 
     def timer(self) -> float:
-        """Seconds since the beginning, or since the timer was reset; pauses do not count."""
+        """Return the seconds since the start or the last reset; pauses don't count."""
         return round(self.scheduler.running_s() - self._timer_from_s, 3)
 
     def reset_timer(self) -> None:
-        """Let the timer count from 0."""
+        """Restart the timer at 0."""
         self._timer_from_s = self.scheduler.running_s()
 
     # ---- topics
 
     def publish(self, topic: str, payload: object) -> None:
-        """Send a message."""
+        """Publish a message on a topic.
+
+        Raises:
+            BehaviourError: It would move a robot without permission.
+        """
         self._linked().publish(topic, payload)
 
     def newest(self, topic: str, path: str) -> object:
-        """A field of a topic's newest message; None while it is not known."""
+        """Return a field of a topic's newest message; None while it is unknown."""
         message = self._linked().newest(topic)
         return None if message is None else values.part(message, path)
 
@@ -317,15 +329,15 @@ class Runtime:
         sent = self._broadcasts.send(name)
         self.scheduler.wait_until(lambda: all(each.done for each in sent), None)
 
-    # ---- what starts a script
+    # ---- hats
 
     def on_start(self, script: Script) -> Script:
-        """The script runs when the program starts."""
+        """Decorate a script that runs when the program starts."""
         self._starts.append(script)
         return script
 
     def on_message(self, topic: str) -> Decorator:
-        """The script runs for each message."""
+        """Decorate a script that runs for each message on a topic; it gets the payload."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_message(topic, lambda payload: hat.happened((payload,)))
@@ -335,7 +347,7 @@ class Runtime:
         )
 
     def on_broadcast(self, name: str) -> Decorator:
-        """The script runs each time this name is broadcast; from its beginning, if it still runs."""
+        """Decorate a script that runs at each broadcast of this name, and restarts if it is still running."""
 
         def decorate(script: Script) -> Script:
             self._broadcasts.receivers.append(Receiver(name, script))
@@ -344,7 +356,7 @@ class Runtime:
         return decorate
 
     def on_true(self, condition: Callable[[], object]) -> Decorator:
-        """The script runs each time the condition becomes so."""
+        """Decorate a script that runs each time the condition becomes true."""
 
         def decorate(script: Script) -> Script:
             self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_so(condition)), script))
@@ -353,7 +365,7 @@ class Runtime:
         return decorate
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """The script runs each time this happens to the robot."""
+        """Decorate a script that runs at each such event of the robot."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
@@ -368,7 +380,7 @@ class Runtime:
         return self._hat(_("when {robot} {event}").format(robot=robot, event=event), prepare, EVENTS_WAITING)
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """The script runs each time the sensor tells another value."""
+        """Decorate a script that runs each time the sensor's value changes."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
@@ -378,7 +390,7 @@ class Runtime:
         )
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """The script runs each time the sensor passes the limit to that side."""
+        """Decorate a script that runs each time the sensor passes the limit to that side."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
@@ -403,22 +415,22 @@ class Runtime:
     # ---- robots
 
     def robot(self, name: str) -> RobotHandle:
-        """A robot by its name."""
+        """Return the handle of a robot."""
         return RobotHandle(name, self)
 
     def described(self, name: str) -> Robot:
-        """The description of a robot; BehaviourError if it is not there."""
+        """Return the description of a robot. Raises BehaviourError if it is not connected."""
         if name not in self._robots:
             raise BehaviourError(_("{name} is not connected.").format(name=name))
         return self._robots[name]
 
     @property
     def robot_count(self) -> int:
-        """How many robots the program has."""
+        """Number of robots of the program."""
         return len(self._robots)
 
     def linked(self) -> ProgramLink:
-        """The network."""
+        """Return the network."""
         return self._linked()
 
     def _linked(self) -> ProgramLink:

@@ -1,8 +1,8 @@
-"""Scripts side by side: threads that take turns, one block at a time.
+"""Cooperative scheduler of scripts: threads that take turns, one block at a time.
 
-Only the script that has the turn runs; it hands the turn on at each `step` and while it waits. So a block is
-never interrupted by another script's, a pause holds every script at the beginning of a block, and a step runs
-exactly one. See ``docs/adr`` on scripts side by side.
+Only the script with the turn runs; it passes the turn on at each `step` and while it waits. So a block is
+never interrupted by another script, a pause holds every script at the beginning of a block, and a step runs
+exactly one block. See ``docs/adr`` on concurrent scripts.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ POLL_S = 0.02
 
 
 class Stopped(BaseException):
-    """Raised inside a script when the program ends; nothing in a program catches it."""
+    """Raised in a script when the program ends; programs never catch it."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What the scripts do now. ``paused`` is True once every script stands still."""
+    """Current blocks of the scripts. ``paused`` is True once every script is held."""
 
     blocks: tuple[str, ...]
     next_block: str | None
@@ -33,24 +33,24 @@ class Snapshot:
 
 
 class EndScript(Stopped):
-    """Raised inside a script whose run ends while the program goes on; an event starts it again."""
+    """Raised in a script whose run ends while the program continues; an event can start it again."""
 
 
 class Script:
-    """One script: a thread, where it is, and how it is woken."""
+    """Script: a thread, its position, and how it is woken."""
 
     def __init__(self, name: str, lock: threading.Lock) -> None:
         self.name = name
         self.wake = threading.Condition(lock)
         self.block: str | None = None
-        self.idle = True  # waits for its event: it does nothing now
-        self.ended = False  # its run is to end: it is told so at its next call
-        self.busy = False  # waits for something that goes on while paused: a robot's answer
-        self.frozen = False  # waits for time or a condition, and stands while paused
+        self.idle = True  # waits for its event
+        self.ended = False  # EndScript is raised at its next call
+        self.busy = False  # waits for something that continues while paused, such as a robot's answer
+        self.frozen = False  # waits for time or a condition, which pauses
 
 
 class Scheduler:
-    """Gives the turn to one script after the other."""
+    """Scheduler that gives the turn to one script after the other."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -58,22 +58,22 @@ class Scheduler:
         self._scripts: list[Script] = []
         self._mine = threading.local()
         self._owner: Script | None = None
-        self._parked: deque[Script] = deque()  # before a block
-        self._resuming: deque[Script] = deque()  # inside a block, after a wait
-        self._opening = False  # scripts are being started: none gets the turn yet
+        self._parked: deque[Script] = deque()  # waiting before a block
+        self._resuming: deque[Script] = deque()  # continuing a block after a wait
+        self._opening = False  # no script gets the turn while scripts are being started
         self._paused = False
         self._paused_since_s = 0.0
-        self._stood_s = 0.0  # how long all pauses before took
-        self.pace_s = 0.0  # slow motion: see `set_pace`
+        self._stood_s = 0.0  # total duration of earlier pauses
+        self.pace_s = 0.0  # see `set_pace`
         self._stepping: Script | None = None
         self._stopping = False
 
     # ---- scripts
 
     def start(self, name: str, body: Callable[[], None], *, idle: bool = True) -> threading.Thread:
-        """Run `body` as a script in a thread of its own; it begins when it gets the turn.
+        """Run `body` as a script in its own thread; it begins when it gets the turn.
 
-        One that is not `idle` waits for no event: it counts as running from now on.
+        A script that is not `idle` waits for no event: it counts as running at once.
         """
         script = Script(name, self._lock)
         script.idle = idle
@@ -95,7 +95,7 @@ class Scheduler:
 
     @contextmanager
     def opening(self) -> Iterator[None]:
-        """Start scripts in here: none gets the turn before all are there, so each knows all others."""
+        """Start scripts within this context: none gets the turn before all exist."""
         with self._lock:
             self._opening = True
         yield
@@ -104,14 +104,14 @@ class Scheduler:
             self._grant()
 
     def begin(self) -> None:
-        """The script's work begins: it takes the turn. Stopped is raised when the program ends."""
+        """Take the turn to begin the script's run. Raises Stopped when the program ends."""
         script = self._script()
         with self._lock:
             script.idle = False
             self._enter(script)
 
     def look(self) -> None:
-        """An idle script takes the turn to look at its condition, not while paused; `rest` gives it back."""
+        """Take the turn to evaluate the condition of an idle script, not while paused; `rest` returns it."""
         script = self._script()
         with self._lock:
             while self._paused and not self._stopping:
@@ -119,16 +119,16 @@ class Scheduler:
             self._enter(script)
 
     def rest(self) -> None:
-        """The script's work is done until its next event."""
+        """End the script's run until its next event."""
         script = self._script()
         with self._lock:
             script.idle, script.block, script.ended = True, None, False
             self._leave(script)
 
     def step(self, block: str) -> None:
-        """The script comes to this block: others get their turn, a pause holds it here.
+        """Note that the script reaches this block: others get their turn, and a pause holds it here.
 
-        In slow motion it stays here for the time of a block first.
+        In slow motion it first stays here for the duration of a block.
         """
         script = self._script()
         with self._lock:
@@ -139,23 +139,23 @@ class Scheduler:
             if self.pace_s and not self._paused:
                 self._stay(script, lambda: self.pace_s, step_ends=True)
             if self._stepping is script:
-                return  # a step was asked for while it stayed here
+                return  # a step was requested while it stayed here
             if not self._parked and not self._resuming and not self._paused:
                 return
             self._leave(script, then_park=True)
             self._await_turn(script)
 
     def me(self) -> Script:
-        """The calling script."""
+        """Return the calling script."""
         return self._script()
 
     def end_run(self, script: Script) -> None:
-        """End what the script does now: EndScript is raised in it at its next call; an idle one goes on."""
+        """End a script's current run: EndScript is raised at its next call; an idle one is not affected."""
         with self._lock:
             self._end_run(script)
 
     def end_others(self) -> None:
-        """End what all scripts but the calling one do now."""
+        """End the current runs of all scripts except the calling one."""
         mine = self._script()
         with self._lock:
             for script in self._scripts:
@@ -167,17 +167,14 @@ class Scheduler:
             script.ended = True
             script.wake.notify()
 
-    # ---- waiting: the others run meanwhile
+    # ---- waiting: other scripts run meanwhile
 
     def wait(self, seconds: float) -> None:
-        """Wait; the clock stands while paused."""
+        """Wait; the time of pauses doesn't count."""
         self.wait_until(None, seconds)
 
     def wait_until(self, condition: Callable[[], bool] | None, at_most_s: float | None) -> bool:
-        """Wait until the condition is so, looked at 50 times a second.
-
-        False when the time was over before.
-        """
+        """Wait until the condition is true, evaluated 50 times a second; return False at the timeout."""
         script = self._script()
         remaining = at_most_s
         while condition is None or not condition():
@@ -191,16 +188,15 @@ class Scheduler:
         return True
 
     def _doze(self, script: Script, seconds: float | None) -> float:
-        """Give the turn away for that long; the seconds that counted are returned."""
         with self._lock:
             return self._stay(script, lambda: seconds)
 
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
     ) -> bool:
-        """Wait for another thread, which calls `poke`; goes on while paused. False after the time-out.
+        """Wait for another thread, which calls `poke`; continues while paused. Return False at the timeout.
 
-        `ready` is called with the lock held: it only looks at a value.
+        `ready` is called with the lock held and should only read a value.
         """
         script = self._script()
         until = None if timeout_s is None else self._clock() + timeout_s
@@ -219,20 +215,20 @@ class Scheduler:
             return ready()
 
     def holds(self) -> bool:
-        """Whether a pause wants the calling script to stand still; may be asked with the lock held."""
+        """Return whether a pause holds the calling script; callable with the lock held."""
         return self._paused and self._stepping is not self._script()
 
     def hold(self) -> None:
-        """Stand still inside a block that the pause interrupted, until it ends or a step is for this one."""
+        """Wait within a block until the pause ends or this script is stepped."""
         with self._lock:
             self._stay(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
 
     def poke(self) -> None:
-        """Something arrived: whoever waits looks again."""
+        """Wake waiting scripts because something arrived."""
         with self._lock:
             self._wake_all()
 
-    # ---- pause, step, stop: from other threads
+    # ---- pause, step, stop: called from other threads
 
     def pause(self) -> None:
         """Hold every script at its next block."""
@@ -244,7 +240,7 @@ class Scheduler:
 
     @property
     def is_paused(self) -> bool:
-        """Whether scripts are held, or one of them makes a step."""
+        """True while scripts are paused, also during a step."""
         return self._paused
 
     def go_on(self) -> None:
@@ -257,12 +253,12 @@ class Scheduler:
             self._wake_all()
 
     def running_s(self) -> float:
-        """A clock in seconds that stands while paused."""
+        """Return a clock in seconds that stops while paused."""
         with self._lock:
             return (self._paused_since_s if self._paused else self._clock()) - self._stood_s
 
     def set_pace(self, seconds: float) -> None:
-        """Slow motion: so long each script stays at a block before it is done; 0 for none."""
+        """Set how long each script stays at a block in slow motion; 0 disables it."""
         self.pace_s = max(0.0, seconds)
         self.poke()
 
@@ -280,26 +276,26 @@ class Scheduler:
             self._wake_all()
 
     def stop(self) -> None:
-        """End every script at its next call; at once for those that wait."""
+        """End every script at its next call, waiting ones at once."""
         with self._lock:
             self._stopping = True
             self._wake_all()
 
     @property
     def stopping(self) -> bool:
-        """Whether the program ends."""
+        """True once the program ends."""
         return self._stopping
 
     def return_to(self, block: str | None) -> None:
-        """The script goes on inside this block, after blocks of another place that it ran."""
+        """Continue inside this block after a function call."""
         self._script().block = block
 
     def block(self) -> str | None:
-        """The block at which the calling script is."""
+        """Return the block of the calling script."""
         return self._script().block
 
     def snapshot(self) -> Snapshot:
-        """What runs now."""
+        """Return the current state."""
         with self._lock:
             active = [script for script in self._scripts if not script.idle]
             blocks = tuple(dict.fromkeys(script.block for script in active if script.block))
@@ -308,10 +304,9 @@ class Scheduler:
             following = first or next((script.block for script in active if script.frozen), None)
             return Snapshot(blocks, following, self._paused and still and not self._resuming)
 
-    # ---- the turn; the lock is held
+    # ---- the turn; call with the lock held
 
     def _stay(self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False) -> float:
-        """Give the turn away until the limit is used up; the seconds used. A step may end it."""
         used = 0.0
         script.frozen = True
         self._leave(script)
@@ -343,7 +338,6 @@ class Scheduler:
         self._grant()
 
     def _enter(self, script: Script) -> None:
-        """Take the turn again inside a block: a pause does not hold this."""
         self._resuming.append(script)
         self._grant()
         self._await_turn(script)
@@ -376,7 +370,6 @@ class Scheduler:
             self._leave(script)
 
     def _forget_turn(self, script: Script) -> None:
-        """The script waits for no turn and no step any more."""
         if self._stepping is script:
             self._stepping = None
         for queue in (self._parked, self._resuming):

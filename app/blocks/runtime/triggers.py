@@ -1,4 +1,4 @@
-"""What starts scripts again and again: events that wait for their script, and values watched for a change."""
+"""Triggers of scripts: queued events, and values watched for a change."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from app.robots.description.description import Event
 
 
 class Hat:
-    """The events of one script.
+    """Event queue of one script.
 
-    They come from the network's thread; at most `most` wait, the oldest is left out and counted. Or, with a
-    `condition`, the event is that it becomes so.
+    Events come from the network's thread; at most `most` wait, the oldest is dropped and counted. With a
+    `condition`, the event is that it becomes true.
     """
 
     def __init__(self, title: str, *, most: int = 1, condition: Callable[[], bool] | None = None) -> None:
@@ -24,13 +24,13 @@ class Hat:
         self._was_so: bool | None = None
 
     def happened(self, arguments: tuple[object, ...]) -> None:
-        """An event; the caller pokes the scheduler."""
+        """Queue an event; the caller pokes the scheduler."""
         if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
             self.dropped += 1
         self._waiting.append(arguments)
 
     def next(self, scheduler: Scheduler) -> tuple[object, ...]:
-        """Wait for the next event; what its script is called with."""
+        """Wait for the next event and return the arguments of its script."""
         if self._condition is None:
             scheduler.wait_for(lambda: bool(self._waiting), idle=True)
             return self._waiting.popleft()
@@ -39,7 +39,6 @@ class Hat:
         return ()
 
     def _becomes_so(self, scheduler: Scheduler) -> bool:
-        """Look at the condition; it runs blocks, so it needs the turn."""
         if self._condition is None:
             return False
         scheduler.look()
@@ -47,16 +46,16 @@ class Hat:
             is_so = self._condition()
         finally:
             scheduler.rest()
-        # So from the beginning is no change.
+        # True from the beginning is not a change.
         became = is_so and self._was_so is False
         self._was_so = is_so
         return became
 
 
 class PassGate:
-    """Tells when a number passes a limit to one side.
+    """Threshold trigger: calls `passed` when a number passes a limit to one side.
 
-    What is beyond it from the beginning has not passed it.
+    A value beyond the limit from the beginning doesn't count.
     """
 
     def __init__(self, side: str, limit: float, passed: Callable[[], None]) -> None:
@@ -66,7 +65,7 @@ class PassGate:
         self._was_beyond: bool | None = None
 
     def __call__(self, value: object) -> None:
-        """Look at the sensor's next value."""
+        """Process a new value."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return
         beyond = value < self._limit if self._side == "below" else value > self._limit
@@ -76,7 +75,7 @@ class PassGate:
 
 
 def changes(changed: Callable[[], None]) -> Callable[[object], None]:
-    """Calls `changed` for each value that differs from the one before; the first is no change."""
+    """Return a callback that calls `changed` for each value that differs from the previous one."""
     before: list[object] = []
 
     def told(value: object) -> None:
@@ -93,10 +92,10 @@ def event_matches(
     event: Event | None,
     source: Mapping[str, object],
 ) -> bool:
-    """Whether an event's data are those that a hat waits for.
+    """Return whether an event's data match the filters of a hat.
 
-    Texts are compared as people do, without case. An event that also tells its end (``rb:level`` with a
-    yes/no field: touched, and down or not) counts only when it begins.
+    Texts are compared ignoring case. An event that also reports its end (``rb:level`` with a boolean field:
+    touched, and down or not) counts only when it begins.
     """
     fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
     for name, wanted in filters.items():

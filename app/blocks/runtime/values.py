@@ -1,4 +1,4 @@
-"""What programs do with values: pure functions, called by blocks of several categories."""
+"""Value functions of programs, used by blocks of several categories. Pure."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from nep.i18n import _, lazy
 
 LONGEST_TEXT = 1_000_000
 MOST_BITS = 14_000
-"""Python writes no whole number of more than 4300 digits; one of more bits is written as 1.2e+4932."""
+"""Python refuses to print integers of more than 4300 digits; larger ones are shown as 1.2e+4932."""
 _MOST_ROUNDS = 10**9
 _JOINER = "\u200d"
 
 
 def text(value: object) -> str:
-    """A value as people say it: 2 for 2.0, yes and no, nothing for a value that is not known."""
+    """Convert a value to text for people: 2 for 2.0, yes and no, "" for an unknown value."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -30,7 +30,7 @@ def text(value: object) -> str:
     if isinstance(value, (Mapping, list, tuple)):
         try:
             return json.dumps(value, ensure_ascii=False, default=str)
-        except ValueError:  # a number of too many digits somewhere, or a list that is in itself
+        except ValueError:  # an integer with too many digits, or a list that contains itself
             return json.dumps(_writable(value, ()), ensure_ascii=False, default=str)
     if isinstance(value, int) and value.bit_length() > MOST_BITS:
         return f"{Decimal(value):.16e}"
@@ -38,7 +38,6 @@ def text(value: object) -> str:
 
 
 def _writable(value: object, around: tuple[int, ...]) -> object:
-    """The same with long numbers as their text; what is in itself, in one of ``around``, ends with "…"."""
     if isinstance(value, int) and value.bit_length() > MOST_BITS:
         return text(value)
     if not isinstance(value, (Mapping, list, tuple)):
@@ -52,12 +51,12 @@ def _writable(value: object, around: tuple[int, ...]) -> object:
 
 
 def is_known(value: object) -> bool:
-    """Whether a sensor or topic has told this value."""
+    """Return whether a value is known."""
     return value is not None
 
 
 def join(first: object, second: object) -> str:
-    """Both as one text."""
+    """Join two values as text."""
     one, other = text(first), text(second)
     if len(one) + len(other) > LONGEST_TEXT:
         raise BehaviourError(
@@ -67,14 +66,14 @@ def join(first: object, second: object) -> str:
 
 
 def length(value: object) -> int:
-    """How many letters a text has, how many things a list or message."""
+    """Return the number of characters of a text, or of items of a list or message."""
     if isinstance(value, (list, tuple, Mapping)):
         return len(value)
     return len(letters(text(value)))
 
 
 def letters(words: str) -> Sequence[str]:
-    """The letters of a text as people see them: an accent or the colour of a skin is none of its own."""
+    """Return the grapheme clusters of a text: accents and skin tones belong to the previous character."""
     if words.isascii():
         return words
     found: list[str] = []
@@ -87,18 +86,17 @@ def letters(words: str) -> Sequence[str]:
 
 
 def _belongs(before: str, character: str) -> bool:
-    """Whether a character is a part of the letter before it."""
     if before[-1] == _JOINER or character in (_JOINER, "\ufe0f"):
         return True
     if "\U0001f3fb" <= character <= "\U0001f3ff" or "\U000e0020" <= character <= "\U000e007f":
-        return True  # a colour of skin, the letters of a region's flag
-    if "\U0001f1e6" <= character <= "\U0001f1ff":  # half a flag
+        return True  # skin tones, letters of a region's flag
+    if "\U0001f1e6" <= character <= "\U0001f1ff":  # second half of a flag
         return len(before) == 1 and "\U0001f1e6" <= before <= "\U0001f1ff"
     return unicodedata.category(character) in ("Mn", "Me", "Mc")
 
 
 def number(value: object, what: str) -> int | float:
-    """The value, if it is a finite number; else BehaviourError, whose sentence begins with `what`."""
+    """Return the value if it is a finite number. Raises BehaviourError; the sentence begins with `what`."""
     if value is None:
         raise BehaviourError(
             _("{what} needs a value, but it has none yet.").format(what=_(what)), unknown=True
@@ -111,22 +109,22 @@ def number(value: object, what: str) -> int | float:
 
 
 def rounded(value: object) -> int:
-    """The nearest whole number; halves go up."""
+    """Return the nearest whole number; halves go up."""
     return math.floor(number(value, lazy("“round”")) + 0.5)
 
 
 def rounded_up(value: object) -> int:
-    """The next whole number above."""
+    """Return the next whole number above."""
     return math.ceil(number(value, lazy("“round up”")))
 
 
 def rounded_down(value: object) -> int:
-    """The next whole number below."""
+    """Return the next whole number below."""
     return math.floor(number(value, lazy("“round down”")))
 
 
 def random_number(low: object, high: object) -> int | float:
-    """A number by chance between both; a whole one when both are whole."""
+    """Return a random number between both limits; a whole one if both are whole."""
     first, last = number(low, lazy("“random number”")), number(high, lazy("“random number”"))
     first, last = min(first, last), max(first, last)
     if float(first).is_integer() and float(last).is_integer():
@@ -135,15 +133,15 @@ def random_number(low: object, high: object) -> int | float:
 
 
 def repeat(times: object) -> range:
-    """So many rounds; a fraction is rounded, below 0 is none."""
+    """Return the rounds of a loop: rounded, at least 0."""
     return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MOST_ROUNDS)))
 
 
 def part(message: object, path: str) -> object:
-    """What is at a path inside a message, such as ``faces.0.name``; None when it is not there.
+    """Return the value at a path in a message, such as ``faces.0.name``; None if it is missing.
 
-    An empty path is the whole message; ``value`` of a plain value is that value. A list is a copy: what a
-    program does with it does not change the message.
+    An empty path is the whole message; ``value`` of a plain value is the value itself. A list is copied, so
+    that changes don't affect the message.
     """
     found = _found(message, path)
     return list(found) if isinstance(found, list) else found

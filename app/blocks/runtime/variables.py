@@ -1,4 +1,4 @@
-"""The variables of a program as people see them while it runs: short words, however large the values are."""
+"""Variables of a running program for display: short texts, however large the values."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ LONGEST_TEXT = 200
 LONGEST_ITEM = 80
 MOST_ITEMS = 100
 MOST_INSIDE = 20
-"""So many parts of a message or of a list in a list are put into words."""
+"""Maximum nesting depth that is shown."""
 MOST_CHARACTERS = 200_000
-"""So much is told at once; what is left comes with the next look."""
+"""Maximum amount of text sent at once; the rest follows with the next read."""
 _DIGITS_BITS = 600
-"""A whole number with more bits than this is told by its length: to write it out could take seconds."""
+"""Integers with more bits are described by their number of digits: printing them could take seconds."""
 _CUT = "…"
 
 
 @dataclass(frozen=True)
 class VariableValue:
-    """What a variable holds: ``text`` in short, and of a list the first ``items`` of ``length``."""
+    """Displayed value of a variable: ``text`` in short, and for a list the first ``items`` of ``length``."""
 
     id: str
     kind: ValueKind
@@ -35,7 +35,7 @@ class VariableValue:
     length: int = 0
 
     def to_json(self) -> dict[str, object]:
-        """As a line between processes holds it."""
+        """Return the JSON form."""
         return {
             "id": self.id,
             "kind": self.kind,
@@ -46,7 +46,7 @@ class VariableValue:
 
     @classmethod
     def from_json(cls, told: object) -> VariableValue | None:
-        """What `to_json` wrote; None when it is something else. No text is longer than it may be."""
+        """Restore a value from `to_json`; None for invalid data. Texts are cut to their limits."""
         if not isinstance(told, Mapping):
             return None
         items, length = told.get("items"), told.get("length")
@@ -64,17 +64,16 @@ class VariableValue:
 
 
 class VariableWatch:
-    """Finds what has changed in a program's variables; the program itself does nothing for it."""
+    """Change detector for a program's variables, without any cost for the program."""
 
     def __init__(self, names: dict[str, object], variables: Sequence[Variable]) -> None:
-        """``names`` are the program's own, in which its scripts put values meanwhile."""
         self._names = names
         self._variables = {variable.python: variable for variable in variables if variable.python}
         self._seen: dict[str, object] = {}
         self._told: dict[str, VariableValue] = {}
 
     def changes(self) -> list[VariableValue]:
-        """The variables whose values look otherwise than at the last look, at first all."""
+        """Return the variables whose display has changed since the last call, at first all."""
         found, characters = [], 0
         for python, variable in self._variables.items():
             if characters > MOST_CHARACTERS:
@@ -85,7 +84,7 @@ class VariableWatch:
             try:
                 told = brief(variable.id, value)
             except RuntimeError:
-                continue  # a script changes it at this moment: the next look sees it
+                continue  # a script is changing it; the next read gets it
             self._seen[python] = _kept(value)
             if told != self._told.get(python):
                 self._told[python] = told
@@ -94,12 +93,11 @@ class VariableWatch:
         return found
 
     def put(self, python: str, value: str | float | bool) -> None:
-        """A person gives a variable of the program another value; any other name is left alone."""
+        """Set a variable of the program; other names are ignored."""
         if python in self._variables:
             self._names[python] = value
 
     def _is_same(self, python: str, value: object) -> bool:
-        """Whether nothing can have changed. What holds other things is looked at each time."""
         seen = self._seen.get(python)
         if isinstance(value, list):
             return isinstance(seen, tuple) and seen == _kept(value) and all(map(_is_plain, seen[1]))
@@ -107,7 +105,6 @@ class VariableWatch:
 
 
 def _kept(value: object) -> object:
-    """What can be compared later with what is there then."""
     return (len(value), tuple(value[:MOST_ITEMS])) if isinstance(value, list) else value
 
 
@@ -116,7 +113,7 @@ def _is_plain(value: object) -> bool:
 
 
 def brief(id: str, value: object) -> VariableValue:
-    """A value in short. RuntimeError when somebody changes it meanwhile."""
+    """Return a value for display. Raises RuntimeError if a script changes it meanwhile."""
     if value is None:
         return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
@@ -133,12 +130,12 @@ def brief(id: str, value: object) -> VariableValue:
 
 
 def brief_words(value: object) -> str:
-    """A value as a person reads it: in short, yes and no."""
+    """Return a value as short text for people."""
     return words(value, LONGEST_TEXT)
 
 
 def words(value: object, most: int) -> str:
-    """A value as text of so many characters at most; no part of it is read that is not shown."""
+    """Return a value as text of at most `most` characters; parts that aren't shown aren't read."""
     if isinstance(value, str):
         return _cut(value[: most + 1], most)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _DIGITS_BITS:
@@ -157,7 +154,6 @@ def words(value: object, most: int) -> str:
 
 
 def _parts(value: object, depth: int) -> Iterator[str]:
-    """The text of a value, piece by piece: whoever has enough does not ask for more."""
     if isinstance(value, Mapping):
         yield from _inside("{", "}", ((f"{key}: ", each) for key, each in value.items()), depth)
     elif isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""All blocks that there are: those of the categories, and those of the robots that are known."""
+"""All blocks: those of the categories, and those of known robots."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ _HOLE = re.compile(r"%[A-Za-z_]\w*")
 
 
 class Catalogue:
-    """Blocks by type. ``connected`` robots by name; `absent` ones bring their blocks, but can't be asked."""
+    """Blocks by type. ``connected`` robots by name; `absent` ones have blocks, but can't be used."""
 
     def __init__(self, robots: Sequence[Robot], absent: Sequence[Robot] = ()) -> None:
-        """Make the blocks of all robots; where two models share a type, the connected one counts."""
         self.connected: Mapping[str, Robot] = {robot.name: robot for robot in robots}
         self.absent: Mapping[str, Robot] = {
             robot.name: robot for robot in absent if robot.name not in self.connected
@@ -36,7 +35,7 @@ class Catalogue:
 
 
 def categories() -> tuple[Category, ...]:
-    """Every category, in the toolbox's order and in the language of now."""
+    """Return all categories in toolbox order, in the current language."""
     return english_categories() if language() == ENGLISH else _translated(language())
 
 
@@ -47,13 +46,13 @@ def _translated(_language: str) -> tuple[Category, ...]:
 
 @lru_cache(maxsize=1)
 def english_categories() -> tuple[Category, ...]:
-    """Every category as its module has it."""
+    """Return all categories in English."""
     found = discover("app.blocks.categories", "CATEGORY", Category)
     return tuple(sorted(found.values(), key=lambda category: (category.order, category.name)))
 
 
 def has_words(english: str) -> bool:
-    """Whether a translator has something to do: "%A %SIGN %B" and "+" are the same everywhere."""
+    """Return whether a text has words to translate: "%A %SIGN %B" and "+" don't."""
     return any(letter.isalpha() for letter in _HOLE.sub("", english))
 
 

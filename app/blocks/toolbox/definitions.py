@@ -1,4 +1,4 @@
-"""What the editor gets: Blockly's definitions of all blocks, and the toolbox."""
+"""Block definitions and toolbox for the editor, in Blockly's JSON."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ STYLES = ("events", "control", "values", "variables", "functions", "messages", "
 def editor_definitions(
     robots: Sequence[Robot], absent: Sequence[Robot] = (), topics: Sequence[str] = ()
 ) -> dict[str, object]:
-    """Definitions for the editor.
+    """Return the definitions for the editor.
 
-    ``blocks`` are Blockly's JSON definitions of all categories and of all robots, connected or `absent`,
-    ``help`` what people are told about them (`app.blocks.toolbox.help`);
-    ``toolbox`` is a category toolbox; ``styles`` are the names of the styles; ``robots`` and ``topics`` are
-    what the drop-downs offer.
+    ``blocks`` are the JSON definitions of all categories and all robots, connected or `absent`, ``help``
+    their help (`app.blocks.toolbox.help`), ``toolbox`` a category toolbox, ``styles`` the names of the
+    styles, ``robots`` and ``topics`` the options of the drop-downs.
     """
     catalogue = Catalogue(robots, absent)
     return {
@@ -77,7 +76,6 @@ def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict
 
 
 def _shown(category: Category) -> Iterator[Mapping[str, object]]:
-    """The blocks of a category with the headings above some of them."""
     for block in category.blocks:
         if block.type in category.headings:
             yield {"kind": "label", "text": category.headings[block.type]}
@@ -86,7 +84,6 @@ def _shown(category: Category) -> Iterator[Mapping[str, object]]:
 
 
 def _hats_of_robots(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, object]]:
-    """What starts a script is looked for in one place: the hats of each robot, with its name above them."""
     contents: list[Mapping[str, object]] = []
     for robot, its in groups.items():
         hats = [_block(entry) for group in its for entry in group.entries if entry.block.shape == "hat"]

@@ -1,4 +1,4 @@
-"""What people are told who ask about a block: what it does, what goes into its gaps, an example."""
+"""Help of a block: what it does, what its gaps take, an example."""
 
 from __future__ import annotations
 
@@ -137,9 +137,10 @@ _UNIT = 3  # letters that a unit has at most
 
 
 def help_of(block: Block) -> dict[str, object]:
-    """``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, words), ``example``.
+    """Return the help of a block.
 
-    ``words``, ``english`` and ``choices`` find it: lists of other words, and what may be chosen on it.
+    Its keys are ``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, text), ``example``. ``words``,
+    ``english`` and ``choices`` are for search: other words, and the options of its fields.
     """
     gaps = [
         [name_of_gap(block, argument), words]
@@ -165,7 +166,7 @@ def _example(block: Block) -> str:
 
 
 def title(block: Block) -> str:
-    """What stands on the block, with its gaps in brackets: "wait (seconds) s"."""
+    """Return the text on the block with its gaps in brackets: "wait (seconds) s"."""
 
     def place(hole: re.Match[str]) -> str:
         argument = block.argument(hole[1])
@@ -177,9 +178,9 @@ def title(block: Block) -> str:
 
 
 def name(block: Block) -> str:
-    """What a sentence calls it: "walk", "repeat … times"; "" for one of signs alone.
+    """Return the block's name in a sentence: "walk", "repeat … times"; "" if it has only signs.
 
-    Without its robot, and without the unit that stands behind its last gap.
+    Without its robot, and without the unit after its last gap.
     """
     words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
     if len(words) > 1 and len(words[-1]) <= _UNIT:
@@ -189,7 +190,7 @@ def name(block: Block) -> str:
 
 
 def name_of_gap(block: Block, argument: Argument) -> str:
-    """What a gap or field is called in words."""
+    """Return the name of a gap or field in words."""
     told = block.about.get(argument.name)
     if told:
         return told[0]
@@ -197,12 +198,11 @@ def name_of_gap(block: Block, argument: Argument) -> str:
 
 
 def english_name_of_gap(argument: Argument) -> str:
-    """What a gap is called in English when its block says nothing of it."""
+    """Return the default name of a gap in English."""
     return _NAMES.get(argument.name, argument.name.lower().replace("_", " "))
 
 
 def _takes(block: Block, argument: Argument) -> str:
-    """What goes into it; "" for what needs no words."""
     words = _kind(argument)
     told = block.about.get(argument.name)
     if words and told and told[1]:
@@ -270,13 +270,11 @@ def _number(field: NumberField) -> str:
 
 
 def _filled(block: Block) -> str:
-    """The block as it comes out of the toolbox, in words."""
     workspace = parse_workspace({"blocks": {"blocks": [block.to_toolbox()]}})
     return reading(workspace.scripts[0][0], _readable(block), {})
 
 
 def _readable(block: Block) -> dict[str, Block]:
-    """The block itself, and the two that stand in gaps."""
     number = Block("values_number", "%NUMBER", "value", "", "", "", "", (NumberField("NUMBER"),))
     words = Block("values_text", "%TEXT", "value", "", "", "", "", (TextField("TEXT"),))
     variable = Block("variables_get", "%VAR", "value", "", "", "", "", (VariableField("VAR"),))

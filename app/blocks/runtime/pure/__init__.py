@@ -1,4 +1,4 @@
-"""What programs work out: pure functions, called by the blocks of one category each.
+"""Pure functions that programs call, one module per category.
 
-The ``__all__`` of each module are names that a program may use.
+The ``__all__`` of each module are names available to programs.
 """

@@ -1,6 +1,6 @@
-"""What programs work out from numbers: pure functions, called by the blocks of the category "Numbers".
+"""Functions of the category "Numbers".
 
-Angles are in degrees. What is no finite number is refused with a sentence (`values.number`).
+Angles are in degrees. Values that aren't finite numbers raise BehaviourError (`values.number`).
 """
 
 from __future__ import annotations
@@ -27,33 +27,33 @@ _EXACT = 2**53
 
 
 def square_root(value: object) -> int | float:
-    """The number that gives this one when multiplied by itself."""
+    """Return the square root."""
     return _only(math.sqrt, value, lazy("“square root”"))
 
 
 def absolute(value: object) -> int | float:
-    """The number without its sign."""
+    """Return the absolute value."""
     return abs(number(value, lazy("“absolute value”")))
 
 
 def sign(value: object) -> int:
-    """1, 0 or -1."""
+    """Return 1, 0 or -1."""
     found = number(value, lazy("“sign”"))
     return (found > 0) - (found < 0)
 
 
 def sine(degrees: object) -> int | float:
-    """The sine of an angle."""
+    """Return the sine of an angle in degrees."""
     return _neat(math.sin(_angle(degrees, lazy("“sin”"))))
 
 
 def cosine(degrees: object) -> int | float:
-    """The cosine of an angle."""
+    """Return the cosine of an angle in degrees."""
     return _neat(math.cos(_angle(degrees, lazy("“cos”"))))
 
 
 def tangent(degrees: object) -> int | float:
-    """The tangent of an angle; there is none at 90 degrees."""
+    """Return the tangent of an angle in degrees. Raises BehaviourError at 90 degrees."""
     what = lazy("“tan”")
     if abs(number(degrees, what)) % 180 == 90:
         raise _no_result(what, degrees)
@@ -61,46 +61,46 @@ def tangent(degrees: object) -> int | float:
 
 
 def arc_sine(value: object) -> int | float:
-    """The angle with this sine."""
+    """Return the angle in degrees with this sine."""
     return _neat(math.degrees(_only(math.asin, value, lazy("“asin”"))))
 
 
 def arc_cosine(value: object) -> int | float:
-    """The angle with this cosine."""
+    """Return the angle in degrees with this cosine."""
     return _neat(math.degrees(_only(math.acos, value, lazy("“acos”"))))
 
 
 def arc_tangent(value: object) -> int | float:
-    """The angle with this tangent."""
+    """Return the angle in degrees with this tangent."""
     return _neat(math.degrees(math.atan(number(value, lazy("“atan”")))))
 
 
 def natural_logarithm(value: object) -> int | float:
-    """The logarithm to the base e."""
+    """Return the logarithm to the base e."""
     return _only(math.log, value, lazy("“ln”"))
 
 
 def logarithm(value: object) -> int | float:
-    """The logarithm to the base 10."""
+    """Return the logarithm to the base 10."""
     return _only(math.log10, value, lazy("“log”"))
 
 
 def e_to_the(power: object) -> float:
-    """E to this power."""
+    """Return e to this power."""
     return math.exp(number(power, lazy("“e to the power”")))
 
 
 def ten_to_the(power: object) -> int | float:
-    """10 to this power."""
+    """Return 10 to this power."""
     return _neat(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
 
 
 def rounded_to(value: object, places: object) -> int | float:
-    """The number with so many digits behind the point, halves up; below 0 it is rounded to tens and more."""
+    """Round to this number of decimal places, halves up; negative places round to tens and more."""
     found = number(value, lazy("“round”"))
     wanted = number(places, lazy("“decimal places”"))
     digits = max(-_MOST_PLACES, min(_MOST_PLACES, round(wanted)))
-    if abs(found) >= _EXACT:  # it has no digits behind the point that a computer keeps
+    if abs(found) >= _EXACT:  # floats of this size have no fraction
         return found
     halves = ROUND_HALF_UP if found > 0 else ROUND_HALF_DOWN
     exact = Decimal(repr(found)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
@@ -108,23 +108,23 @@ def rounded_to(value: object, places: object) -> int | float:
 
 
 def smaller(one: object, other: object) -> int | float:
-    """The smaller of both."""
+    """Return the smaller of both numbers."""
     return min(number(one, lazy("“smaller”")), number(other, lazy("“smaller”")))
 
 
 def larger(one: object, other: object) -> int | float:
-    """The larger of both."""
+    """Return the larger of both numbers."""
     return max(number(one, lazy("“larger”")), number(other, lazy("“larger”")))
 
 
 def limited(value: object, low: object, high: object) -> int | float:
-    """The number, at least the one limit and at most the other, in whichever order they come."""
+    """Clamp the number to the limits, which may be swapped."""
     found, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
     return max(min(first, last), min(max(first, last), found))
 
 
 def mapped(value: object, low: object, high: object, new_low: object, new_high: object) -> int | float:
-    """The number at the same place of another range; the first range is wider than nothing."""
+    """Map a number linearly from one range to another. Raises BehaviourError if the first range is empty."""
     what = lazy("“map”")
     found, first, last, to_first, to_last = (
         number(each, what) for each in (value, low, high, new_low, new_high)
@@ -135,45 +135,45 @@ def mapped(value: object, low: object, high: object, new_low: object, new_high: 
 
 
 def is_even(value: object) -> bool:
-    """Whether it is a whole number that two divides."""
+    """Return whether it is an even whole number."""
     return is_whole(value) and int(number(value, lazy("“even”"))) % 2 == 0
 
 
 def is_odd(value: object) -> bool:
-    """Whether it is a whole number that two does not divide."""
+    """Return whether it is an odd whole number."""
     return is_whole(value) and int(number(value, lazy("“odd”"))) % 2 == 1
 
 
 def is_whole(value: object) -> bool:
-    """Whether nothing is behind its point."""
+    """Return whether it has no fraction."""
     found = number(value, lazy("“is”"))
     return isinstance(found, int) or found.is_integer()
 
 
 def is_positive(value: object) -> bool:
-    """Whether it is above 0."""
+    """Return whether it is above 0."""
     return number(value, lazy("“positive”")) > 0
 
 
 def is_negative(value: object) -> bool:
-    """Whether it is below 0."""
+    """Return whether it is below 0."""
     return number(value, lazy("“negative”")) < 0
 
 
 def is_divisible(value: object, by: object) -> bool:
-    """Whether nothing is left over; as the numbers are written, so 0.3 is divisible by 0.1."""
+    """Return whether the remainder is 0, in decimal arithmetic: 0.3 is divisible by 0.1."""
     found, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
     return Fraction(str(found)) % Fraction(str(divisor)) == 0
 
 
 def counting(first: object, last: object, step: object) -> Iterator[int | float]:
-    """From one number to another, up or down as they stand; the sign of the step does not matter."""
+    """Return the numbers from first to last, up or down; the sign of the step is ignored."""
     what = lazy("“count”")
     begin, end, wide = (number(each, what) for each in (first, last, step))
     if wide == 0:
         raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(what)))
     wide = abs(wide) if end >= begin else -abs(wide)
-    # A hair more: 0.1 three times is 0.30000000000000004, and 0 to 0.3 by 0.1 has four numbers.
+    # Tolerance for rounding errors: 0 to 0.3 by 0.1 has four numbers.
     rounds = min(math.floor((end - begin) / wide + 1e-9), _MOST_ROUNDS)
     whole = isinstance(begin, int) and isinstance(wide, int)
     return (begin + at * wide if whole else _neat(begin + at * wide, places=12) for at in range(rounds + 1))
@@ -196,6 +196,5 @@ def _no_result(what: str, value: object) -> BehaviourError:
 
 
 def _neat(value: float, places: int | None = 10) -> int | float:
-    """Without what a computer adds at the end: sin 30 is 0.5; a whole number is one."""
     found = value if places is None else round(value, places)
     return int(found) if found.is_integer() and abs(found) < _EXACT else found

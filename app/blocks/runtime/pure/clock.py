@@ -1,4 +1,4 @@
-"""The date and time of this computer: called by the blocks of the category "Time"."""
+"""Functions of the category "Time": date and time of this computer."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _DAYS = (
 
 
 def now(part: str) -> object:
-    """One part of the date and time of now; Monday is day 1 of the week."""
+    """Return one part of the current date and time; Monday is day 1 of the week."""
     return part_of_moment(_now(), part)
 
 
 def part_of_moment(moment: datetime, part: str) -> object:
-    """One part of a date and time."""
+    """Return one part of a date and time."""
     if part in ("year", "month", "day", "hour", "minute", "second"):
         return getattr(moment, part)
     if part == "weekday":
@@ -38,12 +38,12 @@ def part_of_moment(moment: datetime, part: str) -> object:
 
 
 def seconds_since(moment: object) -> float:
-    """Seconds since a time of today, a date, or both; below 0 for what is still to come."""
+    """Return the seconds since a time of today, a date, or both; negative for the future."""
     return round((_now() - read_moment(text(moment), _now())).total_seconds(), 3)
 
 
 def read_moment(written: str, today: datetime) -> datetime:
-    """“14:30”, “2026-11-23”, “2026-11-23 14:30:05”; BehaviourError for anything else."""
+    """Parse “14:30”, “2026-11-23” or “2026-11-23 14:30:05”. Raises BehaviourError."""
     words = written.strip()
     if ":" in words and "-" not in words:
         words = f"{today:%Y-%m-%d} {words.zfill(5) if words.count(':') == 1 else words.zfill(8)}"
@@ -58,5 +58,4 @@ _SHAPES = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M
 
 
 def _now() -> datetime:
-    """By the clock on the wall, as people write it."""
     return datetime.now().astimezone().replace(tzinfo=None)

@@ -1,7 +1,7 @@
-"""What programs do with lists: pure functions, called by the blocks of the category "Lists".
+"""Functions of the category "Lists".
 
-Items are numbered from 1, as people count. A list holds at most `MOST_ITEMS` items, those of lists inside it
-too; what is put in is copied, so no list is inside itself.
+Items are numbered from 1. A list holds at most `MOST_ITEMS` items, including those of nested lists; inserted
+lists are copied, so no list contains itself.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ FIRST, LAST, RANDOM = "first", "last", "random"
 
 
 def new_list(*items: object) -> list[object]:
-    """A list of these."""
+    """Return a list of these values."""
     return _own_list(items)
 
 
 def item(of: object, where: object) -> object:
-    """The item at a place: its number, "first", "last" or "random"."""
+    """Return the item at a position: its number, "first", "last" or "random"."""
     items = _read(of)
     return items[_index(items, where)]
 
 
 def set_item(of: object, where: object, value: object) -> None:
-    """Put a value in the place of an item."""
+    """Replace the item at a position."""
     items = _changed(of)
     place = _index(items, where)
     items[place] = _fitting(items, value)
 
 
 def insert_item(of: object, where: object, value: object) -> None:
-    """Put a value before the item at a place, or as the last; the next number after the last is fine too."""
+    """Insert a value before the item at a position, or at the end (also for the next free number)."""
     items = _changed(of)
     if where == LAST or (where != FIRST and where == len(items) + 1):
         place = len(items)
@@ -56,36 +56,36 @@ def insert_item(of: object, where: object, value: object) -> None:
 
 
 def add_item(of: object, value: object) -> None:
-    """Put a value at the end."""
+    """Append a value."""
     items = _changed(of)
     items.append(_fitting(items, value))
 
 
 def remove_item(of: object, where: object) -> object:
-    """Take an item out; it is given back."""
+    """Remove and return an item."""
     items = _changed(of)
     return items.pop(_index(items, where))
 
 
 def contains(where: object, value: object) -> bool:
-    """Whether a list has such an item, or a text has these words in it."""
+    """Return whether a list has an equal item, or a text contains this text."""
     if isinstance(where, str):
         return text(value) in where
     return any(_same(each, value) for each in _read(where))
 
 
 def position(of: object, value: object) -> int:
-    """The number of the first such item; 0 when there is none."""
+    """Return the number of the first equal item, or 0."""
     return next((place for place, each in enumerate(_read(of), 1) if _same(each, value)), 0)
 
 
 def each(of: object) -> list[object]:
-    """The items as they are now: a loop over them is not disturbed when the list changes."""
+    """Return a copy of the items, so that a loop isn't affected by changes."""
     return list(_read(of))
 
 
 def join_items(of: object, between: object) -> str:
-    """All items as one text, with this between them."""
+    """Join all items to a text with a separator."""
     joint, pieces, size = text(between), [], 0
     for one in _read(of):
         pieces.append(text(one))
@@ -98,7 +98,7 @@ def join_items(of: object, between: object) -> str:
 
 
 def split_text(words: object, at: object) -> list[object]:
-    """The pieces of a text between these characters; its single characters when there are none."""
+    """Split a text at a separator; into single characters if it is empty."""
     whole, joint = text(words), text(at)
     pieces = whole.split(joint) if joint else letters(whole)
     if len(pieces) > MOST_ITEMS:
@@ -107,71 +107,71 @@ def split_text(words: object, at: object) -> list[object]:
 
 
 def part_of_list(of: object, first: object, last: object) -> list[object]:
-    """The items from one number to another, both included; what is beyond the ends is left out."""
+    """Return the items from one number to another, both included; positions beyond the ends are ignored."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
     return _own_list(_read(of)[max(begin, 1) - 1 : max(end, 0)])
 
 
 def is_empty_list(of: object) -> bool:
-    """Whether nothing is in the list."""
+    """Return whether the list is empty."""
     return not _read(of)
 
 
 def clear_list(of: object) -> None:
-    """Take all items out."""
+    """Remove all items."""
     _changed(of).clear()
 
 
 def copy_of(of: object) -> list[object]:
-    """A list with the same items."""
+    """Return a copy of the list."""
     return _own_list(_read(of))
 
 
 def sorted_up(of: object) -> list[object]:
-    """The items from small to large: numbers, then texts, capital and small letters alike, then the rest."""
+    """Return the items in ascending order: numbers, then texts ignoring case, then the rest."""
     return sorted(_own_list(_read(of)), key=_rank)
 
 
 def sorted_down(of: object) -> list[object]:
-    """The items from large to small."""
+    """Return the items in descending order."""
     return sorted_up(of)[::-1]
 
 
 def turned_round(of: object) -> list[object]:
-    """The last item first."""
+    """Return the items in reverse order."""
     return _own_list(_read(of))[::-1]
 
 
 def shuffled(of: object) -> list[object]:
-    """The items in a random order."""
+    """Return the items in random order."""
     items = _own_list(_read(of))
     random.shuffle(items)
     return items
 
 
 def sum_of(of: object) -> int | float:
-    """All numbers of the list together; 0 for an empty one."""
+    """Return the sum of the numbers; 0 for an empty list."""
     return sum(_numbers(of, lazy("“sum”")))
 
 
 def average_of(of: object) -> float:
-    """The sum divided by how many there are."""
+    """Return the mean of the numbers."""
     items = _some(_numbers(of, lazy("“average”")))
     return sum(items) / len(items)
 
 
 def smallest_of(of: object) -> int | float:
-    """The smallest number."""
+    """Return the smallest number."""
     return min(_some(_numbers(of, lazy("“smallest number”"))))
 
 
 def largest_of(of: object) -> int | float:
-    """The largest number."""
+    """Return the largest number."""
     return max(_some(_numbers(of, lazy("“largest number”"))))
 
 
 def middle_of(of: object) -> int | float:
-    """The number in the middle when they are sorted; between the two in the middle of an even count."""
+    """Return the median of the numbers."""
     return statistics.median(_some(_numbers(of, lazy("“middle number”"))))
 
 
@@ -186,7 +186,6 @@ def _some(items: list[int | float]) -> list[int | float]:
 
 
 def _rank(value: object) -> tuple[int, float, str]:
-    """Where a value stands among others of any kind."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return (0, math.inf if math.isnan(value) else value, "")
     return (1 if isinstance(value, str) else 2, 0, text(value).casefold())
@@ -233,12 +232,10 @@ def _index(items: Sequence[object], where: object) -> int:
 
 
 def _same(one: object, other: object) -> bool:
-    """As "is" compares them; true is not 1."""
     return one == other and isinstance(one, bool) == isinstance(other, bool)
 
 
 def _fitting(items: list[object], value: object) -> object:
-    """A value that goes into a list: a list as a copy. BehaviourError when there is no room."""
     if len(items) >= MOST_ITEMS:
         raise _full()
     if not isinstance(value, (list, tuple)):
@@ -265,7 +262,6 @@ def _own(value: object) -> object:
 
 
 def _size(value: object, enough: int) -> int:
-    """How many items are in a value, those of lists inside it too; counted no further than ``enough``."""
     if not isinstance(value, (list, tuple)):
         return 0
     found, waiting = 0, [value]

@@ -1,6 +1,6 @@
-"""What programs do with text: pure functions, called by the blocks of the category "Text and answers".
+"""Functions of the category "Text and answers".
 
-Letters are counted from 1, as people see them (`values.letters`). Every value is taken as people write it.
+Characters are counted from 1 as people see them (`values.letters`). All values are converted to text first.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MOST_DIGITS = 300
 
 
 def letter(of: object, where: object) -> str:
-    """The letter at a place: its number, "first", "last" or "random"."""
+    """Return the character at a position: its number, "first", "last" or "random"."""
     all_of_it = letters(text(of))
     if not all_of_it:
         raise BehaviourError(_("The text is empty."))
@@ -50,65 +50,68 @@ def letter(of: object, where: object) -> str:
 
 
 def part_of_text(of: object, first: object, last: object) -> str:
-    """The letters from one number to another, both included; what is beyond the ends is left out."""
+    """Return the characters from one number to another, both included.
+
+    Positions beyond the ends are ignored.
+    """
     begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
     return "".join(letters(text(of))[max(begin, 1) - 1 : max(end, 0)])
 
 
 def position_in_text(of: object, piece: object) -> int:
-    """The number of the letter at which these characters begin; 0 when they are not there."""
+    """Return the position of a substring, or 0."""
     whole, wanted = text(of), text(piece)
     found = whole.find(wanted) if wanted else -1
     return 0 if found < 0 else len(letters(whole[:found])) + 1
 
 
 def has_in_it(of: object, piece: object) -> bool:
-    """Whether these characters are in the text."""
+    """Return whether the text contains this text."""
     return text(piece) in text(of)
 
 
 def starts_with(of: object, piece: object) -> bool:
-    """Whether the text begins with these characters."""
+    """Return whether the text starts with this text."""
     return text(of).startswith(text(piece))
 
 
 def ends_with(of: object, piece: object) -> bool:
-    """Whether the text ends with these characters."""
+    """Return whether the text ends with this text."""
     return text(of).endswith(text(piece))
 
 
 def same_words(one: object, other: object) -> bool:
-    """Whether both are the same but for capital letters and spaces around."""
+    """Return whether both texts are equal, ignoring case and surrounding spaces."""
     return _plain(one) == _plain(other)
 
 
 def is_empty(value: object) -> bool:
-    """Whether nothing is in the text, or only spaces."""
+    """Return whether the text is empty or only spaces."""
     return not text(value).strip()
 
 
 def in_capitals(value: object) -> str:
-    """In capital letters."""
+    """Return the text in upper case."""
     return text(value).upper()
 
 
 def in_small_letters(value: object) -> str:
-    """In small letters."""
+    """Return the text in lower case."""
     return text(value).lower()
 
 
 def without_spaces_around(value: object) -> str:
-    """Without spaces and line ends at its beginning and end."""
+    """Return the text without surrounding white space."""
     return text(value).strip()
 
 
 def backwards(value: object) -> str:
-    """The last letter first."""
+    """Return the text reversed."""
     return "".join(reversed(letters(text(value))))
 
 
 def replaced(of: object, old: object, new: object) -> str:
-    """The text with other characters in the place of these, wherever they are."""
+    """Return the text with all occurrences of a substring replaced."""
     whole, before, after = text(of), text(old), text(new)
     if not before:
         return whole
@@ -120,12 +123,12 @@ def replaced(of: object, old: object, new: object) -> str:
 
 
 def has_number(value: object) -> bool:
-    """Whether a number is written in it."""
+    """Return whether the text contains a number."""
     return _written(value) is not None
 
 
 def number_in(value: object) -> int | float:
-    """The first number that is written in a text; a number is itself."""
+    """Return the first number in a text; a number is returned unchanged."""
     if isinstance(value, (int, float)) or value is None:
         return number(value, lazy("“number in”"))
     found = _written(value)
@@ -135,7 +138,7 @@ def number_in(value: object) -> int | float:
 
 
 def _written(value: object) -> int | float | None:
-    """“12”, “−3.5”, “2,5” and “1,000” are numbers; a comma before three digits is none of a fraction."""  # noqa: RUF002
+    # “12”, “−3.5”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
     match = _NUMBER.search(text(value))
     if match is None or len(match[0]) > _MOST_DIGITS:
         return None
