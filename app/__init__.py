@@ -1,4 +1,5 @@
-"""NEP Studio, the desktop program.
+"""NEP Studio, the desktop application.
 
-Rooms import downward: `ui`, `core`, `blocks`, `robots`, and `nep` below them. `app.__main__` has every entry.
+Packages import downward: `ui`, `core`, `blocks`, `robots`, and `nep` below them. `app.__main__` holds every
+entry point.
 """

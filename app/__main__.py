@@ -1,7 +1,8 @@
-"""NEP Studio's entries: the window, a behaviour without a window, and the processes of a frozen build.
+"""Entry points of NEP Studio: the window, running a behaviour without a window, and child processes.
 
-``python -m app [FILE ...]`` opens the window, ``python -m app run FILE`` runs a behaviour with none. A frozen
-Studio is also its own child: ``--child`` runs a program, ``--module NAME`` a module that is a process.
+``python -m app [FILE ...]`` opens the window; ``python -m app run FILE`` runs a behaviour without it. A
+frozen build also starts its child processes from the same executable: ``--child`` runs a program, ``--module
+NAME`` runs one of `PROCESSES`.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ PROCESSES = (
 )
 
 GRACE_S = 5.0
-"""How long threads that are no daemons may take to end, when the window is closed and all of ours has."""
+"""Time that non-daemon threads get to end after the window has closed."""
 
 _log = logging.getLogger("studio")
 
 
 def window_parser() -> argparse.ArgumentParser:
-    """The options of ``python -m app``."""
+    """Return the argument parser of ``python -m app``."""
     made = argparse.ArgumentParser(
         prog="nep-studio",
         description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window."),
@@ -81,7 +82,7 @@ def window_parser() -> argparse.ArgumentParser:
 
 
 def run_parser() -> argparse.ArgumentParser:
-    """The options of ``python -m app run``."""
+    """Return the argument parser of ``python -m app run``."""
     made = argparse.ArgumentParser(
         prog="nep-studio run",
         description=_(
@@ -113,12 +114,12 @@ def run_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do what the command line asks; the exit code is 0 when it went well."""
+    """Run Studio with these command-line arguments and return the exit code (0 on success)."""
     prepare_streams()
     try:
         return _main(words_given() if arguments is None else list(arguments))
     except ImportError as error:
-        from app.core.reports.not_installed import why_not_imported  # noqa: PLC0415  for this alone
+        from app.core.reports.not_installed import why_not_imported  # noqa: PLC0415  needed only here
 
         why = why_not_imported(error)
         if not why:
@@ -134,16 +135,17 @@ def _main(given: Sequence[str]) -> int:
         return hand_over("app.blocks.runtime.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
         return hand_over(given[1], given[2:])
-    from app.core.storage.settings import kept_language  # noqa: PLC0415  processes of a frozen build need none
+    from app.core.storage.settings import kept_language  # noqa: PLC0415  not needed by child processes of a frozen build
 
-    tests_itself = any(word.startswith("--selft") for word in given)  # it leaves a person's settings alone
+    # a self-test leaves the user's settings unchanged
+    tests_itself = any(word.startswith("--selft") for word in given)
     begin("" if tests_itself else kept_language())
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     parser = window_parser()
     options = parser.parse_intermixed_args(given)
     if options.master is not None:
-        try:  # for the window, and for the processes that it starts
+        try:  # for the window and the processes that it starts
             os.environ[MASTER_VARIABLE] = master_address(options.master)
         except NepError as error:
             parser.error(str(error))
@@ -151,11 +153,12 @@ def _main(given: Sequence[str]) -> int:
         return end_process(self_test(options.selftest, web=options.web))
     if not options.web:
         parser.error(_("--no-web needs --selftest"))
-    gc.disable()  # a tenth of the time to start; the window collects by itself (`app.ui.startup.interpreter`)
-    # Qt reads the source of every module that is imported after it: first what has nothing to do with it.
+    # saves a tenth of the start time; the window runs the collector itself (`app.ui.startup.interpreter`)
+    gc.disable()
+    # Shiboken reads the source of every module imported after Qt, so modules without Qt are imported first.
     importlib.import_module("app.core.session")
     allow_many()
-    from app.ui.application import RESTART, Options, run  # noqa: PLC0415  without a window nothing loads Qt
+    from app.ui.application import RESTART, Options, run  # noqa: PLC0415  Qt is loaded only for a window
 
     code = run(
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
@@ -167,9 +170,9 @@ def _main(given: Sequence[str]) -> int:
 
 
 def start_again(theme: str | None) -> None:
-    """Start Studio as a process of its own, once this one has closed everything."""
-    from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  for this alone
-    from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  for this alone
+    """Start Studio as a new process, after this one has closed all its resources."""
+    from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
+    from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  needed only here
 
     subprocess.Popen(
         studio_command(theme),
@@ -180,11 +183,11 @@ def start_again(theme: str | None) -> None:
 
 
 def self_test(folder: Path, *, web: bool) -> int:
-    """Try in the real window whether all of Studio works; what came out is in ``folder``.
+    """Run the self-test in a real window and write its report to ``folder``.
 
-    0 when all went well, 1 when something did not (the report says what), 2 when ``folder`` can't be written.
+    Return 0 when all steps passed, 1 when one failed (see the report), 2 when ``folder`` can't be written.
     """
-    from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  for this alone
+    from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  needed only here
 
     try:
         is_root = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -197,22 +200,22 @@ def self_test(folder: Path, *, web: bool) -> int:
         test.begin("program", _("the program was loaded"))
         importlib.import_module("app.core.session")
         allow_many()
-        from app.ui.self_test import show_steps  # noqa: PLC0415  what can't be loaded is in the report
+        from app.ui.self_test import show_steps  # noqa: PLC0415  import errors go into the report
 
         return show_steps(test, web=web)
 
     gc.disable()  # as at every start of the window
     code = test.run(show)
     words = test.report.why or _("the self-test passed")
-    with suppress(OSError, ValueError):  # nobody may read it: the report is what counts
+    with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
         (sys.stderr if code else sys.stdout).write(f"{words}: {test.place.folder}\n")
     return code
 
 
 def run_behaviour(arguments: Sequence[str]) -> int:
-    """Run a behaviour file with no window; the exit code of `app.run`."""
+    """Run a behaviour file without a window and return the exit code (see `app.run`)."""
     options = run_parser().parse_args(arguments)
-    from app.run import run_file  # noqa: PLC0415  a child process needs none of it
+    from app.run import run_file  # noqa: PLC0415  not needed by child processes
 
     return run_file(
         options.file,
@@ -224,7 +227,7 @@ def run_behaviour(arguments: Sequence[str]) -> int:
 
 
 def hand_over(module: str, arguments: Sequence[str]) -> int:
-    """Become the process of one of our modules; 2 when it is none of them."""
+    """Run one of `PROCESSES` as ``__main__`` in this process; return 2 when ``module`` is not in the list."""
     if module not in PROCESSES:
         sys.stderr.write(
             _("no process '{module}'; available: {names}").format(module=module, names=", ".join(PROCESSES))
@@ -237,7 +240,7 @@ def hand_over(module: str, arguments: Sequence[str]) -> int:
 
 
 def still_running(within_s: float) -> tuple[str, ...]:
-    """The names of the threads for which Python would wait, and which do not end within that time."""
+    """Return the names of non-daemon threads that don't end within ``within_s`` seconds."""
     until = time.monotonic() + within_s
     others = [
         each
@@ -250,10 +253,10 @@ def still_running(within_s: float) -> tuple[str, ...]:
 
 
 def end_process(code: int, within_s: float = GRACE_S) -> int:
-    """``code`` when all threads have ended; else the log says which has not, and the process ends here.
+    """Return ``code`` once all threads have ended; otherwise log the remaining ones and exit the process.
 
-    Python waits for every thread that is no daemon: one of a plug-in that never ends, or one that writes to a
-    disk which does not answer, would leave a process without a window for ever.
+    Python waits for every non-daemon thread at exit: a plug-in's thread that never ends, or one that writes
+    to a disk that doesn't respond, would keep a process without a window alive forever.
     """
     left = still_running(within_s)
     if not left:

@@ -1,24 +1,24 @@
-"""The errors of Studio.
+"""Exceptions of Studio.
 
 ::
 
     AppError
-    ├── DocumentError        a behaviour file that can't be read or written
-    ├── CompileError         a workspace that can't become a program
-    ├── RunnerError          a program that can't be started or reached
-    ├── SettingsError        settings that can't be kept
-    ├── BackpackError        a backpack that can't be read or kept
-    ├── ReportError          a report of a problem that can't be written
-    ├── CurveError           what was typed is no curve that can be plotted
-    ├── QueryError           what was typed is no query that a message can be asked
-    ├── DescriptionError     a robot's description that can't be understood
-    │   └── DeclarationError one that a driver's Python declares
-    ├── RobotInputError      an action's input that the robot would refuse
-    ├── RobotValueError      what a driver tells is not of the type that it declared
-    └── RobotUnknownError    a robot that isn't there
+    ├── DocumentError        a behaviour file can't be read or written
+    ├── CompileError         a workspace can't be compiled to a program
+    ├── RunnerError          a program's process can't be started or reached
+    ├── SettingsError        settings can't be saved
+    ├── BackpackError        the backpack can't be read or saved
+    ├── ReportError          a problem report can't be written
+    ├── CurveError           a text is not a valid curve expression
+    ├── QueryError           a text is not a valid message query
+    ├── DescriptionError     a robot's description is invalid
+    │   └── DeclarationError a driver's Python declaration is invalid
+    ├── RobotInputError      an action's input is invalid
+    ├── RobotValueError      a driver's value doesn't match its declared type
+    └── RobotUnknownError    a robot is not connected
 
-The attributes come first, the sentence is made from them: lower case, no full stop, values in quotes, the
-next step behind a semicolon.
+Each sentence is built from the exception's attributes: lower case, no full stop, values in quotes, the
+next step after a semicolon.
 """
 
 from __future__ import annotations
@@ -33,10 +33,9 @@ LONGEST_NAME, LONGEST_PROBLEM = 40, 300
 
 
 class AppError(Exception):
-    """Anything that Studio can explain in one sentence: ``str(error)``."""
+    """Base class of errors that Studio explains in one sentence: ``str(error)``."""
 
     def __init__(self, sentence: str) -> None:
-        """Keep the sentence that a person reads."""
         super().__init__(sentence)
         self.sentence = sentence
 
@@ -44,11 +43,10 @@ class AppError(Exception):
 class DocumentError(AppError):
     """A behaviour file can't be read or written.
 
-    ``path`` is the file, ``reason`` a whole sentence that names it, ``advice`` what to do, if that is known.
+    ``path`` is the file, ``reason`` a sentence that names it, ``advice`` the next step, if known.
     """
 
     def __init__(self, path: Path | None, reason: str, advice: str = "") -> None:
-        """Make the sentence from the reason and the advice."""
         self.path = path
         self.reason = reason
         self.advice = advice
@@ -56,10 +54,9 @@ class DocumentError(AppError):
 
 
 class CompileError(AppError):
-    """A workspace can't become a program; ``block`` is the block's id when one is to blame."""
+    """A workspace can't be compiled to a program; ``block`` is the id of the block that causes it, if any."""
 
     def __init__(self, reason: str, block: str | None = None) -> None:
-        """Make the sentence from the reason."""
         self.reason = reason
         self.block = block
         super().__init__(reason)
@@ -70,24 +67,22 @@ class RunnerError(AppError):
 
 
 class SettingsError(AppError):
-    """The settings can't be kept; ``path`` is their file."""
+    """Settings can't be saved; ``path`` is their file."""
 
     def __init__(self, path: Path, reason: str) -> None:
-        """Make the sentence from the file's name and the reason."""
         self.path = path
         self.reason = reason
         super().__init__(_("can't save settings in '{path}': {reason}").format(path=path, reason=reason))
 
 
 class BackpackError(AppError):
-    """The backpack can't be read or kept, or it is full."""
+    """The backpack can't be read or saved, or it is full."""
 
 
 class ReportError(AppError):
-    """A report of a problem can't be written; ``path`` is where."""
+    """A problem report can't be written; ``path`` is its file."""
 
     def __init__(self, path: Path, reason: str, advice: str) -> None:
-        """Make the sentence from the file's name, the reason and the advice."""
         self.path = path
         self.reason = reason
         super().__init__(
@@ -96,18 +91,18 @@ class ReportError(AppError):
 
 
 class CurveError(AppError):
-    """What was typed is no curve that can be plotted."""
+    """A text is not a valid curve expression."""
 
 
 class QueryError(AppError):
-    """What was typed is no query that a message can be asked."""
+    """A text is not a valid message query."""
 
 
 class DescriptionError(AppError):
-    """A robot's description can't be understood; ``problems`` holds every sentence."""
+    """A robot's description is invalid; ``problems`` holds all sentences."""
 
     def __init__(self, name: str, problems: tuple[str, ...]) -> None:
-        """Make the sentence from the first problem, without what a stranger's text may do to a reader."""
+        # The description comes from another program, so its text is escaped and shortened.
         self.name = name
         self.problems = problems
         shown = shortened(escaped(name), LONGEST_NAME)
@@ -121,10 +116,9 @@ class DescriptionError(AppError):
 
 
 class DeclarationError(DescriptionError):
-    """A driver declares something that can't be described: ``declared`` names it, ``where`` its line."""
+    """A driver's declaration is invalid; ``declared`` is its name, ``where`` its line."""
 
     def __init__(self, declared: str, problem: str, where: str = "") -> None:
-        """Make the sentence from the line, the name and the problem."""
         super().__init__(declared, (problem,))
         self.declared = declared
         self.where = where
@@ -133,9 +127,9 @@ class DeclarationError(DescriptionError):
 
 
 class InputProblem(NamedTuple):
-    """What is wrong with one value of an action's input.
+    """Problem of one value of an action's input.
 
-    ``parameter`` is the value's name, "" when it is no parameter's; ``sentence`` is whole.
+    ``parameter`` is the value's name, or "" when it concerns no parameter; ``sentence`` is complete.
     """
 
     parameter: str
@@ -143,41 +137,39 @@ class InputProblem(NamedTuple):
 
 
 class RobotInputError(AppError):
-    """An action's input that the robot would refuse; ``sentences`` has one for each wrong value.
+    """An action's input is invalid; ``sentences`` has one sentence for each invalid value.
 
-    ``problems`` says of which value each one is.
+    ``problems`` assigns each sentence to its parameter.
     """
 
     def __init__(self, sentences: tuple[str, ...], problems: tuple[InputProblem, ...] = ()) -> None:
-        """Make the sentence from all of them."""
         self.sentences = sentences
         self.problems = problems or tuple(InputProblem("", sentence) for sentence in sentences)
         super().__init__("; ".join(sentences))
 
 
 class RobotValueError(AppError, ValueError):
-    """What a driver tells is not of the type that it declared.
+    """A driver's value doesn't match its declared type.
 
-    ``place`` says which value inside is meant; "" is the whole of it.
+    ``place`` is the part of the value that is invalid; "" means the whole value.
     """
 
     def __init__(self, words: str, place: str = "", **holes: object) -> None:
-        """Make the sentence from its `lazy` words, the place (hole ``place``) and what fills the others."""
+        # `words` is marked with `lazy`; its hole `place` and the others are filled here.
         self.place = place
         self._words, self._holes = words, holes
         super().__init__(_(words).format(place=place or _("the value"), **holes))
 
     def inside(self, outer: str) -> RobotValueError:
-        """The same of a value that this one is in."""
+        """Return this error for a value that contains the invalid one."""
         place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
         return RobotValueError(self._words, place, **self._holes)
 
 
 class RobotUnknownError(AppError):
-    """A robot that isn't connected; ``name`` is the one asked for."""
+    """A robot is not connected; ``name`` is its name."""
 
     def __init__(self, name: str) -> None:
-        """Make the sentence from the name."""
         self.name = name
         super().__init__(
             _("no robot '{robot}' is connected; switch it on or use a virtual one").format(robot=name)

@@ -1,7 +1,6 @@
-"""Where the files are that Studio ships: icons, fonts, examples, the web editor.
+"""Paths of the files that Studio ships: icons, fonts, examples, the web editor.
 
-In a checkout they are in ``resources/`` beside ``app/``, in an installed or frozen Studio in
-``app/_resources/``.
+A checkout has them in ``resources/`` beside ``app/``, an installed or frozen Studio in ``app/_resources/``.
 """
 
 from __future__ import annotations
@@ -10,14 +9,17 @@ from pathlib import Path
 
 
 def folder() -> Path:
-    """The folder that holds all resources."""
+    """Return the folder that holds all resources."""
     package = Path(__file__).resolve().parent
     installed = package / "_resources"
     return installed if installed.is_dir() else package.parent / "resources"
 
 
 def path(*parts: str) -> Path:
-    """One resource, such as ``path("icons", "play.svg")``; FileNotFoundError if Studio does not ship it."""
+    """Return the path of a resource, such as ``path("icons", "play.svg")``.
+
+    Raises FileNotFoundError if Studio doesn't ship it.
+    """
     found = folder().joinpath(*parts)
     if not found.exists():
         raise FileNotFoundError(

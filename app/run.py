@@ -1,7 +1,7 @@
-"""``python -m app run FILE``: one behaviour with no window.
+"""Command ``python -m app run FILE``: run a behaviour without a window.
 
-Exit codes: 0 it ended well, 1 a block failed or a robot did not stop, 2 the file can't be run, 3 a robot of
-it is not there, 4 a real robot would move and nobody said that it may, 130 it was stopped by Ctrl+C.
+Exit codes: 0 success, 1 a block failed or a robot did not stop, 2 the file can't be run, 3 a robot is
+missing, 4 a real robot would move without permission, 130 stopped by Ctrl+C.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 
 ROBOT_WAIT_S = 10.0
 SLICE_S = 0.1
 EVERYBODY_S = 3.0
-"""How long a behaviour that publishes waits for what the robots that are there say of themselves."""
+"""Time that a behaviour with publish blocks waits for the descriptions of all robots on the network."""
 LATE_S = 1.0
 _STARTER = re.compile(r"events_|robot_.*_when_")
 
@@ -56,14 +56,20 @@ def run_file(
     allow_moving: bool = False,
     keep_position: bool = False,
 ) -> int:
-    """Run a behaviour file to its end; the exit code of this module's docstring.
+    """Run a behaviour file to its end and return the exit code (see the module docstring).
 
-    It waits `robot_wait_s` for the robots that its blocks name. What happens is written to `out` (stdout),
-    one line each. Virtual robots begin at their start position, or where they are with `keep_position`.
-    Ctrl+C, or `interrupted` set by another thread, stops it and proves that the robots stopped. Without
-    `allow_moving` a behaviour that would move a robot which is not virtual is refused. When `out` takes
-    nothing more (its reader has left, its disk is full) the behaviour is stopped in the same way, and the
-    exit code is 1.
+    Ctrl+C stops the behaviour and waits for the proof that its robots stopped. When ``out`` can't be written
+    (its reader has closed it, the disk is full) the behaviour is stopped in the same way and the exit code is
+    1.
+
+    Args:
+        path: Behaviour file.
+        robot_wait_s: Seconds to wait for the robots that the blocks name.
+        master: Master address; default as for `nep.node`.
+        out: Stream for the output, one event per line; default stdout.
+        interrupted: Event that another thread can set to stop the behaviour like Ctrl+C.
+        allow_moving: Allow the behaviour to move real robots; otherwise it is rejected if it would.
+        keep_position: Leave virtual robots where they are; otherwise they are moved to their start position.
     """
     ending = interrupted or threading.Event()
     say = _Lines(out or sys.stdout, ending)
@@ -99,16 +105,15 @@ def run_file(
 def _robots_for(
     workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
 ) -> FoundRobots:
-    """The robots that a behaviour names, once they are there; all that are there when it publishes."""
     wanted = robots_named(workspace)
     found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else FoundRobots()
     if compile_behaviour(workspace, found.robots, absent=known).publishes:
-        found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # it may move any of them
+        found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # publish blocks may move any of them
     return found
 
 
 def _judged(found: FoundRobots) -> FoundRobots:
-    """The same; virtual are only robots whose programs are known to be ours (docs/trust.md)."""
+    # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
     processes = VirtualProcesses(VIRTUAL_ROBOTS.values())
     robots = (
         replace(robot, virtual=robot.virtual and processes.is_ours(found.owners[robot.name]))
@@ -120,7 +125,7 @@ def _judged(found: FoundRobots) -> FoundRobots:
 
 
 def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
-    """The robots that the scripts name which something starts, described in the file or not."""
+    """Return the names of robots in scripts that an event starts, described in the file or not."""
     parsed = parse_workspace(workspace)
     started = tuple(script for script in parsed.scripts if _STARTER.match(script[0].type))
     blocks = Workspace(started, parsed.variables).all_blocks()
@@ -128,7 +133,7 @@ def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
 
 
 class _Lines:
-    """Writes lines from any thread. When they can't be written any more, the behaviour is to end."""
+    """Thread-safe line writer. Sets `ending` when the stream can't be written any more."""
 
     def __init__(self, stream: TextIO, ending: threading.Event) -> None:
         self._stream = stream
@@ -138,11 +143,10 @@ class _Lines:
 
     @property
     def is_lost(self) -> bool:
-        """Whether a line could not be written."""
         return self._problem is not None
 
     def __call__(self, text: str) -> None:
-        """Write one line, or those of a text of several; letters that a terminal obeys are shown."""
+        # Control characters are escaped: the text may come from other programs.
         line = escaped(text, lines=True)
         with self._lock:
             if self._problem is not None:
@@ -157,7 +161,7 @@ class _Lines:
                 self._ending.set()
 
     def tell_problem(self) -> None:
-        """Say on the error stream why nothing was written any more; nothing when its reader has left."""
+        # Silent when the reader closed the stream: that is a normal end.
         if self._problem:
             tell(
                 _("the output cannot be written: {reason}; the behaviour was stopped.").format(
@@ -167,7 +171,6 @@ class _Lines:
 
 
 def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
-    """The robots that the file describes; one that can't be understood is as good as not described."""
     found = []
     for description in descriptions.values():
         try:
@@ -180,7 +183,6 @@ def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
 def _refused(
     program: Program, wanted: Sequence[str], robots: Sequence[Robot], say: Callable[[str], None]
 ) -> int | None:
-    """Tell the problems; the exit code if the program must not run with them."""
     for problem in program.problems:
         words = _("error: {sentence}") if problem.severity == "error" else _("warning: {sentence}")
         say(words.format(sentence=problem.sentence))
@@ -195,7 +197,6 @@ def _refused(
 
 
 def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
-    """Name each real robot that the program would move; whether there is one."""
     real = [robot for robot in robots if not robot.virtual]
     wanted = wanted_by(program, real)
     moves = {robot.name: risky(robot, asked) for robot, asked in wanted}
@@ -210,7 +211,6 @@ def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], 
 
 
 def _to_start(node: nep.Node, robots: Sequence[Robot]) -> None:
-    """Put virtual robots back to where they stood at first."""
     names = [robot.name for robot in robots]
     for topic in filter(None, (robot.topics.world for robot in robots)):
         with node.new_pub(topic, "json") as world:
@@ -219,7 +219,7 @@ def _to_start(node: nep.Node, robots: Sequence[Robot]) -> None:
 
 @dataclass(frozen=True)
 class _Reach:
-    """How the network is reached: the master's address, the node, and the way to stop robots."""
+    """Connection to the network: master address, node, and the stopper of robots."""
 
     master: str | None
     node: nep.Node
@@ -246,7 +246,7 @@ def _run(
     except KeyboardInterrupt:
         was_interrupted = True
     with without_interrupts():
-        # at once; and again when the program is gone and can't move them any more
+        # Once at once, and again after the program has ended and can't move the robots any more.
         stopper.send_stop(ends=runner.program_key)
         runner.close()
         names = [*(robot.name for robot in found.robots if robot.name in program.robots), *told.silent]
@@ -259,7 +259,7 @@ def _run(
 
 
 class _LateRobots:
-    """Lets a program that publishes know which robots have come: it may not move them."""
+    """Reports newly found robots to a program with publish blocks, which must not move them."""
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
@@ -267,7 +267,6 @@ class _LateRobots:
         self._known: tuple[str, ...] = ()
 
     def look(self) -> None:
-        """Once a second: whoever is new is told."""
         if time.monotonic() < self._next_s:
             return
         with suppress(NepError):
@@ -283,7 +282,7 @@ class _LateRobots:
 
 
 class _Told:
-    """Writes what the program tells; remembers whether it ended well."""
+    """Writes the runner's events as lines and stores how the run ended."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -305,7 +304,7 @@ class _Told:
 
 
 def stop_lines(report: StopReport) -> list[str]:
-    """The stop in words: "all 2 robots stopped (41 ms)", and each robot that did not."""
+    """Return the result of a stop as lines: "all 2 robots stopped (41 ms)", and each robot that did not."""
     strange = [
         _("“{program}” answered Stop in the name of {robot}; that does not count.").format(
             program=program, robot=name

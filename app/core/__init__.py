@@ -1,4 +1,5 @@
-"""What the window shows and does, without the window: session, mailbox, runner. No Qt.
+"""State and logic of the window without Qt: session, mailbox, runner.
 
-`app.core.session.Session` joins its rooms; threads hand over to it by `app.core.network.mailbox` alone.
+`app.core.session.Session` connects its parts; threads pass data to it only through
+`app.core.network.mailbox`.
 """

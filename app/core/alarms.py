@@ -1,4 +1,7 @@
-"""The session's alarms: kept in one file, fed with what arrives, told as alerts, and carried out here."""
+"""Alarms of a session.
+
+Stored in one file, evaluated on messages and graphs, shown as alerts, and executed.
+"""
 
 from __future__ import annotations
 
@@ -36,24 +39,25 @@ from nep.protocol.graph_view import GraphView
 
 FILE = "alarms.json"
 SHOW = "panel:alarms"
-"""The window's command that shows them."""
+"""Window command that shows the alarms panel."""
 LATE_S = 10.0
-"""What waited for a master for longer is not sent any more: who knows what is so by then."""
+"""Maximum age of a message that waits for a master. Older ones are discarded, because they may no longer be
+valid."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
 NOT_CARRIED = lazy("an alarm can't carry out its action: {error}")
 _MOST_BYTES = 4_000_000
 MILD = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
-"""What is a warning; the rest is an error."""
+"""Kinds of conditions that are warnings; all others are errors."""
 
 
 def severity_of(condition: AlarmCondition) -> str:
-    """How an alarm of this kind is told: "error" or "warn"."""
+    """Return the severity of an alarm with this condition: "error" or "warn"."""
     return "warn" if condition.kind in MILD else "error"
 
 
 class AlarmSession(Protocol):
-    """What alarms use of the session that they belong to."""
+    """Parts of the session that alarms use."""
 
     settings: Settings
     alerts: Alerts
@@ -64,23 +68,23 @@ class AlarmSession(Protocol):
     runs: Runs
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic until the watch is closed."""
+        """Subscribe to a topic until the watch is closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class _AskedSend:
-    """A message that waits for the answer to a question."""
+    """Message that waits for the answer to a motion question."""
 
     question: Question
     done: Done
 
 
 class SessionAlarms:
-    """The alarms of a session. One thread uses it (the window's), but for `take`.
+    """Alarms of a session. Not thread-safe except `take`: use it from the window's thread.
 
-    ``keep`` keeps the last seconds of what happened, ``run_behaviour`` runs a behaviour by its name and gives
-    why it can't; each is set by who can, and until then such an action says that it can't be done.
-    ``on_event`` is told of each that came on, went off or is still on.
+    ``keep`` saves the flight recorder; ``run_behaviour`` runs a behaviour by name and returns an error
+    sentence or "". Until their owners set them, such actions fail with a reason. ``on_event`` is called for
+    each alarm that went on, went off or is still on.
     """
 
     def __init__(
@@ -90,14 +94,13 @@ class SessionAlarms:
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
     ) -> None:
-        """Read what was kept beside the settings; without a ``path`` they are kept in memory alone."""
         self._session = session
         self.path: Path | None = session.settings.path.with_name(FILE)
         self._clock, self._clock_s = clock, clock_s
         self._commands = AlarmCommands(session.fleet.gate.refusal_now)
         self._asked: _AskedSend | None = None
         self.on_moved: OnMoved = ignore_moved
-        """Told the robots that a message moves, and "alarm", before it is sent."""
+        """Called before a message that moves robots is sent, with the robots and "alarm"."""
         self.keep: Carrier | None = None
         self.run_behaviour: Callable[[str], str] | None = None
         self.on_event: Callable[[AlarmEvent], object] = _nobody
@@ -121,42 +124,41 @@ class SessionAlarms:
         self._view: GraphView | None = None
         self._on: set[str] = set()
 
-    # ---- what the panel and menus do
+    # ---- interface of the panel and menus
 
     @property
     def rules(self) -> tuple[AlarmRule, ...]:
-        """All alarms, the newest first."""
+        """All alarms, newest first."""
         return self.alarms.rules
 
     @property
     def history(self) -> AlarmHistory:
-        """What happened, bounded."""
+        """Bounded list of past alarm events."""
         return self.alarms.history
 
     @property
     def revision(self) -> int:
-        """Grows with the rules and the history, not with what is seen."""
+        """Counter that increases with each change of the rules or the history (not of the current values)."""
         return self.alarms.revision + self.history.revision
 
     @property
     def on(self) -> Sequence[AlarmRule]:
-        """Those that are on and not snoozed."""
+        """Alarms that are on and not snoozed."""
         return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
 
     def new(self, condition: AlarmCondition) -> AlarmRule:
-        """Begin an alarm, which shows a banner; it is watched as soon as nothing is missing."""
+        """Add an alarm that shows a banner; it is evaluated as soon as it is complete."""
         rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
         self.put(rule)
         return rule
 
     def put(self, rule: AlarmRule) -> None:
-        """Add an alarm, or change the one of this id; what is one too many an alert tells."""
+        """Add an alarm or replace the one with this id; raise an alert when the list is full."""
         if self.alarms.rule(rule.id) is not None or self._has_room():
             self.alarms.put(rule)
             self._follow_rules()
 
     def _has_room(self) -> bool:
-        """Whether one more may be added: no file holds more."""
         if len(self.rules) < MOST_ALARMS:
             return True
         said = _("You have {count} alarms, the maximum.").format(count=MOST_ALARMS)
@@ -167,7 +169,7 @@ class SessionAlarms:
         return False
 
     def remove(self, rule_id: str) -> AlarmRule | None:
-        """Remove an alarm; `put_back` is its undo."""
+        """Remove and return an alarm; `put_back` undoes it."""
         rule = self.alarms.rule(rule_id)
         if rule is not None:
             self._removed = (rule, self.rules.index(rule))
@@ -177,7 +179,7 @@ class SessionAlarms:
         return rule
 
     def put_back(self) -> None:
-        """Put the alarm that was removed last in its place again."""
+        """Restore the last removed alarm at its position."""
         if self._removed is not None and self._has_room():
             (rule, place), self._removed = self._removed, None
             rules = [*self.rules]
@@ -186,28 +188,28 @@ class SessionAlarms:
             self._follow_rules()
 
     def snooze(self, rule_id: str, until_s: float) -> None:
-        """Let nothing be done until then, in seconds since 1970; 0 ends it."""
+        """Suppress the actions of an alarm until ``until_s`` (seconds since 1970); 0 ends the snooze."""
         self.alarms.snooze(rule_id, until_s)
         if until_s > self._clock_s():
             self._session.alerts.dismiss(_alert_id(rule_id))
 
-    # ---- what the session does
+    # ---- interface of the session
 
     def take(self, topic: str, messages: Sequence[Message]) -> None:
-        """Messages arrived; called in the thread in which they do."""
+        """Evaluate messages of a topic. Called in the thread that receives them."""
         self.alarms.evaluator.take(topic, messages)
 
     def see(self, view: GraphView | None) -> None:
-        """A new graph; None when the master has gone."""
+        """Evaluate a new graph; None when the master is lost."""
         self._view = view
         self.alarms.evaluator.see(view)
 
     def start(self) -> None:
-        """Begin to look at what the alarms are about."""
+        """Subscribe to the topics of the alarms."""
         self._follow_rules()
 
     def tick(self) -> None:
-        """Let time go by."""
+        """Process the events and actions that are due."""
         for event in self.alarms.tick():
             self._show(event)
         self.alarms.take_deeds()
@@ -220,7 +222,7 @@ class SessionAlarms:
             )
 
     def check(self) -> None:
-        """Once a second: what alerts say is renewed, and what changed is kept."""
+        """Refresh the alerts and save changes. Called once a second."""
         for rule in self.rules:
             if rule.id in self._on:
                 self._say(rule, self.alarms.evaluator.state(rule).seen, count=0)
@@ -229,7 +231,7 @@ class SessionAlarms:
             if self._worker.take(FILE):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
-            self._written = None  # tried again in a second
+            self._written = None  # retried at the next check
             self._session.alerts.put(
                 "alarms:kept",
                 "warn",
@@ -239,7 +241,7 @@ class SessionAlarms:
             )
 
     def close(self) -> None:
-        """Keep what is not kept yet, and look at nothing any more."""
+        """Close the watches and save pending changes."""
         for watch in self._watches.values():
             watch.close()
         self._watches.clear()
@@ -267,7 +269,7 @@ class SessionAlarms:
             alerts.resolve(_alert_id(rule.id))
             return
         if event.kind == "still":
-            alerts.resolve(_alert_id(rule.id))  # its banner was closed with the snooze
+            alerts.resolve(_alert_id(rule.id))  # its banner was dismissed by the snooze
         self._on.add(rule.id)
         self._say(rule, event.seen, count=1)
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
@@ -275,7 +277,7 @@ class SessionAlarms:
 
     def _say(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
-        # of the value that did it, not of what is now, as long as the history has it
+        # prefers the recorded value that triggered the alarm over the current one
         words = record.words if record is not None else what_words(condition, seen)
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
             said = _("{topic} has been silent for {time}")
@@ -293,7 +295,7 @@ class SessionAlarms:
             count=max(count, now - known) if known else max(1, count),
         )
 
-    # ---- what is done
+    # ---- actions
 
     def _console(self, event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
         words = what_words(event.rule.condition, event.seen)
@@ -326,7 +328,6 @@ class SessionAlarms:
         done(True, _("Stop was sent to all robots"))
 
     def _send(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        """Send a message; what moves a real robot once a person has said that it may."""
         fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
             done(False, _("not sent: waiting for permission to move a robot"))
@@ -359,7 +360,7 @@ class SessionAlarms:
 
         self._session.source.submit(NOT_CARRIED, job)
 
-    # ---- their file
+    # ---- file
 
     def _state(self) -> tuple[tuple[AlarmRule, ...], int]:
         return self.rules, self.history.revision
@@ -369,7 +370,8 @@ class SessionAlarms:
         if path is None or self._is_newer or state == self._written:
             return
         self._written = state
-        rules = [rule for rule in self.rules if problem_of(rule) is None]  # or it can't be read back
+        # an incomplete rule could not be read back
+        rules = [rule for rule in self.rules if problem_of(rule) is None]
         kept = AlarmHistory([replace(record) for record in self.history.records])
 
         def write() -> bool:
@@ -379,8 +381,6 @@ class SessionAlarms:
         self._worker.ask(FILE, write)
 
     def _read(self, path: Path) -> AlarmFile:
-        """What was kept; what is damaged is put aside, and said."""
-
         def parse(data: bytes) -> tuple[AlarmFile, str]:
             found = read_text(data, path.name, lenient=True)
             return found, next(iter(found.problems), "")
@@ -396,8 +396,7 @@ class SessionAlarms:
         return kept.value if kept.value is not None else AlarmFile()
 
 
-def _nobody(_event: AlarmEvent) -> None:
-    """Nobody wants to know."""
+def _nobody(_event: AlarmEvent) -> None: ...
 
 
 def _alert_id(rule_id: str) -> str:
@@ -405,5 +404,4 @@ def _alert_id(rule_id: str) -> str:
 
 
 def _told(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
-    """The alert is there already (`SessionAlarms._show`)."""
     done(True, "")

@@ -1,4 +1,4 @@
-"""Present problems, each with an id, a sentence and a next step; removed when cured."""
+"""Active alerts, each with an id, a sentence and a next step; removed when resolved."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ SEVERITIES = ("error", "warn", "info")
 
 @dataclass(frozen=True, slots=True)
 class ActiveAlert:
-    """One present problem.
+    """One active problem.
 
-    ``title`` says what is wrong, ``detail`` what it means, ``button`` and ``action`` the next step (words,
-    and the name of a command of the window). ``since_s`` is on the clock that `Alerts` was given; ``count``
-    is how often it happened since it was last cured. ``for_developers``: only the Developer layout tells it.
+    ``title`` is the problem, ``detail`` its meaning, ``button`` and ``action`` the next step (label and name
+    of a window command). ``since_s`` is on the clock given to `Alerts`; ``count`` is the number of
+    occurrences since it was last resolved. With ``for_developers`` only the Developer layout shows it.
     """
 
     id: str
@@ -30,10 +30,9 @@ class ActiveAlert:
 
 
 class Alerts:
-    """The present problems, worst first. One thread uses it (the window's)."""
+    """Active alerts, worst first. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
-        """Start with no problem; ``clock`` gives epoch seconds."""
         self._clock = clock
         self._alerts: dict[str, ActiveAlert] = {}
         self._dismissed: set[str] = set()
@@ -42,7 +41,7 @@ class Alerts:
 
     @property
     def active(self) -> Sequence[ActiveAlert]:
-        """All present problems: errors, then warnings, then infos; the oldest first among equals."""
+        """All active alerts: errors, then warnings, then infos; the oldest first within a severity."""
         if self._sorted is None:
             order = {severity: place for place, severity in enumerate(SEVERITIES)}
             self._sorted = tuple(
@@ -51,7 +50,7 @@ class Alerts:
         return self._sorted
 
     def to_tell(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
-        """Return errors and warnings, worst first; those for developers only when asked for."""
+        """Return errors and warnings, worst first; those for developers only if requested."""
         return [
             alert
             for alert in self.active
@@ -70,7 +69,10 @@ class Alerts:
         count: int = 1,
         for_developers: bool = False,
     ) -> None:
-        """Say that a problem is present. Said again, its words are renewed and ``count`` is added."""
+        """Raise or update an alert; on an update, ``count`` is added to its occurrences.
+
+        Raises: ValueError: ``severity`` is not in `SEVERITIES`.
+        """
         if severity not in SEVERITIES:
             raise ValueError(f"no severity '{severity}'; use one of {', '.join(SEVERITIES)}")
         old = self._alerts.get(id)
@@ -93,32 +95,32 @@ class Alerts:
             self._changed()
 
     def resolve(self, id: str) -> None:
-        """The problem is gone; nothing happens when there was none."""
+        """Remove an alert; no effect when it isn't active."""
         self._dismissed.discard(id)
         if self._alerts.pop(id, None) is not None:
             self._changed()
 
     def resolve_all(self, prefix: str) -> None:
-        """Cure every problem whose id begins with ``prefix``."""
+        """Remove every alert whose id starts with ``prefix``."""
         for id in [id for id in self._alerts if id.startswith(prefix)]:
             self.resolve(id)
 
     def has(self, id: str) -> bool:
-        """Whether this problem is present."""
+        """Return whether the alert is active."""
         return id in self._alerts
 
     def get(self, id: str) -> ActiveAlert | None:
-        """Return the problem of this id; None when it is not present."""
+        """Return the active alert with this id, or None."""
         return self._alerts.get(id)
 
     def dismiss(self, id: str) -> None:
-        """Hide it in the banner until it is cured and comes back; it stays among `active`."""
+        """Hide an alert's banner until it is resolved and raised again; it stays in `active`."""
         if id in self._alerts and id not in self._dismissed:
             self._dismissed.add(id)
             self.revision += 1
 
     def dismissed(self, id: str) -> bool:
-        """Whether a person closed its banner."""
+        """Return whether the user closed the alert's banner."""
         return id in self._dismissed
 
     def _changed(self) -> None:

@@ -1,7 +1,7 @@
-"""What happened, line by line: the newest 5000 records, Studio's own and those that programs log on the bus.
+"""Console: the newest 5000 log records of Studio and of programs on the network.
 
-Records of the bus (`nep.nodes.log_handler`) are kept as the messages that they are and decoded when somebody
-reads `Console.records`: a console that nobody looks at costs next to nothing.
+Records from the network (`nep.nodes.log_handler`) are stored as messages and decoded when `Console.records`
+is read, so a hidden console costs almost nothing.
 """
 
 from __future__ import annotations
@@ -25,10 +25,9 @@ _LEVELS = {"warning": "warn"}
 
 @dataclass(frozen=True, slots=True)
 class ConsoleRecord:
-    """One line: epoch seconds, level (debug, info, warn, error, critical), who says it, and the text.
+    """One log record: epoch seconds, level (debug, info, warn, error, critical), origin and text.
 
-    ``number`` counts all lines from 1. ``logger`` is the part of the program that says it and ``place`` the
-    file and line, where that is known.
+    ``number`` counts records from 1. ``logger`` names the logger and ``place`` the file and line, if known.
     """
 
     stamp_s: float
@@ -41,10 +40,9 @@ class ConsoleRecord:
 
 
 class Console:
-    """A ring of log records, oldest first. One thread uses it (the window's)."""
+    """Ring buffer of log records, oldest first. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, clock: Callable[[], float] = time.time, capacity: int = CAPACITY) -> None:
-        """Keep at most ``capacity`` records; ``clock`` gives epoch seconds."""
         self._clock = clock
         self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
@@ -52,21 +50,21 @@ class Console:
         self._errors = log_handler.ShownErrors()
         self._count = 0
         self.left_out = 0
-        """Records of the bus that were dropped because too many came at once."""
+        """Number of records from the network that were dropped because too many arrived at once."""
         self.revision = 0
 
     @property
     def records(self) -> Sequence[ConsoleRecord]:
-        """The records, oldest first; those of the bus that nobody has read yet are decoded now."""
+        """Records, oldest first; decodes pending messages."""
         self._read()
-        return self._lines  # type: ignore[return-value]  # all are records now
+        return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
-        """Add one line; a very long text is cut and says so."""
+        """Add a record; text longer than `TEXT_LIMIT` is shortened visibly."""
         self._put([ConsoleRecord(self._clock(), level, origin, _cut(text))])
 
     def take(self, messages: Sequence[Message], dropped: int = 0) -> None:
-        """Add records of the bus; ``dropped`` are those that were lost before these."""
+        """Add log messages from the network; ``dropped`` is the number of messages lost before them."""
         if dropped:
             self.left_out += dropped
             words = ngettext(
@@ -79,18 +77,21 @@ class Console:
             self._put(messages)
 
     def leave_out(self, pid: int | None) -> None:
-        """Records of that process are told in another way: a program that runs here prints into our pipe."""
+        """Ignore log messages of a process whose output already arrives through a pipe."""
         if pid is not None:
             self._own.append(pid)
 
     def clear(self) -> None:
-        """Forget all records."""
+        """Remove all records."""
         self._lines.clear()
         self._unread = 0
         self.revision += 1
 
     def rewind(self) -> None:
-        """Forget all: the source is at another time, and says again what it said."""
+        """Remove all records and known errors.
+
+        The replay moved to another time and sends its records again.
+        """
         self._errors = log_handler.ShownErrors()
         self.clear()
 
@@ -100,7 +101,6 @@ class Console:
         self.revision += 1
 
     def _read(self) -> None:
-        """Put records in the place of the messages at the end, and number them."""
         unread = [self._lines.pop() for _unread in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
@@ -109,7 +109,6 @@ class Console:
                 self._lines.append(replace(record, number=self._count))
 
     def _of_bus(self, message: Message) -> Sequence[ConsoleRecord]:
-        """The records in a message; a list of a node's last errors has those that did not come before."""
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
                 given = self._errors.new_in(message.payload)
@@ -117,7 +116,7 @@ class Console:
                 one = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
                 given = [one] if self._errors.is_new(one) else []
         except NepError:
-            return ()  # an alert says so, as for every topic
+            return ()  # an alert reports it, as for every topic
         return [self._record(each) for each in given if each.pid is None or each.pid not in self._own]
 
     def _record(self, given: log_handler.LogRecord) -> ConsoleRecord:

@@ -1,7 +1,7 @@
-"""Errors of Studio itself: heard wherever they are, said once, and never the end of what comes after.
+"""Unexpected errors of Studio: logged once, shown as an alert, and isolated from the steps that follow.
 
-Everything goes through `logging`: what is raised and caught nowhere (`install_hooks`, in any thread), what a
-guard caught (`log_errors`), and what Qt says. Handlers that a person reads have a `RepeatFilter`.
+Everything goes through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught by a
+guard (`log_errors`), and Qt's messages. Handlers that people read have a `RepeatFilter`.
 """
 
 from __future__ import annotations
@@ -27,49 +27,51 @@ from nep.version import __version__
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 FAULTS_KEPT = 500
 IN_CONSOLE: dict[str, object] = {"in_console": True}
-"""The `extra` of a record that the Console has in words of its own: it is for the log file."""
+"""`extra` of a record that the Console already shows in other words; only the log file gets it."""
 WRITER = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
 WELL_S = 5.0
-"""So long must what failed have gone well: what fails now and then must not make the banner flicker."""
+"""Time without a failure after which a fault is over, so that intermittent faults don't make the banner
+flicker."""
 OVER_S = 60.0
-"""What is not tried again (an event that came once) is over after so long; the log has it."""
+"""Time after which a fault of a step that isn't repeated (a single event) is over; it stays in the log."""
 MOST = 100
 
 _log = logging.getLogger("studio")
 
 
 def log_folder() -> Path:
-    """Where the log files are: the system's place for them, or below ``$NEP_STUDIO_HOME``."""
+    """Return the folder of the log files: the system's log folder, or ``log`` below ``$NEP_STUDIO_HOME``."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) / "log" if chosen else Path(platformdirs.user_log_dir("nep-studio", appauthor=False))
 
 
 @contextmanager
 def log_errors(what: str) -> Iterator[None]:
-    """Log what goes wrong inside as "can't ``what``", with its traceback, and go on behind it."""
+    """Return a context that logs exceptions as "can't ``what``" with the traceback and suppresses them."""
     try:
         yield
-    except Exception:  # noqa: BLE001  whatever it is: what comes after still has its turn
+    except Exception:  # noqa: BLE001  the caller must continue after any error
         _log.exception("can't %s", what)
 
 
 class RepeatFilter:
-    """Says a fault when it is new, and when it has happened 10, 100, 1000 ... times, with the count.
+    """Logging filter that passes a fault when it is new and at its 10th, 100th, 1000th ... occurrence.
 
-    The same are records of one logger and level, raised at one place or with one text. The newest 500 faults
-    are known; an older one that happens again is new. Handlers call it under their own lock.
+    Records are equal if they have the same logger and level, and were raised at the same line or have the
+    same text. The newest 500 faults are known; an older one counts as new. Thread-safe only under the
+    handler's own lock, which logging holds.
     """
 
     def __init__(self) -> None:
         self._counts: dict[tuple[object, ...], int] = {}
 
     def filter(self, record: logging.LogRecord) -> logging.LogRecord | None:
-        """The record as it is to be written, or None; one that was written before says how often it came.
+        """Return the record to write, with its number of occurrences if it is a repetition, or None.
 
-        It never raises: whoever logs must not end because of the words.
+        Never raises, so that logging can't fail because of a record's arguments.
         """
         record = _sayable(record)
         key = (record.name, record.levelno, _place(record) or record.getMessage())
@@ -83,15 +85,14 @@ class RepeatFilter:
             return None
         again = logging.makeLogRecord(record.__dict__)
         again.msg, again.args = f"{record.getMessage()} ({count} times)", ()
-        again.exc_info, again.exc_text = None, None  # the first one told where
+        again.exc_info, again.exc_text = None, None  # the first record has the traceback
         return again
 
 
 def _sayable(record: logging.LogRecord) -> logging.LogRecord:
-    """The record; where its values do not fit its text, or can't be said, one with the text only."""
     try:
         record.getMessage()
-    except Exception as error:  # noqa: BLE001  values are of any class
+    except Exception as error:  # noqa: BLE001  arguments may have any class
         text = record.msg if isinstance(record.msg, str) else type(record.msg).__name__
         made = logging.makeLogRecord(record.__dict__)
         made.msg, made.args = f"{text} (its values can't be said: {type(error).__name__})", ()
@@ -101,7 +102,6 @@ def _sayable(record: logging.LogRecord) -> logging.LogRecord:
 
 
 def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
-    """The type of an exception and the line that raised it; None when a record has none."""
     if not record.exc_info or record.exc_info[0] is None:
         return None
     kind, _error, trace = record.exc_info
@@ -112,14 +112,14 @@ def _place(record: logging.LogRecord) -> tuple[object, ...] | None:
 
 
 class LogFile(RotatingFileHandler):
-    """Warnings and errors with their tracebacks: ``studio.log`` and three older ones of a megabyte each.
+    """Log file of warnings and errors: ``studio.log`` and three older ones of 1 MB each.
 
-    The first line that a run writes, in each file, says its version: an update goes on in the same file.
-    Only the user may read them. A disk that is full or read-only ends nothing: the line is lost.
+    The first line of a run in each file states its version, because an update continues in the same file.
+    Only the user can read the files. Lines that can't be written (disk full or read-only) are dropped.
     """
 
     def __init__(self, folder: Path) -> None:
-        """The folder is made with the first line."""
+        # `delay`: the folder is created with the first line.
         super().__init__(
             folder / "studio.log", maxBytes=FILE_BYTES, backupCount=FILES_KEPT, encoding="utf-8", delay=True
         )
@@ -128,7 +128,7 @@ class LogFile(RotatingFileHandler):
         self._once = RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a line, once."""
+        """Write the record unless it is a repetition."""
         told = self._once.filter(record)
         if told is not None:
             super().emit(told)
@@ -143,11 +143,14 @@ class LogFile(RotatingFileHandler):
         return stream
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
-        """Nothing: there is no better place to say it, and the Console has the line."""
+        """Ignore errors of writing.
+
+        There is no better place to report them, and the Console has the record.
+        """
 
 
 def install_hooks() -> None:
-    """From now on log what is raised and caught nowhere: in this thread, in others, and while things end."""
+    """Log uncaught exceptions of this thread, of other threads and of finalizers."""
     sys.excepthook = _raised
     threading.excepthook = _raised_in_thread
     sys.unraisablehook = _raised_at_end
@@ -178,14 +181,14 @@ def _raised_at_end(raised: sys.UnraisableHookArgs) -> None:
 
 
 def error_words(error: BaseException) -> str:
-    """An exception in one line: its type and what it says."""
+    """Return an exception as one line: type and message."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 
 @dataclass(slots=True)
 class _Fault:
-    """One thing that failed: what was said, when it last failed, whether it has gone well since."""
+    """Failed step: its sentence, the time of the last failure, and whether it succeeded since."""
 
     said: str
     last_s: float
@@ -193,22 +196,21 @@ class _Fault:
 
 
 class FaultAlerts:
-    """What Studio could not do. One thread uses it (the window's)."""
+    """Alert about steps of Studio that failed. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, alerts: Alerts, clock: Callable[[], float]) -> None:
-        """``clock`` gives monotonic seconds."""
         self._alerts, self._clock = alerts, clock
         self._faults: dict[str, _Fault] = {}
 
     @contextmanager
     def guarded(self, what: str, **holes: object) -> Iterator[None]:
-        """One thing: when it raises, the log and an alert say so, and the next has its turn.
+        """Return a context that logs and alerts exceptions of one step and suppresses them.
 
-        ``what`` completes the sentence "can't ..."; it is marked with `lazy`, its ``holes`` are filled here.
+        ``what`` completes the sentence "can't ..."; mark it with `lazy`. Its ``holes`` are filled here.
         """
         try:
             yield
-        except Exception as error:  # noqa: BLE001  whatever it is: what comes after must still arrive
+        except Exception as error:  # noqa: BLE001  the following steps must run after any error
             english, told = what.format(**holes), _(what).format(**holes)
             _log.exception("can't %s", english)
             self._failed(
@@ -219,7 +221,7 @@ class FaultAlerts:
                 self._faults[what].is_well = True
 
     def check(self) -> None:
-        """Once a second: forget what is over; without any fault the alert is cured."""
+        """Remove faults that are over and resolve the alert when none is left. Called once a second."""
         now = self._clock()
         over = [
             what
@@ -239,7 +241,7 @@ class FaultAlerts:
             del self._faults[next(iter(self._faults))]
         self._faults[what] = _Fault(said, self._clock())
         if not self._alerts.has(ALERT):
-            self._tell(self._faults[what], count=1)  # of others and of how often the log tells
+            self._tell(self._faults[what], count=1)  # further faults and repetitions are in the log
 
     def _tell(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")

@@ -1,4 +1,4 @@
-"""How Studio starts one of its own modules as a process, also where it is frozen into one program."""
+"""Commands that start Studio or one of its modules as a process, also from a frozen build."""
 
 from __future__ import annotations
 
@@ -13,34 +13,37 @@ Fate = Literal["", "replaced", "gone"]
 
 
 def module_command(module: str) -> list[str]:
-    """The command that runs one of our modules as a process of its own, also from a frozen build."""
+    """Return the command that runs one of Studio's modules as a process."""
     if getattr(sys, "frozen", False):
         return [sys.executable, "--module", module]
     return [sys.executable, "-m", module]
 
 
 def studio_command(theme: str | None = None) -> list[str]:
-    """The command that starts Studio itself as this one was, without the files that it was given."""
+    """Return the command that starts Studio like this process, without its file arguments."""
     own = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
     return [*own, *(("--theme", theme) if theme is not None else ())]
 
 
 def fresh_environ(environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment without the language that `nep.i18n.begin` set, so that the settings count."""
+    """Return the environment without the language that `nep.i18n.begin` set, so that the settings apply."""
     return {name: value for name, value in environ.items() if name not in {LANG_VARIABLE, "LANGUAGE"}}
 
 
 class OwnProgram:
-    """The file of a frozen Studio that is open: what is not loaded yet, and its processes, come from it."""
+    """Executable of a frozen build, from which modules are still loaded and child processes start."""
 
     def __init__(self, file: Path | None = None) -> None:
-        """Remember how it is now; by default that of a frozen build, elsewhere none."""
+        # By default the executable of a frozen build; without one, nothing is checked.
         frozen = bool(getattr(sys, "frozen", False))
         self._file = file if file is not None or not frozen else Path(sys.executable)
         self._was = self._look()
 
     def fate(self) -> Fate:
-        """What became of it since: "" nothing, "replaced" by an update, "gone" with the package."""
+        """Return what happened to the file since the start.
+
+        "" (unchanged), "replaced" by an update, or "gone".
+        """
         now = self._look()
         if now == self._was:
             return ""

@@ -107,10 +107,6 @@ class Session:
         clock_ns: Callable[[], int] = time.time_ns,
         start_processes: bool = True,
     ) -> None:
-        """Prepare a session with the master at ``address`` (default: `nep.masters.master.master_address`).
-
-        ``source`` creates a source of messages other than the network. `start` starts the threads.
-        """
         self.address = address if address is not None else master_address()
         self._clock, self._clock_ns = clock, clock_ns
         self._start_processes = start_processes
@@ -203,7 +199,7 @@ class Session:
 
     @property
     def is_replaying(self) -> bool:
-        """Whether a recording is shown instead of the live network."""
+        """True if a recording is shown instead of the live network."""
         return self.replay is not None
 
     @property
@@ -329,7 +325,7 @@ class Session:
         replay.tick(now)
         self.graph = replay.graph
         if not was_open and replay.opened is not None:
-            self.sources_shown += 1  # its topics and start time are known now
+            self.sources_shown += 1  # its topics and start time are available from now on
 
     def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
         """Return a context that logs and alerts exceptions of one step of a tick instead of raising them.
@@ -387,7 +383,7 @@ class Session:
             *([("end the stopper", self.stopper.close)] if self.stopper is not None else []),
             ("end the pictures", live.images.close),
             ("end the doctor", self.doctor.close),
-            ("end the recorder", self.recordings.close),  # before the master goes that it may need
+            ("end the recorder", self.recordings.close),  # before the master, which the recorder may need
             ("close the recording", self._close_replays),
             ("leave the network", self.source.close),
             ("leave other networks", live.networks.close),
@@ -420,7 +416,7 @@ class Session:
         self.fleet.unwatched(topic)
 
     def _forget_watch(self, topic: str) -> None:
-        self._health.forget(topic)  # not before: what is wrong does not depend on whether its panel shows
+        self._health.forget(topic)  # only now: the problem doesn't depend on whether its panel is shown
 
     def _make_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)
@@ -461,7 +457,8 @@ class Session:
     def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
         if topic in LOGS:
             self.console.take(batch.messages, batch.dropped)
-        if self._watches.watched(topic):  # else the last of a subscription that has just ended
+        # else these are the last messages of a subscription that has just ended
+        if self._watches.watched(topic):
             topics = self.live.topics
             topics.add(topic, batch, now)
             topics[topic].watched = True
