@@ -1,4 +1,4 @@
-"""What is on the network, as the window shows it: messages come in by threads and leave by the mailbox.
+"""Live network of the window: threads receive messages and pass them on through the mailbox.
 
-Topics, nodes, watches and their figures; the master and who may reach it.
+Topics, nodes, watches and their statistics; the master and remote access to it.
 """

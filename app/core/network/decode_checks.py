@@ -1,8 +1,8 @@
-"""Whether messages can be read at all, found out where they arrive and not in the window.
+"""Test whether messages can be decoded, in the receiving thread instead of the window's.
 
-Every message of a watched topic is tried, with bounded work: at most 7 % of the time, and a second of
-work in advance for a burst. Half of that advance is kept for topics on which something bad was found, so that
-their count is exact when it matters. What comes faster is not tried but counted as such.
+Every message of a watched topic is decoded within a budget: at most 7 % of the time, with up to 1 s of saved
+budget for bursts. Half of that is reserved for topics with earlier errors, so that their count is exact when
+it matters. Messages beyond the budget are counted as unchecked.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ ADVANCE_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
 LOOK_S = 0.0002
-"""The clock of work takes as long as trying a message: it is looked at this often."""
+"""Reading the clock takes as long as decoding a small message, so it is read once per this much work."""
 SOME, SOME_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
 class Checked:
-    """What was found on one topic since it was asked last.
+    """Result for one topic since the last `Checks.take`.
 
-    ``bad`` of the ``checked`` messages can't be read, ``unchecked`` came too fast to be tried. ``sentence``
-    says what is wrong with the newest bad one; ``last_good`` whether the newest message can be read.
+    ``bad`` of the ``checked`` messages can't be decoded; ``unchecked`` exceeded the budget. ``sentence``
+    describes the newest error; ``last_good`` is whether the newest message can be decoded.
     """
 
     checked: int = 0
@@ -42,14 +42,14 @@ class Checked:
 
 
 class Checks:
-    """Tries messages in the source's thread (`look`); the window's thread takes what was found (`take`)."""
+    """Decoding test of received messages. `look` runs in the source's thread, `take` in the window's."""
 
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
         work: Callable[[], float] = time.thread_time,
     ) -> None:
-        """``clock`` gives seconds that pass, ``work`` those that the calling thread has worked."""
+        # `clock` is monotonic seconds; `work` is the CPU time of the calling thread in seconds.
         self._clock, self._work = clock, work
         self._lock = threading.Lock()
         self._found: dict[str, Checked] = {}
@@ -58,7 +58,7 @@ class Checks:
         self._refilled = clock()
 
     def look(self, topic: str, messages: Sequence[Message]) -> None:
-        """Try the messages of one topic, oldest first. Pictures and bytes are taken as they are."""
+        """Check messages of one topic, oldest first. Images and bytes are not decoded."""
         if not messages or messages[-1].codec not in READABLE:
             return
         found = Checked()
@@ -74,7 +74,7 @@ class Checks:
             self._found[topic] = found
 
     def take(self) -> dict[str, Checked]:
-        """What was found by topic since the last time."""
+        """Return and clear the results by topic."""
         with self._lock:
             found, self._found = self._found, {}
         return found
@@ -86,13 +86,14 @@ class Checks:
 
     def _try(self, topic: str, messages: Sequence[Message], found: Checked) -> None:
         newest = messages[-1]
-        found.sentence = _problem(newest, keep=True)  # always, and it stays decoded: panels show this one
+        # the newest is always decoded and stays decoded: panels show it
+        found.sentence = _problem(newest, keep=True)
         found.last_good = not found.sentence
         found.checked, found.bad = 1, int(not found.last_good)
         now = self._refilled
         if found.bad:
             self._suspects[topic] = now
-        if len(messages) > 1:  # else there is no clock to be read, which takes longer than the message
+        if len(messages) > 1:  # reading the clock takes longer than a single message
             self._try_older(topic, messages, found, now)
 
     def _try_older(self, topic: str, messages: Sequence[Message], found: Checked, now: float) -> None:
@@ -120,7 +121,7 @@ class Checks:
 
 
 def _try_some(messages: Sequence[Message], place: int, end: int, found: Checked) -> int:
-    """Try these messages, or less when they are large; the place of the first that was not tried."""
+    # Returns the index of the first message that was not decoded (fewer are decoded when they are large).
     size_bytes = 0
     while place < end and size_bytes < SOME_BYTES:
         message = messages[place]
@@ -135,7 +136,7 @@ def _try_some(messages: Sequence[Message], place: int, end: int, found: Checked)
 
 
 def _problem(message: Message, *, keep: bool) -> str:
-    """What is wrong with a message; nothing when it can be read. A large one is left to who shows it."""
+    # "" also for large messages: the panel that shows one decodes it.
     if message.size_bytes > LARGE_BYTES:
         return ""
     try:

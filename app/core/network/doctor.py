@@ -1,4 +1,4 @@
-"""The connection doctor beside the window: looks in a thread of its own, keeps what it found."""
+"""Connection doctor of the window: runs the checks in a thread and stores the findings."""
 
 from __future__ import annotations
 
@@ -21,64 +21,61 @@ JOIN_S = 4.0
 
 
 class Doctor:
-    """Looks when it is asked. One thread uses it (the window's); the looking happens in another."""
+    """Runs the connection checks in a thread of its own. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
         look: Callable[[str, doctor.Tell], Sequence[doctor.Finding]],
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """``look`` gets the topic that is missed, and may take seconds; ``clock`` gives epoch seconds.
-
-        Meanwhile it tells what is found so far, how many things it looked at, and of how many.
-        """
+        # `look` gets the missed topic and a progress callback (findings so far, checks done, checks in all).
         self._look, self._clock = look, clock
         self._thread: threading.Thread | None = None
         self._missed = self._told_of = ""
         self._found: tuple[doctor.Finding, ...] = ()
         self._so_far: tuple[doctor.Finding, ...] | None = None
         self.looked_at = self.things = 0
-        """How many things were looked at, by the look that goes on or the last, and of how many."""
+        """Number of checks done in the current or last run; `things` is the number of all checks."""
         self._looked_s: float | None = None
         self.revision = 0
 
     @property
     def looking(self) -> bool:
-        """Whether it looks just now."""
+        """True if the checks are running."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def findings(self) -> Sequence[doctor.Finding]:
-        """What was found last, the worst first."""
+        """Findings of the last completed run, worst first."""
         return self._found
 
     @property
     def so_far(self) -> Sequence[doctor.Finding] | None:
-        """What was found by a look that goes on, the worst first; None when none does."""
+        """Findings of the current run so far, worst first; None when it isn't running."""
         return self._so_far
 
     @property
     def looked_s(self) -> float | None:
-        """When it was found (epoch seconds); None before the first time."""
+        """Time of the last completed run (epoch seconds); None before the first."""
         return self._looked_s
 
     @property
     def missed(self) -> str:
-        """The topic of which somebody sees nothing; "" for none in particular."""
+        """Topic that the user expects messages from; "" for no specific topic."""
         return self._missed
 
     @property
     def told_of(self) -> str:
-        """The topic that was missed when `findings` were found."""
+        """Topic that was missed in the run that produced `findings`."""
         return self._told_of
 
     def miss(self, topic: str) -> None:
-        """Look for what is wrong with this topic, from now on; "" for none in particular."""
+        """Set the topic that the user misses ("" for no specific topic) and run the checks."""
         self._missed = topic
         self.look()
 
     def look(self) -> None:
-        """Look now; while it looks already, that goes on, with what is missed now."""
+        """Start the checks; a run in progress continues with the topic that is missed now."""
         if self.looking:
             return
         self._thread = threading.Thread(target=self._run, name="studio-doctor", daemon=True)
@@ -86,19 +83,19 @@ class Doctor:
         self.revision += 1
 
     def report(self, within_s: float) -> str:
-        """What was found, as text to be given to somebody; waits for a look that goes on. For any thread."""
+        """Return the findings as text for a report; waits for a run in progress. Thread-safe."""
         thread = self._thread
         if thread is not None:
             thread.join(within_s)
         return doctor.report(self._found)
 
     def close(self) -> None:
-        """Wait for a look that goes on."""
+        """Wait for a run in progress."""
         if self._thread is not None:
             self._thread.join(JOIN_S)
 
     def _run(self) -> None:
-        while True:  # whoever misses another topic meanwhile waits for that one
+        while True:  # repeats when another topic was set meanwhile
             missed, self._so_far = self._missed, None
             found = self._find(missed)
             if missed == self._missed:
@@ -114,7 +111,7 @@ class Doctor:
     def _find(self, missed: str) -> tuple[doctor.Finding, ...]:
         try:
             return tuple(self._look(missed, self._tell))
-        except Exception as error:  # noqa: BLE001  a doctor that breaks off must say so, not vanish
+        except Exception as error:  # noqa: BLE001  reported as a finding
             words = _("The doctor could not finish: {kind}: {error}.").format(
                 kind=type(error).__name__, error=error
             )
@@ -124,9 +121,9 @@ class Doctor:
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:
-    """A doctor for the master at this address, who also looks at Studio's own folder.
+    """Return a doctor for the master at this address that also checks Studio's folder.
 
-    What it knows of the topics of other networks it is not asked: it looks into Studio's own only.
+    A topic of another network is not checked: the doctor knows only Studio's own network.
     """
     folders = [(_("Settings and unsaved work"), folder)]
     return Doctor(lambda key, tell: doctor.look(address, "" if split_key(key)[0] else key, folders, tell))

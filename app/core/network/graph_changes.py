@@ -1,4 +1,4 @@
-"""Who came and who left between two graphs, in one line each for the console."""
+"""Compare two graphs: nodes and topics that appeared or disappeared, one console line each."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ PROGRAM = "program "
 NEP = "/nep/"
 FEW = 2
 MOST_LINES = 8
-"""More that come or leave at once are one line with their number: a bridge brings a thousand topics."""
+"""Number of changes above which one line with the count is written: a bridge can add a thousand topics."""
 NAMED = 3
 
 
 def arrivals(before: GraphView, after: GraphView) -> list[str]:
-    """Sentences: nodes that came with their topics, single new topics, nodes that left."""
+    """Return sentences for new nodes with their topics, new topics of known nodes, and nodes that left."""
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
     came = [id for id, node in after.nodes.items() if id not in before.nodes and _told(node)]
@@ -51,7 +51,6 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
 
 
 def _gathered(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
-    """The lines, each with the name that it is about; one, ``many``, for all when they are many."""
     if len(lines) <= MOST_LINES:
         return [line for _name, line in lines]
     named = ", ".join(name for name, _line in lines[:NAMED])
@@ -72,12 +71,11 @@ def _here_with(node: str, count: int, *, original: bool) -> str:
 
 
 def _told(node: NodeInfo) -> bool:
-    # a behaviour's program is told by its run; the gateway and who logs for the master are parts of it
+    # a behaviour's program is reported by its run; the gateway and the master's log node belong to the master
     return node.generation != GATEWAY and node.name != MASTER and not node.name.startswith(PROGRAM)
 
 
 def _ours(topic: str) -> bool:
-    """Whether it is one of those that nep itself makes, such as the log records'."""
     return topic.startswith(NEP)
 
 
@@ -86,7 +84,6 @@ def _published(view: GraphView, topic: str) -> bool:
 
 
 def _topics_by_node(view: GraphView) -> dict[str, dict[str, None]]:
-    """What each node publishes, but for nep's own."""
     found: dict[str, dict[str, None]] = {}
     for name, info in view.topics.items():
         if not _ours(name):

@@ -1,8 +1,8 @@
-"""The bounded hand-over from the threads into the window.
+"""Bounded mailbox from background threads to the window.
 
-Threads post, the window drains once a tick. Messages go into one ring per topic that keeps the newest and
-counts what it drops; events (a new graph, an answer of a robot, an end of a program) are few and must not be
-lost, so their queue is long, and what would overflow it is counted as well.
+Threads post; the window drains once per tick. Each topic has a ring buffer that keeps the newest messages and
+counts dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be
+lost, so their queue is long; events beyond its limit are counted.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ EVENTS = 20_000
 
 @dataclass(slots=True)
 class Batch:
-    """What arrived on one topic since the last drain.
+    """Messages of one topic since the last drain.
 
-    The newest messages, and how many older ones were dropped.
+    The newest messages, and the number of older ones that were dropped.
     """
 
     messages: list[Message] = field(default_factory=list)
@@ -31,13 +31,13 @@ class Batch:
 
     @property
     def arrived(self) -> int:
-        """All that arrived, the dropped ones too."""
+        """Number of messages that arrived, including dropped ones."""
         return len(self.messages) + self.dropped
 
 
 @dataclass(slots=True)
 class Drained:
-    """One drain: batches by topic, events in their order, and how many events were lost."""
+    """Result of a drain: batches by topic, events in order, and the number of lost events."""
 
     batches: dict[str, Batch]
     events: list[object]
@@ -54,7 +54,7 @@ class _Ring:
 
 
 class Mailbox:
-    """Any thread posts; one thread drains."""
+    """Thread-safe mailbox: any thread posts, one thread drains."""
 
     def __init__(
         self,
@@ -62,7 +62,6 @@ class Mailbox:
         bytes_per_topic: int = BYTES_PER_TOPIC,
         events: int = EVENTS,
     ) -> None:
-        """Bound each topic's ring in messages and bytes, and the event queue in events."""
         self._messages_per_topic = messages_per_topic
         self._bytes_per_topic = bytes_per_topic
         self._event_limit = events
@@ -73,7 +72,10 @@ class Mailbox:
         self._rooms: dict[str, int] = {}
 
     def set_room(self, topic: str, messages: int | None) -> None:
-        """Keep so many messages of a topic (1 at least), within the same bytes; None: as of any other."""
+        """Set the ring size of a topic in messages (at least 1, the byte limit stays).
+
+        None restores the default.
+        """
         with self._lock:
             if messages is None:
                 self._rooms.pop(topic, None)
@@ -81,9 +83,10 @@ class Mailbox:
                 self._rooms[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
-        """Hand over a batch of one topic, oldest first; one lock for all of it.
+        """Post a batch of one topic, oldest first, under one lock.
 
-        What a ring can't hold anyway is only counted: a batch of thousands costs no more than a full ring.
+        Messages beyond the ring's size are only counted, so a batch of thousands costs no more than a full
+        ring.
         """
         room = self._rooms.get(topic, self._messages_per_topic)
         newest = messages[-room:]
@@ -103,15 +106,12 @@ class Mailbox:
                 ring.dropped += 1
 
     def forget(self, topic: str) -> None:
-        """Nobody wants any more what waits of a topic; it is not counted as dropped."""
+        """Discard the pending messages of a topic without counting them as dropped."""
         with self._lock:
             self._rings.pop(topic, None)
 
     def post_event(self, event: object) -> None:
-        """Hand over one event.
-
-        When the window has not drained for 20 000 events, new ones are counted as lost.
-        """
+        """Post an event; when `EVENTS` events are pending, it is counted as lost instead."""
         with self._lock:
             if len(self._events) >= self._event_limit:
                 self._lost_events += 1
@@ -119,7 +119,7 @@ class Mailbox:
                 self._events.append(event)
 
     def drain(self) -> Drained:
-        """Take everything posted since the last drain."""
+        """Return and clear everything posted since the last drain."""
         with self._lock:
             rings, self._rings = self._rings, {}
             events, self._events = self._events, deque()

@@ -1,4 +1,4 @@
-"""The master beside the window: is one there, does it know everybody yet; and starting one when none is."""
+"""State of the master, and starting one when none is running."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ else:
     doctor = lazy_module("nep.programs.doctor")
 
 LEARNING_S = 1.5
-"""How long a master that has just started may not know everybody yet (it learns for one second)."""
+"""Time during which a newly started master may not know all nodes yet (it collects them for one second)."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
-"""After how long a master that could not be started is tried again: twice as long each time."""
+"""Pause before another attempt to start a master, and its maximum; the pause doubles with each failure."""
 START_S = 50.0
-"""How long a master may take to answer while its process lives: the first start after an installation, from a
-slow disk and past a virus scanner, takes longer than the ten seconds that a program usually waits."""
+"""Time limit for a started master to answer while its process is alive. The first start after an
+installation, from a slow disk and with a virus scanner, takes longer than the usual ten seconds."""
 END_WAIT_S = 2.0
 
 _log = logging.getLogger("studio.master")
@@ -37,7 +37,10 @@ _log = logging.getLogger("studio.master")
 
 @dataclass(frozen=True, slots=True)
 class MasterState:
-    """Whether a master is there: ``searching``, ``connected`` or ``none``, its address, and a sentence."""
+    """State of the connection to the master.
+
+    ``kind`` is ``searching``, ``connected`` or ``none``; ``sentence`` explains it.
+    """
 
     kind: str
     address: str
@@ -45,14 +48,13 @@ class MasterState:
 
 
 class MasterChange:
-    """Notices that another master has come. One thread uses it (the window's)."""
+    """Detects a new master. Not thread-safe: use it from the window's thread."""
 
     def __init__(self) -> None:
-        """Have seen no other master yet."""
         self._new_epoch = (0, 0.0)
 
     def still(self, known: GraphView | None, view: GraphView, now: float) -> bool:
-        """Whether ``view`` is of another master than ``known`` and may lack people: they have not gone."""
+        """Return whether ``view`` is of another master than ``known`` and may still lack nodes."""
         if known is None or view.epoch == known.epoch:
             return False
         if self._new_epoch[0] != view.epoch:
@@ -61,7 +63,7 @@ class MasterChange:
 
 
 class MasterStart:
-    """Joins the master that runs, or starts one. Each reason why it can't is told once."""
+    """Uses the running master or starts one. Each reason for a failure is reported once."""
 
     def __init__(
         self,
@@ -69,33 +71,33 @@ class MasterStart:
         failed: Callable[[str], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``failed`` is given the reason, in the starting thread; ``clock`` gives monotonic seconds."""
+        # `failed` is called with the reason in the starting thread; `clock` is monotonic seconds.
         self._address, self._failed, self._clock = address, failed, clock
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
         self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
         self.first = False
-        """Whether there was no master before the one that is started here, so nobody can be there yet."""
+        """True if no master ran before this one was started, so that no other node can be registered yet."""
 
     @property
     def runs(self) -> bool:
-        """Whether the master that runs was started here."""
+        """True if the running master was started by this object."""
         return self._process is not None and self._process.poll() is None
 
     def ensure(self) -> None:
-        """Start one now if there is none; returns at once."""
+        """Start a master if none is running. Returns immediately."""
         if self._thread is not None and self._thread.is_alive():
             return
         self._thread = threading.Thread(target=self._start, name="studio-launcher", daemon=True)
         self._thread.start()
 
     def keep(self) -> None:
-        """The same, to be said again and again while there is none: after a failure it takes its time."""
+        """Call `ensure` unless the back-off after a failure is still running. Call it repeatedly."""
         if self._clock() >= self._again_at:
             self.ensure()
 
     def close(self) -> None:
-        """Wait for a start that goes on."""
+        """Wait for a start in progress."""
         if self._thread is not None:
             self._thread.join(timeout=END_WAIT_S)
 
@@ -111,7 +113,6 @@ class MasterStart:
             self._failed(why)
 
     def _why_not(self) -> str:
-        """Start it; "" when there is one now."""
         if is_running(self._address, timeout_s=0.5):
             return ""
         hindered = doctor.start_obstacle(self._address)
@@ -128,7 +129,6 @@ class MasterStart:
         return ""
 
     def _look_back(self) -> None:
-        """The master that was started here has gone: say so, if it crashed."""
         code = self._process.poll() if self._process is not None else None
         if code is None:
             return

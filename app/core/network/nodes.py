@@ -1,4 +1,4 @@
-"""Who is on the network, as the window shows it: every node with what it publishes and subscribes."""
+"""Nodes of the network with the topics that they publish and subscribe to."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ NATIVE = frozenset({"native", GATEWAY})
 
 @dataclass(slots=True, eq=False)
 class NodeEntry:
-    """One node. What is not known is None or empty; a panel shows it blank.
+    """One node. Unknown values are None or empty; panels leave them blank.
 
-    ``publishes`` and ``subscribes`` are topics in the order of their names, also those with wildcards that it
-    subscribes; a topic that it subscribes twice stands there once. ``cpu_ratio`` is the share of one core of
-    its process. ``gone_s`` is None while it is there, else the seconds since it vanished; then what it
-    published stays, to be read. ``network`` is "" for the native one, ``stale`` whether that can't be asked
-    now. ``has_parameters``: it has declared some, which others ``may_set`` where there are services.
+    ``publishes`` and ``subscribes`` are topic names in alphabetical order without duplicates; ``subscribes``
+    includes patterns. ``cpu_ratio`` is the share of one core that its process uses. ``gone_s`` is the time in
+    seconds since the node left, or None while it is registered; the topics of a node that left stay.
+    ``network`` is "" for the native network; ``stale`` is whether that can't be queried now.
+    ``has_parameters`` is whether it declares parameters, ``may_set`` whether others can set them (the network
+    has services).
     """
 
     id: str
@@ -45,28 +46,27 @@ class NodeEntry:
 
     @property
     def key(self) -> str:
-        """Its id among the nodes of all networks."""
+        """Identifier of the node among the nodes of all networks."""
         return key_of(self.network, self.id)
 
     @property
     def is_original(self) -> bool:
-        """Whether it is a program of the original NEP."""
+        """True if it is a program of the original NEP."""
         return not self.network and self.generation not in NATIVE
 
     @property
     def is_bridge(self) -> bool:
-        """Whether it joins this network with another: see `nep.programs.bridges`."""
+        """True if it bridges this network with another (see `nep.programs.bridges`)."""
         return BRIDGES_TOPIC in self.publishes
 
 
 class Nodes:
-    """All nodes, in the order in which they were first seen. One thread uses it (the window's).
+    """All nodes in the order of their first appearance. Not thread-safe: use it from the window's thread.
 
-    The gateway's own node is left out: it stands for the originals, which have entries of their own.
+    The gateway's own node is omitted; programs of the original NEP have entries of their own.
     """
 
     def __init__(self, network: str = "") -> None:
-        """Know no node yet; ``network`` is that of all of them."""
         self._network = network
         self._nodes: dict[str, NodeEntry] = {}
         self._first_graph = True
@@ -75,33 +75,31 @@ class Nodes:
         self.values_revision = 0
 
     def __iter__(self) -> Iterator[NodeEntry]:
-        """Every node, the vanished ones too for ten seconds."""
         return iter(self._nodes.values())
 
     def __len__(self) -> int:
-        """How many `__iter__` gives."""
         return len(self._nodes)
 
     def get(self, id: str) -> NodeEntry | None:
-        """The node of that id, or None."""
+        """Return the node with this id, or None."""
         return self._nodes.get(id)
 
     def set_stale(self, stale: bool) -> None:
-        """Whether the network can't be asked: what is known of those that are there is as it was last."""
+        """Mark all nodes as stale while the network can't be queried."""
         for node in self._nodes.values():
             if node.stale is not stale:
                 node.stale, node.cpu_ratio = stale, None
                 self.revision += 1
 
     def mark_seen(self, id: str) -> None:
-        """A person looked at it: it is not new any more."""
+        """Clear the mark of a node as new."""
         node = self._nodes.get(id)
         if node is not None and node.new:
             node.new = False
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
-        """Take over a new graph; ``now`` is a monotonic clock in s."""
+        """Apply a new graph; ``now`` is monotonic seconds."""
         if (view.epoch, view.revision) != self._seen:
             self._seen = (view.epoch, view.revision)
             self._take_all(view, now)
@@ -112,7 +110,7 @@ class Nodes:
         self.values_revision += 1
 
     def age(self, now: float) -> None:
-        """Let time pass: what vanished ten seconds ago leaves."""
+        """Update the ages; remove nodes that left more than `GONE_SHOWN_S` ago."""
         for node in list(self._nodes.values()):
             if node.gone_since is None:
                 continue
@@ -144,7 +142,7 @@ class Nodes:
         self.revision += 1
 
     def _replace_gone(self, info: NodeInfo) -> None:
-        """A program that was started again takes the place of its struck-through self."""
+        # A restarted program replaces its entry that left.
         for id, node in list(self._nodes.items()):
             if node.gone_since is not None and (node.name, node.host) == (info.name, info.host):
                 del self._nodes[id]
@@ -158,7 +156,7 @@ def _take(node: NodeEntry, info: NodeInfo) -> None:
 
 
 def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]:
-    """(node id → topics that it publishes, node id → topics that it subscribes), each once, by name."""
+    # (topics that each node publishes, topics that it subscribes to), by node id, sorted and unique.
     publishes: dict[str, dict[str, None]] = {}
     subscribes: dict[str, dict[str, None]] = {}
     for name in sorted(view.topics):

@@ -1,4 +1,4 @@
-"""Who can reach the programs of this computer: they alone, or other computers too, when a person let them."""
+"""Remote access: whether programs on other computers can reach the master on this one."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ALERT, NOT_KEPT = "reach", "reach:kept"
 
 @dataclass(frozen=True, slots=True)
 class RemoteAccessChanged:
-    """The master was asked to serve other computers at ``hosts``; ``sentence`` says why it does not."""
+    """Reply of the master to the request to listen on ``hosts``; ``sentence`` is the reason if it failed."""
 
     hosts: tuple[str, ...]
     sentence: str = ""
 
 
 class RemoteAccess:
-    """The switch. One thread uses it (the window's); what waits is done in another."""
+    """Switch for remote access. Not thread-safe: use it from the window's thread; requests run in another."""
 
     def __init__(
         self,
@@ -40,35 +40,35 @@ class RemoteAccess:
         ask: Callable[[Sequence[str], str], None] = listen,
         here: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
     ) -> None:
-        """``address`` is the master's; ``ask`` tells it, ``here`` are the addresses of this computer."""
+        # `ask` sends the request to the master at `address`; `here` returns this computer's addresses.
         self._address, self._settings, self._alerts = address, settings, alerts
         self._post_event, self._ask, self._here = post_event, ask, here
         self._epoch = 0
         self._asking: threading.Thread | None = None
         self.hosts: tuple[str, ...] = ()
-        """Where the master serves other computers now."""
+        """Addresses at which the master listens for other computers."""
 
     @property
     def is_near(self) -> bool:
-        """Whether the master is on this computer, where alone it can be told."""
+        """True if the master is on this computer; only then its addresses can be changed."""
         return is_loopback(self._address)
 
     @property
     def master_host(self) -> str:
-        """The computer of the master, as it is known here."""
+        """Host of the master."""
         return host_of(self._address)
 
     def addresses(self) -> tuple[OwnAddress, ...]:
-        """The addresses of this computer that others may reach."""
+        """Return the addresses of this computer that others can reach."""
         return self._here()
 
     def typed_by_others(self, host: str) -> str:
-        """What a program on another computer needs to know."""
+        """Return the setting that programs on other computers need."""
         return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
 
     def listen_at(self, hosts: Sequence[str]) -> None:
-        """Serve other computers at these addresses, none: no more. Kept for the next start."""
-        self._tell(tuple(hosts))  # first: whoever shuts others out must not wait for a disk
+        """Listen for other computers at these addresses, or at none; saved for the next start."""
+        self._tell(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
             self._settings.set(KEPT, list(hosts))
         except SettingsError as error:
@@ -90,7 +90,7 @@ class RemoteAccess:
             self._alerts.resolve(NOT_KEPT)
 
     def follow(self, view: GraphView) -> None:
-        """See what the master does; another one is told what a person chose."""
+        """Apply a new graph; a new master gets the saved addresses."""
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
@@ -100,7 +100,7 @@ class RemoteAccess:
                 self._tell(kept)
 
     def changed(self, event: RemoteAccessChanged) -> None:
-        """The master has answered."""
+        """Apply the master's reply."""
         if not event.sentence:
             self.hosts = event.hosts
             self._alerts.resolve(ALERT)
@@ -115,7 +115,7 @@ class RemoteAccess:
         )
 
     def close(self) -> None:
-        """Wait for the thread."""
+        """Wait for the request thread."""
         if self._asking is not None:
             self._asking.join(3.0)
 
@@ -137,7 +137,7 @@ class RemoteAccess:
 
 
 def access_words(reach: RemoteAccess) -> tuple[str, str, str | None]:
-    """What the status bar says of it: icon, words, status."""
+    """Return how the status bar shows remote access: icon, text, status."""
     if reach.hosts:
         return (
             "wifi",

@@ -1,4 +1,4 @@
-"""Where messages come from. The live network today; a recording gives the same calls."""
+"""Sources of messages and graphs: the live network; a recording has the same interface."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4
 POLL_PAUSE = 5.0
-"""Where telling the graph takes long (10 000 topics: 0.4 s) the pause is so many times as long, at most:"""
+"""Where a query of the graph takes long (10 000 topics: 0.4 s), the pause is this multiple of it ..."""
 POLL_SLOWEST_S = 3.0
 NODE_NAME = "studio"
 
 _log = logging.getLogger("studio")
 
 Sink = Callable[[str, Sequence[Message]], None]
-"""Takes a batch of one topic, oldest first, in nep's thread."""
+"""Function that receives a batch of one topic, oldest first, in a thread of nep."""
 NodeSink = Callable[[Sequence[Message]], None]
-"""The same of one topic's subscriber."""
+"""Function that receives a batch of the subscriber's topic."""
 Job = Callable[[Node], None]
 
 
 @dataclass(frozen=True, slots=True)
 class GraphSeen:
-    """The master told what is there; ``asked_s`` is how long it took."""
+    """A new graph; ``asked_s`` is the duration of the query."""
 
     view: GraphView
     asked_s: float
@@ -55,7 +55,7 @@ class MasterFound:
 
 @dataclass(frozen=True, slots=True)
 class MasterLost:
-    """No master answers at ``address``; ``sentence`` says so to a person."""
+    """No master answers at ``address``; ``sentence`` explains it."""
 
     address: str
     sentence: str
@@ -63,7 +63,7 @@ class MasterLost:
 
 @dataclass(frozen=True, slots=True)
 class WatchFailed:
-    """A topic could not be subscribed."""
+    """Subscribing to a topic failed."""
 
     topic: str
     sentence: str
@@ -71,47 +71,47 @@ class WatchFailed:
 
 @dataclass(frozen=True, slots=True)
 class JobFailed:
-    """Something that was to be done on the network failed: ``what`` (see `Source.submit`), and why."""
+    """A job on the network failed; ``what`` is as in `Source.submit`, ``sentence`` the reason."""
 
     what: str
     sentence: str
 
 
 class Source(Protocol):
-    """Messages by topic, live or recorded. Nothing arrives for a topic that is not watched."""
+    """Source of messages by topic, live or recorded. Only watched topics are received."""
 
     address: str
 
     def start(self) -> None:
-        """Begin; events and messages reach the sinks from now on."""
+        """Start; events and messages are passed to the sinks from now on."""
 
     def watch(self, topic: str) -> None:
-        """Messages of ``topic`` are wanted, as soon as it is there."""
+        """Subscribe to ``topic`` as soon as it exists."""
 
     def unwatch(self, topic: str) -> None:
-        """Messages of ``topic`` are not wanted any more."""
+        """Unsubscribe from ``topic``."""
 
     def submit(self, what: str, job: Job) -> None:
-        """Do something with the node, in the source's thread; a failure is told as `JobFailed`.
+        """Run a job with the node in the source's thread; a failure is reported as `JobFailed`.
 
-        ``what`` is the `lazy` sentence for that, with the hole ``error``; "" when nobody is to be told.
+        ``what`` is the `lazy` sentence for the report, with the hole ``error``; "" for none.
         """
 
     def missed(self) -> Mapping[str, int]:
-        """By watched topic, the messages that were sent since it is watched and did not arrive here."""
+        """Return the number of messages lost before they arrived, by topic, since each topic is watched."""
 
     def close(self) -> None:
-        """End; returns when its thread has ended."""
+        """Stop; returns when the thread has ended."""
 
 
 MakeSource = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
-"""Makes a source of a master's address, the sinks of its messages, and what takes its events."""
+"""Creates a source from a master's address, the message sinks, and the event callback."""
 
 
 class LiveSource:
-    """The network of one master.
+    """Live network of one master.
 
-    One thread asks the master, subscribes and does jobs; none of it in the window.
+    One thread queries the master, subscribes and runs jobs, so that the window never blocks.
     """
 
     def __init__(
@@ -123,11 +123,8 @@ class LiveSource:
         always: Mapping[str, str] | None = None,
         thread: str = "studio-source",
     ) -> None:
-        """Give batches of messages to every sink (in nep's thread) and events to ``post_event``.
-
-        ``always``: topics, with their types, that are subscribed from the start, before anybody publishes.
-        ``thread`` is the name of its thread.
-        """
+        # `always`: topics with their types that are subscribed to from the start, before they have
+        # publishers.
         self._always = always or {}
         self.address = address
         self._sinks = tuple(sinks)
@@ -144,11 +141,11 @@ class LiveSource:
         self._view: GraphView | None = None
 
     def start(self) -> None:
-        """Look for the master from now on."""
+        """Start connecting to the master."""
         self._thread.start()
 
     def watch(self, topic: str) -> None:
-        """See `Source.watch`."""
+        """Subscribe to ``topic`` as soon as it exists."""
         with self._lock:
             self._wanted.add(topic)
             held = self._subscribers.get(topic)
@@ -156,56 +153,60 @@ class LiveSource:
         self.submit("", _nothing)
 
     def unwatch(self, topic: str) -> None:
-        """See `Source.unwatch`."""
+        """Unsubscribe from ``topic``."""
         with self._lock:
             self._wanted.discard(topic)
         self.submit("", _nothing)
 
     def submit(self, what: str, job: Job) -> None:
-        """See `Source.submit`; jobs keep their order and wait until a master is there."""
+        """Queue a job; jobs run in order and wait until a master answers."""
         self._jobs.put((what, job))
 
     def missed(self) -> Mapping[str, int]:
-        """See `Source.missed`."""
+        """Return the number of lost messages by topic."""
         with self._lock:
             held = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
             before = dict(self._missed_before)
         return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
 
     def end(self) -> None:
-        """Let its thread end, and wait for nothing; `close` waits."""
+        """Signal the thread to end without waiting; `close` waits."""
         self._closing.set()
         self._jobs.put(None)
 
     @property
     def has_ended(self) -> bool:
-        """Whether its thread runs no more."""
+        """True if the thread has ended."""
         return not self._thread.is_alive()
 
     def close(self) -> None:
-        """See `Source.close`."""
+        """Stop and wait for the thread (at most 5 s)."""
         self.end()
         if self._thread.is_alive():
             self._thread.join(timeout=5)
 
-    # -- what is otherwise on other networks (see `app.core.networks`); in its thread ------------------------
+    # -- overridden for other networks (see `app.core.networks`); called in its thread
+    # ------------------------
 
     poll_s = POLL_S
-    """How often the graph is asked for."""
+    """Interval of the graph queries."""
 
     def join(self) -> Node:
-        """Studio's node there. Raises `NepError` while nobody answers."""
+        """Create Studio's node.
+
+        Raises: NepError: no master answers.
+        """
         view = look(self.address, timeout_s=0.5)
         if view is None:
             raise NepError(_("no master responds at {address}").format(address=self.address))
         return nep.node(_free_name(view), master=self.address)
 
     def look(self, node: Node) -> GraphView:
-        """Who is there. Raises `NepError`."""
+        """Return the current graph. Raises `NepError`."""
         return node.graph(timeout_s=1.0)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
-        """Hear a topic of this type. Raises `NepError`."""
+        """Subscribe to a topic of this type. Raises `NepError`."""
         return node.new_sub(topic, msg_type, sink=sink, wildcards=False)
 
     # -- its thread ------------------------------------------------------------------------------------------
@@ -226,7 +227,7 @@ class LiveSource:
                 self._node.close()
 
     def _turn(self) -> bool:
-        """Join, ask once, do what is wished until it is time to ask again; False while no master answers."""
+        # One cycle: join, query, run jobs until the next query. False while no master answers.
         if self._node is None and not self._join():
             return False
         asked_s = self._ask()
@@ -248,7 +249,7 @@ class LiveSource:
             self._post_event(MasterLost(self.address, sentence))
 
     def _ask(self) -> float:
-        """Ask for the graph; how long the answer took, 0.0 when there was none."""
+        # Returns the duration of the query in seconds, 0.0 when it failed.
         if self._node is None:
             return 0.0
         asked = time.monotonic()
@@ -279,13 +280,12 @@ class LiveSource:
                 job(self._node)
             except NepError as error:
                 self._post_event(JobFailed(what, str(error)))
-            except Exception as error:  # noqa: BLE001  one job that fails must not end all others
+            except Exception as error:  # noqa: BLE001  a failing job must not end the thread
                 _log.exception("a job on the network failed")
                 self._post_event(JobFailed(what, error_words(error)))
             self._reconcile()
 
     def _reconcile(self) -> None:
-        """Subscribe what is wanted and there, unsubscribe what is not wanted any more."""
         view = self._view
         if view is None:
             return
@@ -318,7 +318,7 @@ class LiveSource:
             self._subscribers[topic] = (msg_type, subscriber)
 
     def _leave(self, topic: str) -> int:
-        """Unsubscribe; how many messages had not arrived."""
+        # Returns the number of lost messages of the subscription.
         with self._lock:
             _, subscriber = self._subscribers.pop(topic)
         subscriber.close()
@@ -331,11 +331,9 @@ class LiveSource:
 
 
 def _free_name(view: GraphView) -> str:
-    """The node's name; a second Studio on this network has its number behind it."""
     taken = {node.name for node in view.nodes.values()}
     others = (f"{NODE_NAME} {number}" for number in count(2))
     return NODE_NAME if NODE_NAME not in taken else next(name for name in others if name not in taken)
 
 
-def _nothing(_node: Node) -> None:
-    """Only wakes the thread, so that a new wish is met at once."""
+def _nothing(_node: Node) -> None: ...

@@ -1,4 +1,4 @@
-"""Topics as a tree by the slashes in their names: folders with the sums of what is below them."""
+"""Tree of topics by the slashes in their names: folders with sums of the statistics below them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from app.core.network.topics import Topic, key_of
 
 Number = TypeVar("Number", int, float)
 DEEPEST = 12
-"""Slashes below this do not make folders any more: no window is wide enough to indent them."""
+"""Maximum depth of folders; deeper levels stay in the name, because no window is wide enough to indent them.
+"""
 
 
 def parts_of_name(name: str) -> tuple[str, ...]:
-    """What stands between the slashes of a topic's name, `DEEPEST` folders at most; never nothing."""
+    """Split a topic's name at its slashes into at most `DEEPEST` folders and a name; never empty."""
     parts = [part for part in name.split("/") if part]
     if not parts:
         return (name,)
@@ -24,29 +25,29 @@ def parts_of_name(name: str) -> tuple[str, ...]:
 
 
 def folder_key(network: str, path: str) -> str:
-    """The key of the folder of this path; as a pattern it fits every topic in it."""
+    """Return the key of the folder with this path; as a pattern it matches every topic in the folder."""
     return key_of(network, f"{path}*")
 
 
 @dataclass(frozen=True, slots=True)
 class FolderFigures:
-    """The figures of all topics below a folder that are there; None where none of them tells one.
+    """Statistics of all existing topics below a folder; None where no topic has a value.
 
-    ``rate_hz`` and ``bandwidth_Bps`` are sums, ``lost`` too; ``age_s`` is that of the newest message.
+    ``rate_hz``, ``bandwidth_Bps`` and ``lost`` are sums; ``age_s`` is that of the newest message.
     """
 
     rate_hz: float | None = None
-    bandwidth_Bps: float | None = None  # noqa: N815  bytes a second, as the vocabulary spells it
+    bandwidth_Bps: float | None = None  # noqa: N815  unit: bytes per second
     age_s: float | None = None
     lost: int | None = None
 
 
 @dataclass(slots=True, eq=False)
 class TopicFolder:
-    """A folder: its last ``name``, its whole ``path`` ("/robot/arm/"), how ``deep`` it is, what is in it.
+    """Folder of topics: last part of its path, whole path ("/robot/arm/"), depth and content.
 
-    ``topics`` are all topics below, in deeper folders too; ``key`` tells it from every topic and from folders
-    of other networks. ``is_open`` says whether what is in it is shown.
+    ``topics`` are all topics below, including those in subfolders. ``key`` is unique among topics and folders
+    of all networks. ``is_open`` is whether the folder is expanded.
     """
 
     name: str
@@ -60,12 +61,12 @@ class TopicFolder:
 
     @property
     def key(self) -> str:
-        """Its name among the folders and topics of all networks: "/robot/*", which is no topic's name."""
+        """Key among the folders and topics of all networks: "/robot/*", which can't be a topic's name."""
         return folder_key(self.network, self.path)
 
     @property
     def figures(self) -> FolderFigures:
-        """The sums as they were when `renew` was called last, or at the first question after it."""
+        """Statistics, computed at the first access after `renew`."""
         if self._figures is None:
             there = [topic for topic in self.topics if topic.gone_s is None]
             self._figures = FolderFigures(
@@ -77,7 +78,7 @@ class TopicFolder:
         return self._figures
 
     def renew(self) -> None:
-        """The figures of the topics may have changed: add them up again when somebody asks."""
+        """Invalidate the statistics."""
         self._figures = None
 
 
@@ -90,10 +91,10 @@ def _sum(values: Iterable[Number | None]) -> Number | None:
 
 
 class TopicTree:
-    """Topics in the folders that their names make; a topic may have the name of a folder beside it."""
+    """Topics in the folders of their names; a topic may have the same name as a folder."""
 
     def __init__(self, topics: Iterable[Topic], closed: Collection[str] = ()) -> None:
-        """``closed`` are the keys of the folders that are closed; all others are open."""
+        # `closed` are the keys of collapsed folders.
         self._closed = closed
         self._folders: dict[str, TopicFolder] = {}
         self._top: list[TreeRow] = []
@@ -101,22 +102,16 @@ class TopicTree:
             self._put(topic)
 
     def __contains__(self, key: object) -> bool:
-        """Whether there is a folder of that key."""
         return key in self._folders
 
     def __getitem__(self, key: str) -> TopicFolder:
-        """The folder of that key; KeyError when there is none."""
         return self._folders[key]
 
     def __iter__(self) -> Iterator[TopicFolder]:
-        """All folders."""
         return iter(self._folders.values())
 
     def rows(self, ordered: Callable[[list[TreeRow]], list[TreeRow]]) -> list[TreeRow]:
-        """What is shown from top to bottom: folders, and below each open one what is in it.
-
-        ``ordered`` puts the rows of one folder into their order.
-        """
+        """Return the visible rows from top to bottom; ``ordered`` sorts the rows of one folder."""
         rows: list[TreeRow] = []
         waiting = ordered(self._top)[::-1]
         while waiting:
@@ -127,7 +122,7 @@ class TopicTree:
         return rows
 
     def renew(self) -> None:
-        """The figures of topics may have changed."""
+        """Invalidate the statistics of all folders."""
         for folder in self._folders.values():
             folder.renew()
 
@@ -147,16 +142,16 @@ class TopicTree:
 
 
 def folders_above(topic: str, network: str = "") -> list[str]:
-    """The keys of the folders that a topic is in, the outermost first."""
+    """Return the keys of the folders that contain a topic, outermost first."""
     parts = parts_of_name(topic)[:-1]
     return [folder_key(network, f"/{'/'.join(parts[: count + 1])}/") for count in range(len(parts))]
 
 
 def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
-    """Whether a topic fits every one of these words; asked with its name and with all that is told of it.
+    """Return a predicate (name, details) that is true when a topic matches every word, ignoring case.
 
-    A word with ``*`` or ``?`` is a pattern for the whole name (``*`` is any text, slashes too), ``!`` before
-    a word leaves out what fits it; other words are found anywhere. Case does not matter.
+    A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes); ``!`` before a
+    word excludes topics that match it; any other word matches anywhere in the details.
     """
     wanted: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:

@@ -1,4 +1,4 @@
-"""What is on the network, as the window shows it: every topic with its figures and its newest message."""
+"""Topics of the network with their statistics and newest messages."""
 
 from __future__ import annotations
 
@@ -17,40 +17,43 @@ GONE_SHOWN_S = 10.0
 RATES_KEPT = 60
 AT_ONCE = 1500
 START_S = 5.0
-"""A camera that is switched on when somebody subscribes it has sent its first picture by then."""
+"""Time that a publisher has for its first message after a subscription, such as a camera that starts then."""
 FIGURES_LATE_S = 6.0
-"""Nodes of large graphs tell their counts every 5 s; what only they tell is not judged earlier."""
+"""Minimum silence of topics whose counts only the nodes report: nodes of large graphs report every 5 s."""
 
 
 _BLANK = " "
 
 
 def key_of(network: str, topic: str) -> str:
-    """The name of a topic among those of all networks: "ros2 /camera"; of the native one ("") its own.
+    """Return a topic's name among those of all networks: "ros2 /camera"; unchanged for the native one ("").
 
-    A native topic has no blank in its name, so none is taken for one of another network.
+    Native topic names contain no blank, so the two can't be confused.
     """
     return f"{network}{_BLANK}{topic}" if network else topic
 
 
 def split_key(key: str) -> tuple[str, str]:
-    """(network, topic) of what `key_of` gave."""
+    """Return (network, topic) of a key made by `key_of`."""
     network, blank, topic = key.partition(_BLANK)
     return (network, topic) if blank else ("", key)
 
 
 @dataclass(slots=True, eq=False)
 class Topic:
-    """One topic. Figures that are not known are None; a panel shows them blank.
+    """One topic. Unknown statistics are None; panels leave them blank.
 
-    ``rate_hz`` messages a second and ``bandwidth_Bps`` bytes a second as the publishers tell, ``age_s``
-    seconds since the newest message by its stamp, ``silent_s`` seconds in which somebody listened and nothing
-    came (None while nobody listens: who sends only when heard is not silent), ``lost`` messages and
-    ``loss_ratio`` of those that a subscriber should have had. ``gone_s`` is None while it is there, else the
-    seconds since it vanished. ``newest``, ``previous`` are kept, and ``received``, ``dropped`` (of those,
-    before a panel saw them) and ``missed`` (sent, but not received here) counted, only while somebody looks.
-    ``network`` is "" for the native one, ``stale`` whether that can't be asked now: all is as it was last.
-    ``counted`` are (messages, bytes) a second that arrive here, where nobody tells them and somebody looks.
+    ``rate_hz`` (messages per second) and ``bandwidth_Bps`` (bytes per second) are as reported by the
+    publishers. ``age_s`` is the time since the newest message by its time stamp; ``silent_s`` the time
+    without a message although the topic has subscribers (None without subscribers: some publishers send only
+    to subscribers). ``lost`` is the number of lost messages, ``loss_ratio`` their share of all messages that
+    subscribers should have received. ``gone_s`` is the time in seconds since the topic vanished, or None
+    while it exists.
+
+    Only while the topic is watched, ``newest`` and ``previous`` are kept and ``received``, ``dropped``
+    (discarded before a panel read them) and ``missed`` (sent but not received here) are counted. ``network``
+    is "" for the native network; ``stale`` is whether that can't be queried now. ``counted`` is the rate
+    measured here (messages, bytes per second) for watched topics whose publishers report none.
     """
 
     name: str
@@ -60,7 +63,7 @@ class Topic:
     publisher_nodes: tuple[str, ...] = ()
     subscribers: int = 0
     rate_hz: float | None = None
-    bandwidth_Bps: float | None = None  # noqa: N815  bytes a second, as the vocabulary spells it
+    bandwidth_Bps: float | None = None  # noqa: N815  unit: bytes per second
     age_s: float | None = None
     silent_s: float | None = None
     lost: int | None = None
@@ -87,29 +90,26 @@ class Topic:
 
     @property
     def key(self) -> str:
-        """Its name among the topics of all networks."""
+        """Key of the topic among those of all networks."""
         return key_of(self.network, self.name)
 
     @property
     def shown_of(self) -> tuple[int, int]:
-        """How many messages were kept for the panels, of how many sent, since somebody looks."""
+        """Number of messages shown by panels and number of messages sent, since the topic is watched."""
         return self.received - self.dropped, self.received + self.missed
 
     def facts(self) -> tuple[object, ...]:
-        """What changes seldom; a panel rebuilds its rows when one of these changes."""
+        """Return the values that change rarely; a panel rebuilds its rows when one of them changes."""
         gone = self.gone_since is not None
         return (self.msg_type, self.codec, self.publisher_nodes, self.new, gone, self.stale)
 
 
 class Topics:
-    """All topics, in the order in which they were first seen. One thread uses it (the window's)."""
+    """All topics in the order of their first appearance. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, own: tuple[str, int] | None = None, network: str = "") -> None:
-        """Know no topic yet. ``own`` is the computer and process that looks (default: this one).
-
-        ``network`` is that of all of them. A topic that only the looking process subscribes has vanished:
-        looking does not keep it.
-        """
+        # `own` is (host, process id) of the watching process: a topic with no other subscriber counts as
+        # vanished.
         self._network = network
         self._own = own if own is not None else (platform.node(), os.getpid())
         self._topics: dict[str, Topic] = {}
@@ -117,52 +117,49 @@ class Topics:
         self._seen = (-1, -1)
         self._view: GraphView | None = None
         self._clocks: Mapping[str, int] = {}
-        """By node on another computer, what to add to its times for this computer's clock (ns)."""
+        """Clock offset of each node on another computer, to add to its times (ns)."""
         self._aged = 0
         self._told_at = 0.0
-        self._past: set[str] = set()  # vanished long ago, but somebody still looks at them
+        self._past: set[str] = set()  # vanished, but still watched
         self.revision = 0
         self.values_revision = 0
 
     def __iter__(self) -> Iterator[Topic]:
-        """Every topic, the vanished ones too for ten seconds."""
         return (topic for topic in self._topics.values() if topic.name not in self._past)
 
     def __len__(self) -> int:
-        """How many `__iter__` gives."""
         return len(self._topics) - len(self._past)
 
     def __getitem__(self, name: str) -> Topic:
-        """The topic of that name; KeyError when there is none."""
         return self._topics[name]
 
     def __contains__(self, name: object) -> bool:
-        """Whether the name is known."""
         return name in self._topics
 
     def get(self, name: str) -> Topic | None:
-        """The topic of that name, or None."""
+        """Return the topic with this name, or None."""
         return self._topics.get(name)
 
     def live(self) -> list[Topic]:
-        """Those that have not vanished."""
+        """Return the topics that have not vanished."""
         return [topic for topic in self._topics.values() if topic.gone_since is None]
 
     def of_type(self, *msg_types: str) -> list[Topic]:
-        """The live topics of one of these types."""
+        """Return the existing topics of one of these types."""
         return [topic for topic in self.live() if topic.msg_type in msg_types]
 
     def mark_seen(self, name: str) -> None:
-        """A person looked at it: it is not new any more."""
+        """Clear the mark of a topic as new."""
         topic = self._topics.get(name)
         if topic is not None and topic.new:
             topic.new = False
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
-        """Take over a new graph; ``now`` is a monotonic clock in s.
+        """Apply a new graph; ``now`` is monotonic seconds.
 
-        Where nobody came or went only the figures are renewed, of very many topics by and by (`age`).
+        When no node or topic changed, only the statistics are updated; with more than `AT_ONCE` topics they
+        are updated in parts (`age`).
         """
         seen = (view.epoch, view.revision)
         self._clocks = self._clocks_in(view)
@@ -181,7 +178,7 @@ class Topics:
             id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None
         }
         if not any(known.values()):
-            return {}  # all are on the master's computer
+            return {}  # all nodes are on the master's computer
         own = next((known[id] for id in self._own_in(view) if id in known), None)
         return {} if own is None else {id: offset - own for id, offset in known.items() if offset != own}
 
@@ -204,13 +201,13 @@ class Topics:
         self._first_graph = False
 
     def forget(self, now: float) -> None:
-        """The master is gone: nothing is known to be there."""
+        """Mark all topics as vanished: the master is lost."""
         for topic in self._topics.values():
             if topic.gone_since is None:
                 self._vanish(topic, now)
 
     def set_stale(self, stale: bool) -> None:
-        """Whether the network can't be asked: what is known of those that are there is as it was last."""
+        """Mark all topics as stale while the network can't be queried."""
         for topic in self._topics.values():
             if topic.stale is not stale:
                 topic.stale = stale
@@ -219,9 +216,9 @@ class Topics:
                 self.revision += 1
 
     def count(self, passed_s: float, before: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
-        """Count what arrived of watched topics whose publishers tell no rate, in ``passed_s`` seconds.
+        """Measure the rates of watched topics whose publishers report none, over ``passed_s`` seconds.
 
-        ``before`` is what this gave the last time: messages and bytes that had arrived by then.
+        ``before`` is the previous return value: messages and bytes that had arrived, by topic.
         """
         arrived = {
             topic.name: (topic.received, topic.received_bytes)
@@ -240,9 +237,9 @@ class Topics:
         return arrived
 
     def age(self, now: float, now_ns: int) -> None:
-        """Let time pass: ages grow, what vanished ten seconds ago leaves.
+        """Update the ages; remove topics that vanished more than `GONE_SHOWN_S` ago.
 
-        Of very many topics each call takes the next `AT_ONCE`, and renews their figures.
+        With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` and updates their statistics.
         """
         if self._aged >= len(self._topics):
             self._aged = 0
@@ -260,7 +257,7 @@ class Topics:
                 topic.silent_s = _silence(topic, now, self._told_at)
 
     def _leave(self, topic: Topic) -> None:
-        """It vanished ten seconds ago; one that somebody still looks at only leaves the lists."""
+        # A vanished topic that is still watched only leaves the lists.
         listed = topic.name not in self._past
         if topic.watched:
             self._past.add(topic.name)
@@ -270,8 +267,8 @@ class Topics:
         self.revision += listed
 
     def add(self, name: str, batch: Batch, now: float) -> None:
-        """Take over what arrived on a watched topic."""
-        if not batch.messages:  # a watched topic of which there is nothing, and perhaps never was
+        """Add messages that arrived on a watched topic."""
+        if not batch.messages:  # a watched topic without messages; it may never have existed
             return
         topic = self._topics.get(name)
         if topic is None:
@@ -281,14 +278,14 @@ class Topics:
         topic.newest = batch.messages[-1]
         topic.received += batch.arrived
         kept_bytes = sum(message.size_bytes for message in batch.messages)
-        # what was dropped is taken to have been as large as what was not
+        # dropped messages are assumed to be as large as the others
         topic.received_bytes += kept_bytes * batch.arrived // len(batch.messages)
         topic.dropped += batch.dropped
         topic.last_received = topic.moved_at = now
         self.values_revision += 1
 
     def unwatch(self, name: str) -> None:
-        """Nobody looks any more: forget its messages."""
+        """Discard the messages and counts of a topic that is no longer watched."""
         topic = self._topics.get(name)
         if topic is not None:
             topic.newest = topic.previous = None
@@ -298,7 +295,7 @@ class Topics:
             topic.watched = False
 
     def set_figures(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
-        """By topic the messages a second, and when the newest came (ns), where no publishers tell it."""
+        """Set the reported rate (messages per second) and time of the newest message (ns), by topic."""
         for name, (rate_hz, newest_ns) in figures.items():
             topic = self._topics.get(name)
             if topic is not None:
@@ -308,7 +305,7 @@ class Topics:
         self.values_revision += 1
 
     def rewind(self) -> None:
-        """The source is at another time: what was newest, and when, is told anew."""
+        """Discard the newest messages and their times: the replay moved to another time."""
         for topic in self._topics.values():
             topic.newest = topic.previous = None
             topic.last_stamp_ns = topic.last_received = topic.age_s = None
@@ -365,7 +362,7 @@ def _take_figures(topic: Topic, info: TopicInfo, now: float, clocks: Mapping[str
 
 
 def _newest_of(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
-    """When the newest message was published, by this computer's clock."""
+    # In this computer's clock.
     stamps = (
         each.last_stamp_ns + clocks.get(each.node_id, 0)
         for each in info.publishers
@@ -390,7 +387,7 @@ def _age(topic: Topic, now: float, now_ns: int) -> float | None:
 
 
 def _heard_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
-    """Since when the publishers that are there have had a subscriber; None while they have none."""
+    # Start of the time in which the present publishers have had a subscriber.
     if not info.publishers or not info.subscribers:
         return None
     before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
@@ -399,10 +396,8 @@ def _heard_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
 
 
 def _silence(topic: Topic, now: float, told_at: float) -> float | None:
-    """How long nothing came although somebody listened, on our own clock: that of the sender may be wrong.
-
-    What arrives here is known to the moment; of others only what the master told last, at ``told_at``.
-    """
+    # By this computer's clock, because the publisher's may be wrong. For topics that are not watched, the
+    # last report of the master (`told_at`) counts.
     if topic.heard_since is None or topic.moved_at is None:
         return None
     until = now if topic.watched else told_at
@@ -412,6 +407,6 @@ def _silence(topic: Topic, now: float, told_at: float) -> float | None:
 
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:
-    """Messages a second of all topics together; None when no publisher told its rate."""
+    """Return the total message rate of the topics; None when no publisher reports one."""
     known = [info.rate_hz for info in topics if info.rate_hz is not None]
     return sum(known) if known else None

@@ -1,4 +1,4 @@
-"""How many messages there are, how many were lost, and how many of those looked at were shown."""
+"""Message statistics of the whole network: rate, losses, and messages shown of those watched."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from nep.protocol.graph_view import GraphView
 WINDOW_S = 30.0
 
 SUM_EVERY_S = 0.5
-"""Figures of very many topics are summed up this often, however often they are told."""
+"""Interval at which the statistics of more than `AT_ONCE` topics are summed."""
 
 
 class RecentLosses:
-    """Counts what was lost in the last 30 s."""
+    """Counter of losses in the last 30 s."""
 
     def __init__(self) -> None:
-        """What was lost before the first total is not counted."""
+        # The first total is the baseline.
         self._grew: deque[tuple[float, int]] = deque()
         self._before: int | None = None
 
     def count(self, total: int, now: float) -> int:
-        """The losses of the last 30 s; ``total`` is all that were ever lost, ``now`` monotonic seconds."""
+        """Return the losses of the last 30 s.
+
+        ``total`` is the number of losses ever, ``now`` monotonic seconds.
+        """
         if self._before is not None and total > self._before:
             self._grew.append((now, total - self._before))
         self._before = total
@@ -34,15 +37,14 @@ class RecentLosses:
 
 
 class Traffic:
-    """Figures of the whole network, and of what Studio looks at. One thread uses it (the window's).
+    """Statistics of the network and of the watched topics. Not thread-safe: use it from the window's thread.
 
-    ``messages_per_s`` of all topics as their publishers tell it, None when none does; ``lost_30s`` messages
-    that subscribers of all programs did not get. ``shown_30s`` of ``sent_30s`` messages on the topics that
-    are looked at were kept for the panels: what came faster than the window shows was dropped, and counted.
+    ``messages_per_s`` is the rate of all topics as reported by publishers, or None; ``lost_30s`` the messages
+    that any subscriber lost in the last 30 s. ``shown_30s`` of ``sent_30s`` messages on watched topics were
+    passed to panels; the others were dropped because they arrived faster than the window shows them.
     """
 
     def __init__(self, topics: Topics) -> None:
-        """Count what arrives for these topics."""
         self._topics = topics
         self._losses = RecentLosses()
         self._recent: deque[tuple[float, int, int]] = deque()
@@ -54,7 +56,7 @@ class Traffic:
         self.sent_30s = 0
 
     def follow(self, view: GraphView, now: float) -> None:
-        """Take over a new graph; ``now`` is monotonic seconds. Very many topics are summed up at leisure."""
+        """Apply a new graph; ``now`` is monotonic seconds. Large graphs are summed less often."""
         self._untold = view
         if len(view.topics) <= AT_ONCE:
             self._sum_up(view, now)
@@ -62,7 +64,7 @@ class Traffic:
             self._sum_up_if_due(now)
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
-        """Count what a tick took over; called with every tick."""
+        """Count the messages of a tick. Called at every tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
         self._count(shown, sum(batch.arrived for batch in batches.values()), now)
         self._sum_up_if_due(now)
@@ -77,7 +79,10 @@ class Traffic:
         self.messages_per_s = total_rate_hz(view.topics.values())
 
     def miss(self, missed: Mapping[str, int], now: float) -> None:
-        """Count what did not arrive here; ``missed`` are totals since each topic is looked at."""
+        """Count messages that were lost before they arrived.
+
+        ``missed`` are totals since each topic is watched.
+        """
         grown = 0
         for name, total in missed.items():
             topic = self._topics.get(name)
