@@ -1,4 +1,4 @@
-"""The networks that Studio can look at beside its own: their names, where they are, what is known."""
+"""Kinds of networks that Studio can show beside its own: names, addresses, available statistics."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _TEXT_OF_ROS = "std_msgs/String"
 
 @dataclass(frozen=True, slots=True)
 class NetworkKind:
-    """A kind of network. ``name`` is that of nep's back end, ``words`` what people call it.
+    """Kind of network. ``name`` is the name of nep's back end, ``words`` the product name.
 
-    ``place`` says what its address is and ``hint`` what a person should know of it, both marked with `lazy`;
-    ``example`` is the address that is meant when none is given. ``tells_figures``: its nodes tell rates,
-    losses and how much of a processor they use. ``codec`` gives a topic's codec where the graph has a more
-    general one, ``reads`` as what a topic is subscribed. ``qos`` is the quality that hears most publishers.
+    ``place`` describes its address and ``hint`` gives advice, both marked with `lazy`; ``example`` is the
+    default address. ``tells_figures`` is whether its nodes report rates, losses and CPU use. ``codec``
+    returns a topic's codec where the graph has a more general one; ``reads`` the type to subscribe with.
+    ``qos`` is the quality of service that is compatible with most publishers.
     """
 
     name: str
@@ -34,12 +34,12 @@ class NetworkKind:
     qos: str = ""
 
     def checked(self, address: str) -> str:
-        """The address as the back end has it. Raises `NepError` for what is none."""
+        """Return the address in the back end's form. Raises `NepError` if it is invalid."""
         return backend_named(self.name).master(address.strip() or self.example)
 
     @property
     def not_known(self) -> str:
-        """Why a figure is missing: "not known on ROS 2"."""
+        """Explanation of a missing value: "not known on ROS 2"."""
         return _("unknown on {network}").format(network=self.words)
 
 
@@ -52,7 +52,7 @@ def _reads_ros_2(info: TopicInfo) -> str:
 
 
 def _reads_ros(info: TopicInfo) -> str:
-    """A subscriber of json reads any message as a map, also of a package that is not installed here."""
+    # A json subscriber reads any message as a map, also of a package that is not installed here.
     if info.codec == "image":
         return "image"
     return _TEXT_OF_ROS if info.msg_type == _TEXT_OF_ROS else "json"
@@ -78,7 +78,7 @@ KINDS = (
         tells_figures=False,
         codec=_codec_of_ros_2,
         reads=_reads_ros_2,
-        qos="best_effort",  # a reader that does not insist hears writers that don't, and all others
+        qos="best_effort",  # a best-effort reader is compatible with best-effort and reliable writers
     ),
     NetworkKind(
         "zenoh",
@@ -95,5 +95,5 @@ _BY_NAME = {kind.name: kind for kind in KINDS}
 
 
 def kind_named(name: str) -> NetworkKind | None:
-    """The kind of this name; None for "", which is the native network, and for any other."""
+    """Return the kind with this name; None for "" (the native network) and unknown names."""
     return _BY_NAME.get(name)

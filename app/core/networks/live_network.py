@@ -1,4 +1,4 @@
-"""The live network as `app.core.session.Session` knows it."""
+"""Live network as part of `app.core.session.Session`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.protocol.graph_view import GraphView
 
 @dataclass(slots=True)
 class LiveNetwork:
-    """State of the live network, also while a recording is shown; robots, Stop, alarms and health use it."""
+    """State of the live network, also while a recording is shown; used by robots, Stop, alarms and health."""
 
     topics: Topics
     nodes: Nodes

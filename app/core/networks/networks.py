@@ -1,4 +1,4 @@
-"""The networks that a person chose to look at beside the native one, and what is known of each."""
+"""Networks that the user chose to show beside the native one, and their state."""
 
 from __future__ import annotations
 
@@ -19,44 +19,47 @@ from nep.errors import NepError
 from nep.i18n import _
 
 KEPT = "networks"
-"""Which are looked at, by kind: their addresses."""
+"""Setting with the shown networks: addresses by kind."""
 LOOK_COMMAND = "network.look"
-"""The window's command that lets a person choose."""
+"""Window command for choosing the networks."""
 COUNT_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
 
 
 class NetworkSource(Protocol):
-    """What brings a network's graph and messages; see `app.core.network.source.Source`."""
+    """Source of a network's graph and messages (see `app.core.network.source.Source`)."""
 
     def start(self) -> None:
-        """Begin."""
+        """Start the source."""
 
     def watch(self, topic: str) -> None:
-        """Messages of it are wanted."""
+        """Subscribe to a topic."""
 
     def unwatch(self, topic: str) -> None:
-        """Messages of it are not wanted any more."""
+        """Unsubscribe from a topic."""
 
     def end(self) -> None:
-        """End soon; waits for nothing."""
+        """Signal the thread to end without waiting."""
 
     @property
     def has_ended(self) -> bool:
-        """Whether its thread runs no more."""
+        """True if the thread has ended."""
 
     def close(self) -> None:
-        """End; returns when its thread has."""
+        """Stop and wait for the thread."""
 
 
 MakeNetwork = Callable[[NetworkKind, str, Sequence[Sink], Callable[[object], None]], NetworkSource]
-"""Makes the source of a network of this kind and address."""
+"""Creates the source of a network of this kind and address."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkEvent:
-    """What a network's source told; ``number`` is the source's: one that was ended may still tell things."""
+    """Event of a network's source.
+
+    ``number`` identifies the source, as a stopped one may still send events.
+    """
 
     kind: str
     number: int
@@ -64,13 +67,12 @@ class NetworkEvent:
 
 
 class OtherNetwork:
-    """One of them. ``state`` is "off" until it is chosen; ``sentence`` says why it is "lost".
+    """State of one network. ``state`` is "off" until it is chosen; ``sentence`` is why it is "lost".
 
-    ``unread`` has, by topic, why a topic that somebody looks at can't be read.
+    ``unread`` maps watched topics that can't be read to the reason.
     """
 
     def __init__(self, kind: NetworkKind) -> None:
-        """Not chosen yet."""
         self.kind = kind
         self.address = ""
         self.number = 0
@@ -78,7 +80,7 @@ class OtherNetwork:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known of it."""
+        """Reset the state."""
         self.state: NetworkState = "off"
         self.sentence = ""
         self.topics, self.nodes = Topics(network=self.kind.name), Nodes(self.kind.name)
@@ -88,11 +90,11 @@ class OtherNetwork:
 
     @property
     def is_chosen(self) -> bool:
-        """Whether it is looked at."""
+        """True if the network is shown."""
         return self.source is not None
 
     def take(self, event: object, now: float) -> None:
-        """What its source told."""
+        """Apply an event of its source."""
         match event:
             case GraphSeen():
                 self.state, self.sentence = "there", ""
@@ -112,7 +114,7 @@ class OtherNetwork:
                 pass
 
     def age(self, now: float, now_ns: int) -> None:
-        """Let time pass; once a second what arrives is counted, where publishers don't tell it."""
+        """Update the ages; once a second, measure rates that publishers don't report."""
         self.topics.age(now, now_ns)
         self.nodes.age(now)
         if self._counted_at is None or now - self._counted_at >= COUNT_S:
@@ -121,7 +123,10 @@ class OtherNetwork:
 
 
 class Networks:
-    """All kinds, chosen or not. One thread uses it (the window's); each network has a thread of its own."""
+    """All kinds of networks, shown or not. Not thread-safe: use it from the window's thread.
+
+    Each shown network has a thread of its own.
+    """
 
     def __init__(
         self,
@@ -131,10 +136,7 @@ class Networks:
         alerts: Alerts,
         make: MakeNetwork = OtherSource,
     ) -> None:
-        """``sinks`` take messages by their topics' names among all networks, ``post_event`` what is told.
-
-        ``alerts`` say which network does not answer.
-        """
+        # `sinks` get messages by topic key (`key_of`); `post_event` gets the sources' events.
         self._alerts = alerts
         self._settings, self._sinks, self._post_event, self._make = settings, tuple(sinks), post_event, make
         self._networks = {kind.name: OtherNetwork(kind) for kind in KINDS}
@@ -144,46 +146,45 @@ class Networks:
         self._changes = 0
 
     def __iter__(self) -> Iterator[OtherNetwork]:
-        """All of them, also those that are not chosen."""
         return iter(self._networks.values())
 
     def get(self, name: str) -> OtherNetwork | None:
-        """The network of this kind; None for the native one."""
+        """Return the network of this kind; None for the native one."""
         return self._networks.get(name)
 
     @property
     def chosen(self) -> list[OtherNetwork]:
-        """Those that are looked at."""
+        """Networks that are shown."""
         return [network for network in self if network.is_chosen]
 
     @property
     def revision(self) -> int:
-        """Grows with every change but that of figures."""
+        """Counter that increases with every change except statistics."""
         return self._changes + sum(each.topics.revision + each.nodes.revision for each in self)
 
     @property
     def values_revision(self) -> int:
-        """Grows when figures may have changed."""
+        """Counter that increases when statistics may have changed."""
         return sum(each.topics.values_revision + each.nodes.values_revision for each in self)
 
     @property
     def topics(self) -> list[Topic]:
-        """The topics of all that are looked at."""
+        """Topics of all shown networks."""
         return [topic for network in self.chosen for topic in network.topics]
 
     @property
     def nodes(self) -> list[NodeEntry]:
-        """The nodes of all that are looked at."""
+        """Nodes of all shown networks."""
         return [node for network in self.chosen for node in network.nodes]
 
     def topic(self, key: str) -> Topic | None:
-        """The topic of this name among all networks; None when it is native or not known."""
+        """Return the topic with this key; None when it is native or unknown."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.topics.get(topic) if network is not None else None
 
     def unread(self, key: str) -> str:
-        """Why this topic can't be read; empty when it can, or nobody looks at it."""
+        """Return why a watched topic can't be read, or ""."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.unread.get(topic, "") if network is not None else ""
@@ -191,7 +192,7 @@ class Networks:
     # -- choosing --------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Look at those that were chosen before; whatever is kept and is no address is left out."""
+        """Join the saved networks; invalid saved addresses are skipped."""
         for name, address in self._kept().items():
             network = self._networks.get(name)
             if network is not None and isinstance(address, str):
@@ -201,9 +202,9 @@ class Networks:
                     continue
 
     def choose(self, name: str, address: str) -> None:
-        """Look at the network of this kind, at this address; kept for the next start.
+        """Show the network of this kind at this address, also after the next start.
 
-        Raises `NepError` for what is no address there, `SettingsError` when it can't be kept.
+        Raises: NepError: the address is invalid. SettingsError: the choice can't be saved.
         """
         network = self._networks[name]
         checked = network.kind.checked(address)
@@ -213,7 +214,7 @@ class Networks:
         self._keep({**self._kept(), name: checked})
 
     def leave(self, name: str) -> None:
-        """Look at it no more. Raises `SettingsError` when that can't be kept."""
+        """Stop showing a network. Raises `SettingsError` when that can't be saved."""
         self._end(self._networks[name])
         self._keep({kind: address for kind, address in self._kept().items() if kind != name})
 
@@ -246,10 +247,10 @@ class Networks:
             self._changes += network.topics.revision + network.nodes.revision + 1
             network.forget()
 
-    # -- what the session does -------------------------------------------------------------------------------
+    # -- interface of the session ----------------------------------------------------------------------------
 
     def on_event(self, told: NetworkEvent, now: float) -> None:
-        """Take over what a network's source told."""
+        """Apply an event of a network's source."""
         network = self._networks[told.kind]
         if network.is_chosen and told.number == network.number:
             before = network.state
@@ -259,7 +260,6 @@ class Networks:
                 self._tell(network)
 
     def _tell(self, network: OtherNetwork) -> None:
-        """An alert says what is wrong with it, as long as that is so."""
         id = f"network:{network.kind.name}"
         if network.state != "lost":
             self._alerts.resolve(id)
@@ -275,7 +275,7 @@ class Networks:
         )
 
     def add(self, key: str, batch: Batch, now: float) -> None:
-        """Take over what arrived on a topic that is looked at."""
+        """Add messages that arrived on a watched topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None or not network.is_chosen or topic not in self._watched[name]:
@@ -285,7 +285,7 @@ class Networks:
         network.unread.pop(topic, None)
 
     def watch(self, key: str) -> None:
-        """Somebody looks at a topic."""
+        """Watch a topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None:
@@ -298,7 +298,7 @@ class Networks:
             network.source.watch(topic)
 
     def unwatch(self, key: str) -> None:
-        """Nobody looks at a topic any more."""
+        """End the watch of a topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None:
@@ -310,12 +310,12 @@ class Networks:
             network.source.unwatch(topic)
 
     def age(self, now: float, now_ns: int) -> None:
-        """Let time pass."""
+        """Update the ages."""
         for network in self.chosen:
             network.age(now, now_ns)
 
     def close(self) -> None:
-        """End all; returns when their threads have ended."""
+        """Stop all sources and wait for their threads."""
         for network in self:
             if network.source is not None:
                 network.source.end()
@@ -327,26 +327,26 @@ class Networks:
 
 
 def lost_words(network: OtherNetwork) -> str:
-    """Why nothing new is known of it: "ROS 1: no ROS master answers at ..."; empty while it is well."""
+    """Return why a network is lost ("ROS 1: no ROS master answers at ..."), or "" while it answers."""
     if network.state != "lost":
         return ""
     return _("{network}: {reason}.").format(network=network.kind.words, reason=network.sentence)
 
 
 def network_words(name: str) -> str:
-    """What people call the network of this kind; "NEP" for the native one."""
+    """Return the product name of the network of this kind; "NEP" for the native one."""
     kind = kind_named(name)
     return kind.words if kind is not None else "NEP"
 
 
 def topic_words(key: str) -> str:
-    """What a topic is called: "/camera", or "/camera on ROS 2"."""
+    """Return a topic's name for people: "/camera", or "/camera on ROS 2"."""
     name, topic = split_key(key)
     return _("{topic} on {network}").format(topic=topic, network=network_words(name)) if name else topic
 
 
 def by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
-    """Batches by topic: those of the native network, and those of others."""
+    """Split batches into those of the native network and those of others."""
     native: dict[str, Batch] = {}
     others: dict[str, Batch] = {}
     for key, batch in batches.items():

@@ -1,6 +1,6 @@
-"""The parameters of the node that a person chose: what they are now, which have just changed, setting one.
+"""Parameters of the selected node: current values, recent changes, setting a value.
 
-Values are heard on the topic on which a node tells them; they are set by a call, in a thread of its own.
+Values are received on the node's parameter topic and set by a service call in a thread of its own.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ from nep.patterns.parameters.remote import RemoteParameters
 from nep.text import bounded_str
 
 ANSWER_S = 3.0
-"""How long a node may take to answer that it has set one."""
+"""Timeout of the call that sets a parameter."""
 READ_BYTES = 4 * 2**20
-"""More is not read in the window."""
+"""Maximum message size that is decoded in the window."""
 EDITED_LETTERS = 20_000
 MOST = 1000
 _MAX_DESCRIPTION_LENGTH = 2_000
-"""As many as a node may declare; of a stranger's the others are not shown."""
+"""Maximum length of a shown description (`MOST` is the number of parameters that a node may declare; more are
+not shown)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownParameter:
-    """A parameter as its node tells it. ``kind`` is "bool", "int", "float", "str", "list" or "dict".
+    """Parameter as reported by its node. ``kind`` is "bool", "int", "float", "str", "list" or "dict".
 
-    ``minimum`` and ``maximum`` bound numbers, ``choices`` are the only values there are, if there are any.
-    ``read_only``: only its own node may set it. ``text`` is the value as a person edits it.
+    ``minimum`` and ``maximum`` bound numbers; ``choices`` lists the allowed values, if restricted. With
+    ``read_only`` only its own node can set it. ``text`` is the value in editable form.
     """
 
     name: str
@@ -56,24 +57,27 @@ class ShownParameter:
 
 
 class ParameterSetter:
-    """Sets parameters of nodes of the native network. One thread uses it (the window's)."""
+    """Sets parameters of nodes of the native network. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, submit: Callable[[str, Job], None]) -> None:
-        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        # `submit` runs a job with Studio's node (`app.core.network.source.Source.submit`).
         self._submit = submit
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-parameters")
 
     def set(self, node_id: str, name: str, value: object) -> None:
-        """Ask the node to give it this value; `take` tells how that went."""
+        """Call the node to set a parameter; `take` returns the result."""
         owner = f"{node_id} {name}"
         self._submit("", lambda node: self._worker.ask(owner, partial(_set, node, node_id, name, value)))
 
     def take(self, node_id: str, name: str) -> bool:
-        """Whether the node has set it since the last time. Raises `NepError` with why it has not."""
+        """Return whether the node has set it since the last call.
+
+        Raises `NepError` with the reason if it failed.
+        """
         return self._worker.take(f"{node_id} {name}") is True
 
     def close(self) -> None:
-        """Wait for a call that goes on, 2 s at most."""
+        """Wait for a call in flight, at most 2 s."""
         self._worker.close()
 
 
@@ -89,10 +93,10 @@ def _set(node: Node, node_id: str, name: str, value: object) -> bool:
 
 
 class NodeParameters:
-    """Those of the node that is shown. One thread uses it (the window's).
+    """Parameters of the shown node. Not thread-safe: use it from the window's thread.
 
-    ``changed`` has, by name, when a value changed while it was watched (monotonic seconds). ``revision``
-    grows with every change.
+    ``changed`` maps names to the time of the last change while watched (monotonic seconds). ``revision``
+    increases with every change.
     """
 
     def __init__(
@@ -102,28 +106,26 @@ class NodeParameters:
         setter: ParameterSetter,
         has_master: Callable[[], bool] = lambda: True,
     ) -> None:
-        """``watch`` looks at a topic by its name among those of all networks, ``topic`` is what came.
-
-        ``has_master``: whether the native network's master answers, so that nodes can be called.
-        """
+        # `watch` opens a watch by topic key, `topic` returns its state; `has_master`: whether nodes can be
+        # called.
         self._watch, self._topic, self._setter, self._has_master = watch, topic, setter, has_master
         self.watching: Watching | None = None
         self.node: NodeEntry | None = None
         self.all: tuple[ShownParameter, ...] = ()
         self.changed: dict[str, float] = {}
         self.heard = False
-        """Whether the node has told them since it is shown."""
+        """True if the node has reported its parameters since it is shown."""
         self.problem = ""
-        """Why what it told can't be read."""
+        """Why its report can't be read, or ""."""
         self.setting = ""
-        """The one that is being set."""
+        """Name of the parameter that is being set, or ""."""
         self.refusal = ""
-        """Why the last one was not set, as a sentence."""
+        """Sentence why the last set call was rejected, or ""."""
         self.revision = 0
         self._shown: Message | None = None
 
     def show(self, node: NodeEntry | None) -> None:
-        """Look at the parameters of this node, which may have none; None: of no node."""
+        """Show the parameters of this node, which may have none; None shows no node."""
         wanted = node if node is not None and node.has_parameters else None
         if wanted is self.node:
             return
@@ -133,7 +135,7 @@ class NodeParameters:
             self.watching = self._watch(key_of(wanted.network, place_of(wanted.id)))
 
     def close(self) -> None:
-        """Look at none."""
+        """Show no node."""
         if self.watching is not None:
             self.watching.close()
         self.watching = self.node = self._shown = None
@@ -142,11 +144,11 @@ class NodeParameters:
         self.revision += 1
 
     def find(self, name: str) -> ShownParameter | None:
-        """The parameter of this name."""
+        """Return the parameter with this name, or None."""
         return next((each for each in self.all if each.name == name), None)
 
     def refresh(self, now: float) -> None:
-        """Take over what has come; ``now`` is monotonic seconds."""
+        """Apply received values; ``now`` is monotonic seconds."""
         node = self.node
         if node is None:
             return
@@ -190,7 +192,10 @@ class NodeParameters:
                 self.revision += 1
 
     def set(self, name: str, text: str) -> None:
-        """Ask the node to give it the value that the text means; why it can't be is then in `refusal`."""
+        """Call the node to set the value that the text means.
+
+        `refusal` is then the reason if it can't be set.
+        """
         node, parameter = self.node, self.find(name)
         self.revision += 1
         self.refusal = ""
@@ -211,7 +216,7 @@ class NodeParameters:
 
 
 def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
-    """Why a parameter can't be set from here; empty when it can."""
+    """Return why a parameter can't be set from here, or ""."""
     if node.gone_s is not None:
         return _("its node has disappeared")
     if len(parameter.text) > EDITED_LETTERS:
@@ -222,7 +227,7 @@ def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
 
 
 def parameters_in(state: object) -> tuple[ShownParameter, ...]:
-    """What a node tells of its parameters. Raises `NepError` for anything else: anybody may publish there."""
+    """Parse a node's parameter message. Raises `NepError` if it is malformed: any node can publish there."""
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
         raise NepError(_("this is not a list of parameters"))
@@ -250,22 +255,22 @@ def _number(told: object) -> float | None:
 
 
 def _same(one: object, other: object) -> bool:
-    """1, 1.0 and True are three values."""
+    # 1, 1.0 and True are different values.
     return type(one) is type(other) and one == other
 
 
 def text_of(value: object) -> str:
-    """A value as a person edits it: a text as it is, anything else as JSON."""
+    """Return a value in editable form: strings unchanged, anything else as JSON."""
     if isinstance(value, str):
         return value
     try:
         return orjson.dumps(value).decode()
-    except TypeError:  # what no JSON has, and a stranger sent
+    except TypeError:  # a value that JSON lacks, from another program
         return bounded_str(value)
 
 
 def value_of(text: str, kind: str) -> object:
-    """What a text means for a parameter of this kind. Raises `ValueError` with a sentence."""
+    """Parse the text of a parameter of this kind. Raises `ValueError` with a sentence."""
     if kind == "str":
         return text
     said = text.strip()

@@ -1,4 +1,4 @@
-"""One network beside the native one, joined by a node of its back end in a thread of its own."""
+"""Source of a network other than the native one, joined by a node of its back end in a thread of its own."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOOK_S = 2.0
 
 
 class OtherSource(LiveSource):
-    """As `LiveSource`; sinks are given topics by their names among all networks (`key_of`)."""
+    """`LiveSource` of another network; its sinks get topics by their keys among all networks (`key_of`)."""
 
     poll_s = ASK_S
 
@@ -33,7 +33,6 @@ class OtherSource(LiveSource):
         sinks: Sequence[Sink],
         post_event: Callable[[object], None],
     ) -> None:
-        """``address`` is where the nodes of this kind of network meet."""
         super().__init__(
             address, [_keyed(kind.name, sink) for sink in sinks], post_event, thread=f"studio-{kind.name}"
         )
@@ -42,15 +41,15 @@ class OtherSource(LiveSource):
         self._revision = 0
 
     def join(self) -> Node:
-        """See `LiveSource.join`."""
+        """Join the network. Raises `NepError` while it doesn't answer."""
         with _in_words():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=LOOK_S)
 
     def look(self, node: Node) -> GraphView:
-        """See `LiveSource.look`; topics have the codec by which they are read.
+        """Return the graph with the codecs by which topics are read.
 
-        The revision grows with every change of who is there: back ends that gather a graph anew each time
-        give two different ones the same number.
+        The revision increases with every change of nodes or topics: back ends that collect a new graph each
+        time give different graphs the same number.
         """
         with _in_words():
             view = node.graph(timeout_s=LOOK_S)
@@ -65,7 +64,7 @@ class OtherSource(LiveSource):
         return replace(view, topics=topics, revision=self._revision)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
-        """See `LiveSource.subscribe`."""
+        """Subscribe to a topic with the type by which it is read."""
         info = self._view.topics.get(topic) if self._view is not None else None
         wanted = self._kind.reads(info) if info is not None else msg_type
         with _in_words():
@@ -73,7 +72,6 @@ class OtherSource(LiveSource):
 
 
 def _members(view: GraphView) -> object:
-    """Who is there and what they have, without figures."""
     nodes = {(each.id, each.name, each.host, each.pid, each.generation) for each in view.nodes.values()}
     topics = {
         (
@@ -93,7 +91,7 @@ def _members(view: GraphView) -> object:
 
 @contextmanager
 def _in_words() -> Iterator[None]:
-    """What a back end's library raises becomes a `NepError`."""
+    # Converts exceptions of a back end's library to `NepError`.
     try:
         yield
     except NepError:
