@@ -1,4 +1,4 @@
-"""Robots: who is there, what a person tries with them, whether they may move, their stop.
+"""Robots: connections, manual actions, motion permission, Stop.
 
-`fleet` has all robots, each a `robot_link.RobotLink`; `stop` proves that they stand still.
+`fleet` has all robots, each a `robot_link.RobotLink`; `stop` proves that they have stopped.
 """

@@ -1,8 +1,8 @@
-"""Who says that it is a robot: one program for each name, the one that announced it first.
+"""Robot announcements: the program that announced a name first owns it.
 
-What others say under the same name changes nothing and is told as a claim. A robot's program is replaced only
-when the master does not list its announcement any more. Robots of RIZE say nothing about themselves: who
-listens to ``robot_action`` is taken for one.
+Announcements of other programs under the same name are ignored and reported as claims. A robot's program is
+replaced only after the master has removed its announcement. Robots of RIZE announce nothing; nodes that
+subscribe to ``robot_action`` count as such robots.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from nep.protocol.graph_view import GraphView
 MOST_ROBOTS = 200
 MOST_CLAIMANTS = 8
 MOST_OWNERS = 4
-"""Programs of one robot whose descriptions are kept, should one of them come back."""
+"""Maximum number of earlier programs of one robot whose descriptions are kept, in case they return."""
 READING_SHARE = 0.2
-"""So much of the window's time may go into reading descriptions in the long run, whoever sends how many."""
+"""Maximum share of the window's time for parsing descriptions in the long run."""
 READING_S = 1.0
-"""So much may be read at once after a rest: all robots of a room that come together."""
+"""Maximum time for parsing at once after an idle period, such as for all robots of a room."""
 
 NATIVE = frozenset({"native", "gateway"})
 SUFFIXES = ("_driver", "_robot", "_node")
@@ -38,7 +38,7 @@ SUFFIXES = ("_driver", "_robot", "_node")
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Somebody says of itself what is not believed: what is wrong, and what it means."""
+    """Rejected announcement: the problem, and the consequence."""
 
     title: str
     detail: str
@@ -46,11 +46,11 @@ class Claim:
 
 @dataclass(slots=True)
 class _Announced:
-    """A description topic: whose it is, and the newest description of each of its publishers.
+    """Description topic with its owner and the newest description of each publisher.
 
-    ``place`` is how many topics the same node announces before it. ``owners`` are the nodes whose it was, the
-    newest at the front. What they said is kept while they are not
-    listed: a latched message comes once, and a program that only slept comes back over the same connection.
+    ``place`` is the number of topics that the same node announced before it. ``owners`` are the nodes that
+    owned it, newest first. Their descriptions are kept while they aren't listed: a latched message arrives
+    only once, and a suspended program resumes over the same connection.
     """
 
     watch: Watch | None = None
@@ -66,7 +66,7 @@ class _Announced:
 
 
 class Announcements:
-    """The descriptions on the network, each with the program that it counts from. One thread uses it."""
+    """Descriptions on the network with the programs that own them. Not thread-safe."""
 
     def __init__(
         self,
@@ -75,10 +75,7 @@ class Announcements:
         clock: Callable[[], float] = time.monotonic,
         is_proven: Callable[[str], bool] = lambda _topic: False,
     ) -> None:
-        """``watches`` subscribes description topics; ``senders`` learns who publishes them.
-
-        The robot of a topic that ``is_proven`` (it has answered, or may move) makes room for no other.
-        """
+        # A robot whose topic `is_proven` (it has answered, or may move) is never evicted.
         self._is_proven = is_proven
         self._watches, self._senders, self._clock = watches, senders, clock
         self._may_read_s, self._looked_s = READING_S, clock()
@@ -88,27 +85,27 @@ class Announcements:
         """Description topics of robots beyond `MOST_ROBOTS`."""
 
     def is_announced(self, topic: str) -> bool:
-        """Whether somebody announces a robot on this topic now."""
+        """Return whether a robot is announced on this topic."""
         known = self._topics.get(topic)
         return known is not None and known.watch is not None
 
     @property
     def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
-        """Each robot that is announced now: its topic, its description, its program."""
+        """Announced robots: topic, description, program."""
         for topic, known in self._topics.items():
             if known.watch is not None and known.robot is not None and known.owner is not None:
                 yield topic, known.robot, known.owner
 
     @property
     def unreadable(self) -> tuple[str, ...]:
-        """Description topics whose descriptions can't be used."""
+        """Description topics whose descriptions are invalid."""
         return tuple(
             topic for topic, known in self._topics.items() if known.is_unreadable and known.robot is None
         )
 
     @property
     def claims(self) -> Mapping[str, Claim]:
-        """What is not believed, by an id."""
+        """Rejected announcements by id."""
         found = {}
         for topic, known in self._topics.items():
             if known.watch is None:
@@ -136,7 +133,7 @@ class Announcements:
         return found
 
     def update(self, view: GraphView) -> None:
-        """Take over a new graph: who announces robots now, and whose announcement counts."""
+        """Apply a new graph: find the announced robots and their owners."""
         there = {
             topic: nodes
             for topic, info in view.topics.items()
@@ -173,25 +170,23 @@ class Announcements:
         self._read()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
-        """Take over the descriptions that arrived; whether any was read, also one that came before."""
+        """Add received descriptions; return whether any was parsed, including earlier ones."""
         for topic in batches.keys() & self._topics.keys():
             known = self._topics[topic]
             for message in batches[topic].messages:
                 if message.publisher is not None:
-                    known.told.pop(message.publisher, None)  # the newest stands at the end
+                    known.told.pop(message.publisher, None)  # so that the newest is last
                     known.told[message.publisher] = message
             while len(known.told) > MOST_CLAIMANTS:
                 self._drop_one(known)
             self._waiting.add(topic)
         return self._read()
 
-    # -- inside ----------------------------------------------------------------------------------------------
+    # -- private ---------------------------------------------------------------------------------------------
 
     def _begin(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
-        """Return a new topic; None when there are too many.
-
-        Topics that are gone make room, then those of nodes that announce more robots than this one.
-        """
+        # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
+        # more robots than this one.
         if len(self._topics) >= MOST_ROBOTS:
             strangers = [name for name in self._topics if not self._is_proven(name)]
             gone = next((name for name in strangers if self._topics[name].watch is None), None)
@@ -205,17 +200,15 @@ class Announcements:
         return self._topics.setdefault(topic, _Announced())
 
     def _end(self, known: _Announced) -> None:
-        """Nobody announces it any more; whose it was, and what that said, is kept: that one may come back.
-
-        After a new master, or when it only slept, it does so over the connection that it has.
-        """
+        # The owner and its description are kept: after a restart of the master or a suspension it returns
+        # over the same connection.
         if known.watch is not None:
             known.watch.close()
         known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
         known.told = {id: told for id, told in known.told.items() if self._is_owners(known, told)}
 
     def _drop_one(self, known: _Announced) -> None:
-        """Make room among the publishers; what the robot's programs said stays, the present one's longest."""
+        # Evicts another publisher's description; those of the robot's programs last.
         for owners in (known.owners, known.owners[:1]):
             for id, told in known.told.items():
                 if self._senders.node_of(told) not in owners:
@@ -227,11 +220,8 @@ class Announcements:
         return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
 
     def _read(self) -> bool:
-        """Parse those that wait, first of who has just come, then the shortest; whether there were any.
-
-        When too much time went into them lately the rest waits: a program that changes a long description
-        again and again must not hold up the window, with its Stop.
-        """
+        # New robots first, then the shortest description. The time is limited, so that a program that keeps
+        # changing a long description can't block the window and its Stop.
         now = self._clock()
         self._may_read_s = min(READING_S, self._may_read_s + (now - self._looked_s) * READING_SHARE)
         self._looked_s = now
@@ -251,7 +241,7 @@ class Announcements:
         return len(self._waiting) < len(wait)
 
     def _unread(self, topic: str) -> Message | None:
-        """The newest description of the robot's own program, if nobody has parsed it yet."""
+        # None if the newest description of the robot's own program has been parsed.
         known = self._topics.get(topic)
         if known is None or known.watch is None:
             return None
@@ -264,7 +254,7 @@ class Announcements:
         try:
             robot = announced(newest)
         except NepError:
-            return  # the session's alert `message:<topic>` says so; what it said before still counts
+            return  # reported by the session's alert `message:<topic>`; the previous description stays valid
         except DescriptionError as error:
             said = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
             whose = known.owner.words if known.owner is not None else topic
@@ -284,7 +274,7 @@ class Announcements:
 
 
 def _fairly(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
-    """Description topics by how many the same node announces before: each node's first comes first."""
+    # Sorted so that the first topic of each node comes before the second topic of any node.
     counts: Counter[str] = Counter()
     placed = []
     for topic, nodes in there.items():
@@ -294,25 +284,21 @@ def _fairly(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
 
 
 class RizeNames:
-    """Which robots of RIZE are there, and their names.
-
-    As they said when they were ready, else their node's.
-    """
+    """Names of the present robots of RIZE, from their ready messages, else from their nodes."""
 
     def __init__(self) -> None:
-        """Nobody has said a name."""
         self._told: dict[str, None] = {}
 
     def tell(self, name: str) -> None:
-        """A robot said on ``rize_event`` that it is ready under this name."""
+        """Add a name from a ready message on ``rize_event``."""
         self._told.setdefault(name)
         if len(self._told) > MOST_ROBOTS:
             del self._told[next(iter(self._told))]
 
     def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
-        """The names of the robots of RIZE in this graph.
+        """Return the names of the robots of RIZE in this graph.
 
-        ``native`` are robots with a description: they say on ``rize_event`` that they are ready, too.
+        ``native`` are robots with a description, which also send ready messages on ``rize_event``.
         """
         told = [name for name in self._told if name not in native]
         info = view.topics.get(rize.COMMANDS)

@@ -1,4 +1,4 @@
-"""What the open behaviours wait for of a robot: words that it is to hear, and other things that happen."""
+"""Values that open behaviours wait for: words that a robot should hear, and other event data."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ SHORTEST, LONGEST = 1, 60
 def awaited_values(
     workspaces: Iterable[Mapping[str, object]], robot: Robot, event: Event, name: str
 ) -> tuple[str, ...]:
-    """What hats and comparisons wait for in the datum ``name`` of an event; then what is suggested.
+    """Return the values of an event's datum ``name`` that blocks wait for, then the suggested default.
 
-    Each once, at most twelve. ``workspaces`` are saved ones, the behaviour that shows first.
+    Unique, at most `MOST`. ``workspaces`` are saved workspaces, that of the current behaviour first.
     """
     hat = type_of(robot.model, "when", event.name)
     argument = TextParts(event.text, event.filters).arguments.get(name, "")
@@ -36,7 +36,7 @@ def awaited_values(
 
 
 def _compared(block: Mapping[str, object], sensors: set[str]) -> list[str]:
-    """The texts beside a sensor in one block: “last word heard” = “yes”."""
+    # Texts compared with a sensor in one block: “last word heard” = “yes”.
     inputs = block.get("inputs")
     held: list[Mapping[str, object]] = []
     for connection in inputs.values() if isinstance(inputs, Mapping) else ():

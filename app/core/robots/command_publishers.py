@@ -10,7 +10,7 @@ from nep.nodes.node import Node
 from nep.programs.robots.moving import COMMAND_TYPE
 
 Submit = Callable[[str, Callable[[Node], None]], None]
-"""Runs a job with the node in the source's thread, in order. The text says what the job does."""
+"""Runs a job with the node in the source's thread, in order. The text describes the job."""
 
 
 class CommandPublishers:
@@ -30,7 +30,7 @@ class CommandPublishers:
             native = link.robot.dialect == "native"
             try:
                 if link.robot.topics != topics:
-                    return  # it has changed meanwhile, and is reached by the next graph
+                    return  # the description changed; the next graph opens the new topics
                 world = node.new_pub(topics.world, "json") if topics.world is not None else None
                 link.world = world
                 link.publisher = node.new_pub(topics.command, COMMAND_TYPE if native else "json", batch=False)
@@ -40,7 +40,7 @@ class CommandPublishers:
         self._submit(_("connect to {robot}").format(robot=link.name), open_them)
 
     def leave(self, link: RobotLink) -> None:
-        """Close the publishers of topics that the robot's description does not name any more."""
+        """Close the publishers of topics that the robot's description no longer names."""
         old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
         link.publisher = link.world = None
 
@@ -52,7 +52,7 @@ class CommandPublishers:
             self._submit(_("leave the old topics of {robot}").format(robot=link.name), close_them)
 
     def end(self, link: RobotLink) -> None:
-        """Close the publishers of a robot that Studio forgets, also those that are being opened."""
+        """Close the publishers of a robot that Studio discards, including those that are being opened."""
         if link.is_opening or link.publisher is not None or link.world is not None:
             self._submit("", lambda _node: close_publishers(link))
 

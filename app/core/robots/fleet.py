@@ -61,11 +61,7 @@ class Fleet:
         settings: Settings | None = None,
         processes: RobotProcesses | None = None,
     ) -> None:
-        """Start without robots. ``submit`` runs a job with the node in the source's thread.
-
-        ``settings`` store motion permissions and known robots. ``processes`` tell virtual robots from real
-        ones; without them a robot's own description decides.
-        """
+        # `processes` distinguish virtual from real robots; without them a robot's own description decides.
         self._watches = watches
         self._publishers = CommandPublishers(submit)
         self._clock = clock
@@ -148,7 +144,7 @@ class Fleet:
         """Subscribe to the sensors of a robot until the returned watch is closed.
 
         Raises:
-            RobotUnknownError: There is no robot of that name.
+            RobotUnknownError: No robot has that name.
         """
         return self._watches.open(topics_of(self._get(name).robot))
 
@@ -156,7 +152,7 @@ class Fleet:
         """Send an action to a robot.
 
         Raises:
-            RobotUnknownError: There is no robot of that name.
+            RobotUnknownError: No robot has that name.
             RobotInputError: The robot lacks the action or rejects the input; has a sentence for each value.
             MayNotMoveError: The user has to permit the motion first; the action is sent once permitted.
         """
@@ -201,7 +197,7 @@ class Fleet:
 
     @property
     def begins_at_start(self) -> bool:
-        """Whether virtual robots return to their start position when a behaviour begins."""
+        """True if virtual robots return to their start position when a behaviour begins."""
         return self._settings is None or self._settings.get(BEGINS_AT_START, True)
 
     def choose_start(self, *, begins: bool) -> None:
@@ -221,7 +217,7 @@ class Fleet:
             self.world(name, change)
 
     def told_to_stop(self, names: Iterable[str]) -> None:
-        """Mark robots as stopping, until `stopped` takes their result."""
+        """Mark robots as stopping until `stopped` applies their result."""
         self.stops += 1
         for link in map(self._links.get, names):
             if link is not None and link.stop_began_s is None:
@@ -253,9 +249,9 @@ class Fleet:
         return link is not None and link.connected and not link.mute
 
     def stopped(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
-        """Take the result of a Stop; ``words`` has a sentence and a status for each robot.
+        """Apply the result of a Stop; ``words`` has a sentence and a status for each robot.
 
-        Invocations of a robot that is not proven to stand still end only by its own answers.
+        Invocations of a robot without a confirmed stop end only by its own replies.
         """
         wrong = {name: robot.wrong for name, robot in report.by_name.items()}
         for name, (last_stop, status) in words.items():
@@ -271,7 +267,7 @@ class Fleet:
             self._alive.rest(name)
 
     def stands_still(self, names: Iterable[str]) -> None:
-        """Take the user's confirmation that these robots stand still."""
+        """Apply the user's confirmation that these robots have stopped."""
         known = tuple(names)
         self.moved.confirm(known)
         for link in map(self._links.get, known):
@@ -286,7 +282,7 @@ class Fleet:
     # -- input from the session ------------------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Take a new graph: connect, replace and disconnect robots."""
+        """Apply a new graph: connect, replace and disconnect robots."""
         self._has_graph, before = True, self._own.view
         self._movable.view = view
         self._own.update(view)
@@ -310,7 +306,7 @@ class Fleet:
         self._forget_away()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
-        """Take received messages: descriptions, answers, sensor values."""
+        """Process received messages: descriptions, replies, sensor values."""
         if self._announcements.add(batches):
             self._follow_announced()
             self._forget_away()
@@ -334,19 +330,19 @@ class Fleet:
         return {**self._announcements.claims, **self._taken}
 
     def take_notes(self) -> tuple[str, ...]:
-        """Return notices for the user about restarted robots; each once."""
+        """Return and clear notices for the user about restarted robots."""
         notes, self._notes = tuple(self._notes), []
         return notes
 
     def close(self) -> None:
-        """End the heartbeat and the command publishers."""
+        """Stop the heartbeat and close the command publishers."""
         self.known.saw([link.robot for link in self.connected])
         self._alive.close()
         for link in self._links.values():
             close_publishers(link)
 
     def unwatched(self, topic: str) -> None:
-        """Drop the sensor values of a topic that is no longer subscribed."""
+        """Discard the sensor values of a topic that is no longer subscribed to."""
         for link in self._links.values():
             for sensor in link.robot.sensors:
                 if sensor.topic == topic:
@@ -359,13 +355,13 @@ class Fleet:
         return None if link is None else link.identity
 
     def _drop_ended(self, link: RobotLink) -> None:
-        # A virtual robot is its program: it stands still once the process has ended.
+        # A virtual robot is its program: it has stopped once the process has ended.
         if link.virtual and link.name in self.moved:
             self.moved.drop_ended(link.name)
             link.not_stopped = link.not_stopped if link.name in self.moved else ""
 
     def _judge_motion(self, link: RobotLink) -> None:
-        # Explains why a robot that may move and doesn't answer is not known to stand still.
+        # Explains why a robot that may move and doesn't answer is not known to have stopped.
         if not link.connected:
             self._drop_ended(link)
         motion = self.moved.motion(link.name)
@@ -395,7 +391,7 @@ class Fleet:
                 self._away(link)
 
     def _follow_announced(self) -> None:
-        """Connect announced robots; disconnect those whose program is no longer listed."""
+        # Connects announced robots; disconnects those whose program is no longer listed.
         found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
         for topic, name in list(self._names.items()):
             link, now = self._links.get(name), found.get(topic)
@@ -433,7 +429,7 @@ class Fleet:
         )
 
     def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
-        """Connect a robot described on ``topic``. Has no effect if neither robot nor program changed."""
+        """Connect a robot described on ``topic``. No effect if neither robot nor program changed."""
         link = self._links.get(robot.name)
         was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
         if identity is not None:
@@ -461,7 +457,7 @@ class Fleet:
         self.revision += 1
 
     def _take_identity(self, link: RobotLink, identity: Identity | None) -> None:
-        # The program before may still run on another computer and move the robot.
+        # The previous program may still run on another computer and move the robot.
         before, link.identity = link.identity, identity
         if before is None or identity is None or before.node_id == identity.node_id:
             return
@@ -484,7 +480,7 @@ class Fleet:
         self._publishers.leave(link)
 
     def _keep_going(self, link: RobotLink, program: Identity | None) -> None:
-        # Notes actions that the robot could not end: their end can no longer be observed.
+        # Records actions that the robot could not end: their end can no longer be observed.
         if link.goes_on and not link.virtual:  # a virtual robot is its program
             self.moved.note([link.name], "action", program=program)
             link.not_stopped = link.not_stopped or link.goes_on
@@ -507,7 +503,7 @@ class Fleet:
         self.revision += 1
 
     def _forget_away(self) -> None:
-        # Bounds disconnected robots: any program can announce any number of names.
+        # Limits disconnected robots: any program can announce any number of names.
         in_use = {self._chosen, *self.used(), *self.moved.names}
         for link in excess_away(self._links.values(), in_use):
             del self._links[link.name]

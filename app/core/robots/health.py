@@ -1,4 +1,4 @@
-"""Looks for what a person should know: data that can't be read, robots that fell silent, names used twice."""
+"""Health checks for alerts: undecodable data, silent robots, duplicate names, unsaved settings."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from nep.protocol.graph_view import Alert, GraphView
 SILENT_S = 3.0
 CURE_S = 1.0
 AWAY_S = 5.0
-"""A driver that is started again is back by then."""
+"""Time within which a restarted driver is back."""
 PORTS = "ports"
 ASK_DOCTOR = lazy("Open the connection doctor")
 GIVES_UP = "leaving"
 INSTALLATION = "installation"
-"""The alert of Studio's own program; "program" is the behaviour's."""
+"""Alert about Studio's own installation; "program" is that of the behaviour."""
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
-"""Alerts of one robot; the name follows after a colon."""
+"""Prefixes of alert ids of one robot; the name follows after a colon."""
 
 REAL = lazy("Check that it is switched on and on the same Wi-Fi.")
 VIRTUAL = lazy("Start the virtual robot again.")
@@ -32,7 +32,7 @@ VIRTUAL = lazy("Start the virtual robot again.")
 
 @dataclass(slots=True)
 class _Bad:
-    """A topic that sends what can't be read: how many, how many were not tried, when the last one came."""
+    """Topic with undecodable messages: their number, the number of unchecked ones, time of the last one."""
 
     count: int = 0
     unchecked: int = 0
@@ -41,10 +41,9 @@ class _Bad:
 
 
 class Health:
-    """Puts alerts and cures them. One thread uses it (the window's)."""
+    """Raises and resolves health alerts. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, topics: Topics, fleet: Fleet, alerts: Alerts, clock: Callable[[], float]) -> None:
-        """Look at these; ``clock`` gives monotonic seconds."""
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
         self._from_graph: set[str] = set()
         self._claims: set[str] = set()
@@ -54,9 +53,10 @@ class Health:
         self._robots: set[str] = set()
 
     def look(self, found: Mapping[str, Checked]) -> None:
-        """Tell which topics send what can't be read: one alert each, with the exact count.
+        """Alert topics with undecodable messages, with their exact count.
 
-        `check` cures it when only good messages came for a second: a topic that mixes both is one alert.
+        `check` resolves the alert when only good messages arrived for a second, so a topic with both has one
+        alert.
         """
         for topic, checked in found.items():
             bad = self._bad.get(topic)
@@ -72,15 +72,15 @@ class Health:
                 self._tell(topic, bad, checked)
 
     def forget(self, topic: str) -> None:
-        """Nobody looks at a topic any more, or it is well again."""
+        """Discard the problems of a topic that is no longer watched or is well again."""
         self._bad.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
 
     def check(self, used: Container[str] = (), started: Container[str] = ()) -> None:
-        """Once a second: which topics are well again, which robots' pictures have stopped, who has gone.
+        """Update all alerts. Called once a second.
 
-        ``used`` are the names of the robots that a program uses, ``started`` those of the virtual robots
-        whose processes were started here and still run.
+        ``used`` are the names of robots in use by a program, ``started`` those of virtual robots whose
+        processes this Studio started and that still run.
         """
         now = self._clock()
         for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= CURE_S]:
@@ -110,7 +110,7 @@ class Health:
                 self._check_presence(link, now, runs_here=link.name in started)
 
     def journal(self, sentence: str | None) -> None:
-        """Whether unsaved work is kept: the sentence that says why not, or None."""
+        """Alert that unsaved work can't be backed up for the reason ``sentence``, or None to resolve it."""
         if sentence is None:
             self._alerts.resolve("journal")
             self._alerts.resolve(GIVES_UP)
@@ -126,13 +126,13 @@ class Health:
         )
 
     def gives_up(self, name: str, sentence: str) -> bool:
-        """Whether a person closes the window though the work of ``name`` can't be kept, and has been told so.
+        """Return whether the user closes the window although the work of ``name`` can't be saved.
 
-        ``sentence`` says why it can't be kept. The first time an alert tells it, and what to do.
+        The first call alerts the user with the reason ``sentence`` and returns False.
         """
         if self._alerts.has(GIVES_UP):
             return True
-        self._alerts.resolve("journal")  # it comes again, behind this one
+        self._alerts.resolve("journal")  # it is raised again after this one
         self._alerts.put(
             GIVES_UP,
             "error",
@@ -145,7 +145,7 @@ class Health:
         return False
 
     def settings(self, sentence: str | None) -> None:
-        """Whether what a person chooses is kept: the sentence that says why not, or None."""
+        """Alert that settings can't be saved for the reason ``sentence``, or None to resolve it."""
         if sentence is None:
             self._alerts.resolve("settings")
             return
@@ -158,7 +158,7 @@ class Health:
         )
 
     def program(self, fate: Fate) -> None:
-        """What became of Studio's own program while it was open."""
+        """Alert that Studio's installation was replaced or removed."""
         if fate == "replaced":
             self._alerts.put(
                 INSTALLATION,
@@ -179,7 +179,7 @@ class Health:
             self._alerts.resolve(INSTALLATION)
 
     def graph_alerts(self, view: GraphView) -> None:
-        """Take over what the master noticed (a name used twice, types that differ, ports that are taken)."""
+        """Alert problems that the master reports (duplicate names, conflicting types, occupied ports)."""
         ids = set()
         ports = [found for found in view.alerts if found.id.startswith("port:")]
         for found in view.alerts:
@@ -194,7 +194,7 @@ class Health:
         self._from_graph = ids
 
     def _tell_ports(self, taken: Sequence[Alert]) -> None:
-        """Say in one alert which ports of the original NEP are taken: only its programs need them."""
+        # One alert for all occupied ports of the original NEP: only its programs need them.
         title, detail = taken[0].sentence, taken[0].hint
         if len(taken) > 1:
             numbers = sorted(
@@ -230,7 +230,7 @@ class Health:
         )
 
     def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
-        """Tell of a robot that was there and is no more: a real one, or a virtual one that hangs."""
+        # A real robot that left, or a virtual one that hangs.
         since = self._away.setdefault(link.name, now)
         if now - since < AWAY_S or (link.virtual and not runs_here):
             self._alerts.resolve(f"robot:{link.name}")
@@ -248,7 +248,7 @@ class Health:
         )
 
     def _forget_robots(self) -> None:
-        """Resolve the alerts of robots that Studio has forgotten."""
+        # Resolves the alerts of robots that Studio has discarded.
         names = {link.name for link in self._fleet.links}
         for name in self._robots - names:
             self._away.pop(name, None)
@@ -257,7 +257,6 @@ class Health:
         self._robots = names
 
     def _check_claims(self) -> None:
-        """Tell of programs that say that they are a robot and are not believed."""
         claims = self._fleet.claims
         for id in self._claims - claims.keys():
             self._alerts.resolve(f"claim:{id}")
@@ -266,7 +265,7 @@ class Health:
         self._claims = set(claims)
 
     def unreachable(self, problems: Mapping[str, str]) -> None:
-        """Tell of robots that a stop can't reach, by their names, and why."""
+        """Alert robots that a Stop can't reach: reasons by name."""
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():
@@ -276,9 +275,9 @@ class Health:
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
-        """Tell of a robot that could not end an action, as it says, or may move and can't be heard."""
+        # A robot that reports an action it couldn't end, or that may move and doesn't answer.
         wrong = link.goes_on if link.connected else ""
-        if not wrong and not link.not_stopped:  # else the alert of the stop says it
+        if not wrong and not link.not_stopped:  # otherwise covered by the alert of the Stop
             wrong = link.may_move
         if not wrong:
             self._alerts.resolve(f"moving:{link.name}")
@@ -295,7 +294,7 @@ class Health:
         )
 
     def _check_driver(self, link: RobotLink, now: float) -> None:
-        """Tell of a driver that rejects messages or catches exceptions, until it has not for a while."""
+        # Resolved when the counts have not increased for a while.
         rejected, errors = link.rejected, link.errors
         said = {
             "rejected": (

@@ -1,6 +1,6 @@
-"""How one robot is, fact by fact in plain words: what answers, what it tells of itself, how it stops.
+"""Health of one robot as facts in plain words: connection, battery, sensors, Stop.
 
-A fact that is to be looked at says so with its status; what is not known yet is said to be so.
+The status of a fact shows whether it needs attention; unknown values are shown as such.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from nep.i18n import _, lazy, ngettext, number
 
 SILENT_S = 3.0
 MISSED = 5
-"""So many messages in a row that did not come are a silence."""
+"""Number of consecutive missing messages that count as silence."""
 LOW_PERCENT = 20
 WARM_C = 60
-"""From here on motors of small robots begin to lose their strength."""
+"""Temperature from which motors of small robots begin to lose force."""
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
@@ -33,9 +33,9 @@ AgeWords = Callable[[float], str]
 
 @dataclass(frozen=True, slots=True)
 class HealthFact:
-    """One line: ``status`` is ok, warn, error, or off for what is not there or not known yet.
+    """One line; ``status`` is ok, warn, error, or off when missing or unknown.
 
-    ``title`` is one of those above: people read it by `nep.i18n`.
+    ``title`` is one of the constants above, marked for `nep.i18n`.
     """
 
     title: str
@@ -44,14 +44,15 @@ class HealthFact:
 
     @property
     def to_look_at(self) -> bool:
-        """Whether a person should do something about it."""
+        """True if the fact needs attention."""
         return self.status in ("warn", "error")
 
 
 def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -> tuple[HealthFact, ...]:
-    """Everything that is known about a robot, what is to be looked at first.
+    """Return all facts about a robot, those that need attention first.
 
-    ``now`` is the clock of the robot's answers (monotonic seconds), ``age_words`` says a time: "14 s".
+    ``now`` is on the clock of the robot's replies (monotonic seconds); ``age_words`` formats a duration: "14
+    s".
     """
     facts = [_connection(link, now, age_words)]
     if link.connected:
@@ -65,7 +66,7 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
 
 
 def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
-    """Whether anything that a robot said or sent speaks for it; of others only their description is known."""
+    """Return whether the robot has sent anything itself; otherwise only its description is known."""
     return link.answered_s is not None or any(fact.title in TOLD and fact.status == "ok" for fact in facts)
 
 
@@ -206,19 +207,17 @@ def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[H
 
 
 def _has_sent(topic: Topic | None) -> bool:
-    """Whether anything was ever sent on a topic that is there."""
     return topic is not None and topic.gone_s is None and topic.age_s is not None
 
 
 def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
-    """Whether one that tells its value all the time has stopped; others may have nothing new to tell."""
+    # Only sensors with a rate can be silent; others may have no change to report.
     if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
     return topic.silent_s > max(SILENT_S, MISSED / sensor.rate_hz)
 
 
 def _count(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]:
-    """What went wrong in the driver of a robot, if anything did."""
     if count.is_growing(now):
         yield HealthFact(title, "warn", _("{count} so far; see its log").format(count=count.value))
     elif count.value:

@@ -1,4 +1,4 @@
-"""Robots that were here once: their names and when they were last seen, kept between starts."""
+"""Known robots: names of real robots and the time they were last seen, stored in the settings."""
 
 from __future__ import annotations
 
@@ -19,28 +19,30 @@ Told = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class KnownRobot:
-    """A real robot that was here, and when it was seen last (epoch seconds)."""
+    """Real robot and the time it was last seen (epoch seconds)."""
 
     name: str
     seen_s: float
 
 
 class KnownRobots:
-    """The real robots that were here, the one seen last first. Virtual ones come whenever they are wanted."""
+    """Known real robots, most recently seen first.
+
+    Virtual robots can be started at any time and are not stored.
+    """
 
     def __init__(self, settings: ListSettings | None = None, clock: Callable[[], float] = time.time) -> None:
-        """``settings`` keep them; without it nothing is remembered."""
         self._settings, self._clock = settings, clock
 
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
-        """All of them, the one seen last first; what does not look like a robot is left out."""
+        """All known robots, most recently seen first; invalid entries are skipped."""
         told: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
         found = {robot.name: robot for robot in map(_robot, told) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 
     def saw(self, robots: Sequence[Robot]) -> None:
-        """These are here now, or were until now."""
+        """Record that these robots are connected, or were until now."""
         names = [robot.name for robot in robots if not robot.virtual]
         if names:
             now = self._clock()
@@ -48,14 +50,14 @@ class KnownRobots:
             self._keep([*(KnownRobot(name, now) for name in names), *others])
 
     def forget(self, name: str) -> None:
-        """A person does not want to see it any more; when it comes again it is known again."""
+        """Remove a robot from the list; it is added again when it connects."""
         self._keep([robot for robot in self.robots if robot.name != name])
 
     def _keep(self, robots: Sequence[KnownRobot]) -> None:
         if self._settings is None:
             return
         told = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:LIMIT]]
-        # Only a line in a list is lost then, and what a person chose complains about the same file.
+        # Only an entry of a list is lost, and saving other settings alerts problems of the same file.
         with contextlib.suppress(SettingsError):
             self._settings.set(KEY, told)
 

@@ -1,4 +1,4 @@
-"""The virtual robots of the last start: they come back at the next one, unless a person does not want it."""
+"""Virtual robots of the last session, restarted at the next start unless the user disabled that."""
 
 from __future__ import annotations
 
@@ -15,33 +15,32 @@ MOST = 8
 
 
 class StartsRobots(Protocol):
-    """What is needed of the launcher."""
+    """Part of the launcher that is used here."""
 
     wanted: dict[str, str]
 
     def start_virtual_robot(self, name: str = ..., model: str = ...) -> None:
-        """Start one of that name and model."""
+        """Start a virtual robot of that name and model."""
 
 
 class LastRobots:
-    """Keeps in the settings which virtual robots a person works with. One thread uses it (the window's)."""
+    """Stores the virtual robots in use in the settings. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, settings: Settings) -> None:
-        """The settings keep them; nobody is here yet."""
         self._settings = settings
         self._seen: dict[str, str] = {}
 
     @property
     def come_back(self) -> bool:
-        """Whether they come back at the next start."""
+        """True if the robots are restarted at the next start."""
         return self._settings.get(COME_BACK, True)
 
     def set_come_back(self, wanted: bool) -> None:
-        """Choose whether they come back. Raises SettingsError."""
+        """Set `come_back`. Raises SettingsError."""
         self._settings.set(COME_BACK, wanted)
 
     def start(self, launcher: StartsRobots) -> None:
-        """Start those that were there when Studio ended; returns at once, and nothing moves."""
+        """Start the robots of the last session. Returns immediately; nothing moves."""
         if not self.come_back:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
@@ -50,9 +49,9 @@ class LastRobots:
                 launcher.start_virtual_robot(name, model)
 
     def keep(self, launcher: StartsRobots) -> None:
-        """Keep who is here now if somebody came or went since the last time.
+        """Save the current robots if they changed.
 
-        At once and not only at the end: a crash loses nobody. What can't be written is told by the settings.
+        Called during the session, so that a crash loses none. Errors are reported by the settings.
         """
         if launcher.wanted != self._seen:
             self._seen = dict(launcher.wanted)

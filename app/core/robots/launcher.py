@@ -1,4 +1,4 @@
-"""The processes that Studio starts beside itself: the master, when there is none, and virtual robots."""
+"""Child processes of Studio: the master, if none is running, and virtual robots."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from nep.system.addresses import is_loopback
 
 END_WAIT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
-"""The module of each model of virtual robot."""
+"""Module of each model of virtual robot."""
 TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
 KNOWN_WITHIN_S = 3.0
-"""How long a start waits until it is known who is there: a robot of that name may be."""
+"""Time that a start waits for the first graph, which may contain a robot of that name."""
 COMING_S = 30.0
-"""How long a robot that was started counts as coming: a slow computer takes its time."""
+"""Time during which a started robot counts as starting: slow computers need that long."""
 WISH_KEPT_S = 4.0
-"""How long a wish is kept for a robot that is there: it may have died, which is noticed within 3.3 s."""
+"""Time that a request is kept although the robot is listed: its end is noticed only within 3.3 s."""
 
 RUNS_MODULE = ("-m", "--module")
 MOST_KNOWN = 1000
@@ -42,7 +42,7 @@ _log = logging.getLogger("studio.launcher")
 
 @dataclass(frozen=True, slots=True)
 class _Wish:
-    """A person wants a virtual robot of this model; until when that is kept (monotonic seconds)."""
+    """Request to start a virtual robot of this model, and its deadlines (monotonic seconds)."""
 
     model: str
     known_until: float
@@ -51,7 +51,7 @@ class _Wish:
 
 @dataclass(frozen=True, slots=True)
 class LaunchFailed:
-    """A process did not start or ended by itself; ``detail`` is the end of what it said."""
+    """A process did not start or ended unexpectedly; ``detail`` is the end of its output."""
 
     what: str
     sentence: str
@@ -60,29 +60,29 @@ class LaunchFailed:
 
 
 class Process(Protocol):
-    """What is needed of a process, as `subprocess.Popen` has it."""
+    """Methods of `subprocess.Popen` that are used here."""
 
     pid: int
 
     def poll(self) -> int | None:
-        """Its exit code, None while it runs."""
+        """Return the exit code, None while it runs."""
 
     def wait(self, timeout: float | None = None) -> int:
-        """Its exit code, waited for. Raises `subprocess.TimeoutExpired`."""
+        """Wait and return the exit code. Raises `subprocess.TimeoutExpired`."""
 
     def terminate(self) -> None:
-        """Ask it to end."""
+        """Ask the process to end."""
 
     def kill(self) -> None:
-        """End it."""
+        """Kill the process."""
 
 
 StartProcess = Callable[[Sequence[str], Mapping[str, str], IO[bytes]], Process]
-"""Starts a command in an environment; what it says is written into the file. Raises OSError."""
+"""Starts a command in an environment; its output is written to the file. Raises OSError."""
 
 
 def start_process(command: Sequence[str], environment: Mapping[str, str], log: IO[bytes]) -> Process:
-    """A process of the operating system. See `StartProcess`."""
+    """Start a process of the operating system (see `StartProcess`)."""
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -94,7 +94,7 @@ def start_process(command: Sequence[str], environment: Mapping[str, str], log: I
 
 
 class Launcher:
-    """Starts processes, notices when one ends, ends them with the window."""
+    """Starts child processes, detects their end, and ends them with the window."""
 
     def __init__(
         self,
@@ -104,24 +104,20 @@ class Launcher:
         clock: Callable[[], float] = time.monotonic,
         start: StartProcess = start_process,
     ) -> None:
-        """``address`` is the master's; failures are posted as `LaunchFailed`.
-
-        ``is_there`` tells whether a robot of a name is there, whoever started it; None while that is not
-        known yet. ``clock`` gives monotonic seconds. ``start`` starts the processes of virtual robots.
-        """
+        # `is_there` returns whether a robot is listed, from any instance, or None while unknown.
         self._address = address
         self._is_there = is_there
         self._clock = clock
         self._start = start
         self._wishes: dict[str, _Wish] = {}
-        self._coming: dict[str, float] = {}  # until when it counts as coming, by the robot's name
+        self._coming: dict[str, float] = {}  # end of the starting state, by the robot's name
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
         self.wanted: dict[str, str] = {}
-        """The virtual robots that a person started here and did not end, each with its model."""
+        """Virtual robots that the user started here and did not stop, with their models."""
         self.ended: frozenset[str] = frozenset()
-        """The virtual robots started here whose processes have ended by themselves."""
+        """Virtual robots started here whose processes ended unexpectedly."""
         sentence = (
             _("The master can't be started.") if is_loopback(address) else _("The master does not respond.")
         )
@@ -131,45 +127,44 @@ class Launcher:
 
     @property
     def virtual_robots(self) -> tuple[str, ...]:
-        """The names of the virtual robots that run because Studio started them."""
+        """Names of running virtual robots that this Studio started."""
         with self._lock:
             return tuple(name for name, (process, _log) in self._robots.items() if process.poll() is None)
 
     @property
     def coming(self) -> tuple[str, ...]:
-        """The virtual robots that a person wants and that are not there yet, but those that failed."""
+        """Virtual robots that are starting."""
         now = self._clock()
         return tuple(name for name, until in self._coming.items() if now < until)
 
     def came(self, name: str) -> None:
-        """This robot is there."""
+        """Mark a robot as started."""
         self._coming.pop(name, None)
 
     @property
     def process_ids(self) -> tuple[int, ...]:
-        """The processes of the virtual robots that were started here and run."""
+        """Process ids of running virtual robots that this Studio started."""
         with self._lock:
             return tuple(process.pid for process, _log in self._robots.values() if process.poll() is None)
 
     @property
     def started_master(self) -> bool:
-        """Whether the master that runs was started here."""
+        """True if this Studio started the running master."""
         return self._master.runs
 
     def ensure_master(self) -> None:
-        """Join the master that runs, or start one; returns at once, a failure is posted."""
+        """Start a master if none is running. Returns immediately; a failure is posted."""
         self._master.ensure()
 
     def keep_master(self) -> None:
-        """The same, to be said again and again while there is none: after a failure it takes its time."""
+        """Call `ensure_master` with a back-off after failures. Call it repeatedly."""
         self._master.keep()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
-        """Start a virtual robot of that name and model.
+        """Start a virtual robot of that name and model unless one is listed, also one of another Studio.
 
-        One of that name that is there is used, also one that another Studio started. The wish is kept for
-        some seconds: `follow` starts a robot as soon as it is known that there is none, or none any more.
-        Where the master is started here, nobody can be there yet.
+        The request is kept for some seconds: `follow` starts the robot as soon as it is known that none is
+        listed. If Studio started the master itself, none can be.
         """
         now = self._clock()
         self.wanted[name] = model
@@ -178,7 +173,7 @@ class Launcher:
         self.follow()
 
     def follow(self) -> None:
-        """Start the robots that were wished and are not there (called by each of the session's ticks)."""
+        """Start requested robots that are not listed. Called at each tick of the session."""
         if not self._wishes:
             return
         now = self._clock()
@@ -221,7 +216,7 @@ class Launcher:
             self.ended -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
-        """Start it anew; a process of it that still lives but hangs is killed."""
+        """Restart a virtual robot; a process that hangs is killed."""
         self.wanted[name] = model
         self._wishes.pop(name, None)
         with self._lock:
@@ -234,7 +229,7 @@ class Launcher:
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
-        """End a virtual robot that was started here; it is not wished any more."""
+        """Stop a virtual robot that was started here and drop its request."""
         self.wanted.pop(name, None)
         self._end_robot(name)
 
@@ -248,7 +243,7 @@ class Launcher:
             held[1].close()
 
     def check(self) -> None:
-        """Notice processes that ended by themselves (called once in a while by the session's tick)."""
+        """Detect processes that ended unexpectedly. Called regularly by the session's tick."""
         with self._lock:
             codes = {name: process.poll() for name, (process, _log) in self._robots.items()}
             for name, code in codes.items():
@@ -271,7 +266,7 @@ class Launcher:
                 log.close()
 
     def close(self) -> None:
-        """End the virtual robots. The master lives on while programs that are not ours are registered."""
+        """Stop the virtual robots. The master continues while other programs are registered."""
         self._wishes.clear()
         for name in list(self._robots):
             self._end_robot(name)
@@ -288,7 +283,7 @@ def _end(process: Process) -> None:
 
 
 def _silent_end(code: int) -> str:
-    """What is known of a process that ended without a word; a negative code is the number of a signal."""
+    # A negative exit code is the number of a signal.
     if code < 0:
         return _("Another program on this computer stopped it.")
     return _("It gave no reason (exit code {code}).").format(code=code)
@@ -301,19 +296,18 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class VirtualProcesses:
-    """Looks at processes of this computer. One thread uses it; what was found out about one is kept."""
+    """Identifies processes of virtual robots on this computer; caches results. Not thread-safe."""
 
     def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:
-        """``modules`` are those of our virtual robots, ``started`` the ids of processes started here."""
         self._modules = frozenset(modules)
         self._started = started
         self._known: dict[Identity, bool] = {}
 
     def is_ours(self, identity: Identity) -> bool:
-        """Whether this program is a virtual robot that this Studio started, or another of this person.
+        """Return whether a program is a virtual robot of this Studio or of another one of the same user.
 
-        That is this process or one that was started here (or its child, as a frozen build makes one), or a
-        process of the same user on this computer that runs the module of one of our virtual robots.
+        That is this process, one that it started (or its child, as in a frozen build), or a process of the
+        same user on this computer that runs a virtual robot's module.
         """
         if identity.pid is None or identity.host != platform.node():
             return False
@@ -326,17 +320,17 @@ class VirtualProcesses:
         return self._known[identity]
 
     def has_ended(self, identity: Identity) -> bool:
-        """Whether it is sure that this program runs no more; never of one on another computer."""
+        """Return whether a program has certainly ended; always False for other computers."""
         if identity.pid is None or identity.host != platform.node():
             return False
-        import psutil  # noqa: PLC0415 (heavy: the window shows before there is a robot)
+        import psutil  # noqa: PLC0415 (slow import, not needed to show the window)
 
         with suppress(psutil.Error):
             return psutil.Process(identity.pid).status() == psutil.STATUS_ZOMBIE
         return not psutil.pid_exists(identity.pid)
 
     def _look(self, pid: int) -> bool:
-        import psutil  # noqa: PLC0415 (heavy, see above)
+        import psutil  # noqa: PLC0415 (slow import)
 
         started = set(self._started())
         try:
@@ -348,5 +342,5 @@ class VirtualProcesses:
             return False
 
     def _is_virtual(self, command: list[str]) -> bool:
-        """Whether a command runs one of the modules; what stands behind other words is no option."""
+        # Only the module option counts; later words of the command may be anything.
         return len(command) > 2 and command[1] in RUNS_MODULE and command[2] in self._modules

@@ -14,10 +14,10 @@ from nep.protocol.graph_view import GraphView
 
 
 class OwnMessages:
-    """Filter robots' messages by sender. Not thread-safe: use it from the window's thread."""
+    """Filters robots' messages by sender. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, senders: Senders, links: Mapping[str, RobotLink]) -> None:
-        """``senders`` map publishers to nodes; ``links`` are the robots by name."""
+        # `senders` map publishers to nodes; `links` are the robots by name.
         self._senders, self._links = senders, links
         self.view = GraphView(0, 0)
         """Newest graph."""
@@ -25,7 +25,7 @@ class OwnMessages:
         """Unlisted programs that are still connected, by robot and subscriber id."""
 
     def update(self, view: GraphView) -> None:
-        """Take a new graph; keep programs that left it but are still connected, as they may only hang."""
+        """Apply a new graph; keep programs that left it but are still connected, as they may only hang."""
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
             topic, serving = before.topics.get(link.robot.topics.command), self._serving(link, before)
@@ -62,7 +62,7 @@ class OwnMessages:
         return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
-        """Return programs that receive the robot's commands and publish its answers, unlike ``before``."""
+        """Return programs that serve the robot (receive commands, publish replies) but not in ``before``."""
         if link.robot.dialect != "native":
             return []
         earlier = self._serving(link, before)
@@ -76,9 +76,9 @@ class OwnMessages:
         return [node for node in hearing(view, link.robot.topics.command) if node in answering]
 
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
-        """Return whether the robot's own program sent a message; None while that is not known.
+        """Return whether the robot's own program sent a message; None while that is unknown.
 
-        Robots of RIZE can't be told apart: for them it is who hears their commands, or the gateway.
+        Robots of RIZE can't be distinguished: any subscriber of their commands or the gateway counts.
         """
         if link.identity is None and link.robot.dialect == "native":
             return True
@@ -90,7 +90,10 @@ class OwnMessages:
         return None if node is None or link.identity is None else node == link.identity.node_id
 
     def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
-        """Return the newest message that counts: of the robot's own program, if that publishes the topic."""
+        """Return the newest message that counts.
+
+        Only of the robot's own program if it publishes the topic.
+        """
         if batch is None or not batch.messages:
             return None
         own = link.identity.node_id if link.identity is not None else ""

@@ -1,25 +1,25 @@
-"""A count that a robot's driver reports in its signs of life, and whether it still grows."""
+"""Counter that a robot's driver reports in its heartbeats, and whether it still grows."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 GROWING_S = 30.0
-"""Without an increase for this long, whatever went wrong is over. Signs of life come only during actions."""
+"""Time without an increase after which the problem is over. Heartbeats are sent only during actions."""
 MAX_COUNT = 2**53
 
 
 @dataclass(slots=True)
 class ReportedCount:
-    """Newest value, and when it grew last (monotonic seconds), None before the first increase."""
+    """Newest value and the time of its last increase (monotonic seconds; None before the first)."""
 
     value: int = 0
     grew_s: float | None = None
 
     def take(self, reported: object, now_s: float) -> None:
-        """Take over a reported value. Anything but a whole number from 0 to `MAX_COUNT` is ignored.
+        """Update from a reported value; anything but an integer from 0 to `MAX_COUNT` is ignored.
 
-        A smaller value comes from a driver that was restarted.
+        A smaller value means that the driver was restarted.
         """
         if type(reported) is not int or not 0 <= reported <= MAX_COUNT:
             return

@@ -1,4 +1,4 @@
-"""One robot as Studio sees it now, and what a person tried with it."""
+"""State of one robot in Studio, and the user's manual actions on it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
 
 SENDER = "studio"
-"""Who the commands of try-outs are from."""
+"""Sender id of manual commands."""
 TRIES_KEPT = 40
 MAX_AWAY = 200
-"""Robots that went away and are remembered: a whole room may go at once, when its access point fails."""
+"""Maximum number of disconnected robots that are kept; a whole room may disconnect when its access point
+fails."""
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
@@ -32,17 +33,17 @@ STATE_WORDS = {
     "busy": lazy("busy"),
     "ready": lazy("ready"),
 }
-"""What people read for each `RobotLink.state`."""
+"""Label of each `RobotLink.state`."""
 
 Payload = Mapping[str, object]
 
 
 @dataclass(slots=True, eq=False)
 class Invocation:
-    """One action that a person tried: its state is a robot's answer (``sent`` until the first one).
+    """Manual invocation of an action; its state is the robot's reply (``sent`` until the first one).
 
-    While it is ``accepted`` it may wait for the actions ``waits_for``; it ended those of ``replaces``.
-    ``timeout_s`` counts from the moment in which the robot began. ``at_s`` is the time of day (epoch).
+    While ``accepted``, it may wait for the actions ``waits_for``; it ended those in ``replaces``.
+    ``timeout_s`` counts from the start of execution. ``at_s`` is the time of day (epoch seconds).
     """
 
     id: str
@@ -63,37 +64,39 @@ class Invocation:
 
     @property
     def left_s(self) -> float | None:
-        """Seconds until it takes too long; None when it has no limit or has not begun."""
+        """Seconds until the time limit; None without a limit or before the start."""
         if self.timeout_s is None or self.begun_s is None:
             return None
         return self.begun_s + self.timeout_s - self.clock()
 
     @property
     def running(self) -> bool:
-        """Whether the robot has not finished it."""
+        """True if the robot has not finished it."""
         return self.state not in FINAL_STATES
 
     @property
     def elapsed_s(self) -> float:
-        """Seconds since it was sent, at most until it ended."""
+        """Seconds from sending to the end, or until now."""
         return (self.ended_s if self.ended_s is not None else self.clock()) - self.started_s
 
 
 @dataclass(slots=True, eq=False)
 class RobotLink:
-    """One robot as Studio sees it now.
+    """State of one robot.
 
-    ``values`` has the newest value of each sensor while somebody looks. ``tried`` are the last tries, the
-    newest at the end. ``mute`` says that it did not answer a command; ``heard_s`` is when it last answered
-    anything or was asked, ``answered_s`` when it last answered, ``gone_s`` since when it is away.
-    ``not_stopped`` says why the last stop is not proven ("Arm may still move: the brake does not answer"),
-    ``goes_on`` what it says itself about actions that it could not end, ``may_move`` that it was told to move
-    and is not heard any more (`MovedRobots`); they are empty when all is well.
-    ``stop_began_s`` is since when the answer to a stop is waited for, ``stopping`` whether that is long
-    enough to be said. ``is_reached`` says that a stop would arrive now.
-    ``identity`` is the program that it is, ``topics_before`` are the topics of its earlier descriptions.
-    ``rejected`` counts messages that its driver did not handle, ``errors`` exceptions that it survived.
-    ``was_real`` says that it has not always been virtual, ``has_proven_stop`` that its program once did.
+    ``values`` has the newest value of each sensor while it is watched; ``tried`` the last manual invocations,
+    newest last. ``mute`` is whether it did not reply to a command. ``heard_s`` is the time of its last reply
+    or of the last command, ``answered_s`` of its last reply, ``gone_s`` of its disconnection.
+
+    Empty while all is well: ``not_stopped`` is why the last Stop is not confirmed ("Arm may still move: the
+    brake does not answer"), ``goes_on`` the robot's own report of actions that it could not end, ``may_move``
+    that it received a command and no longer replies (`MovedRobots`). ``stop_began_s`` is the time of an
+    unanswered Stop, ``stopping`` whether it lasts long enough to be shown. ``is_reached`` is whether a Stop
+    would arrive now.
+
+    ``identity`` is its program, ``topics_before`` are the topics of earlier descriptions. ``rejected`` counts
+    messages that its driver rejected, ``errors`` exceptions that it caught. ``was_real`` is whether it was
+    ever not virtual, ``has_proven_stop`` whether its program ever confirmed a Stop.
     """
 
     name: str
@@ -129,19 +132,19 @@ class RobotLink:
 
     @property
     def virtual(self) -> bool:
-        """Whether it exists only on this computer."""
+        """True if it exists only on this computer."""
         return self.robot.virtual
 
     @property
     def can_confirm_stop(self) -> bool:
-        """Whether it answers a stop; robots of RIZE do not."""
+        """True if it confirms a Stop; robots of RIZE don't."""
         return self.robot.safe_stop.confirmed
 
     @property
     def state(self) -> str:
-        """``not stopped``, ``stopping``, ``away``, ``connecting``, ``silent``, ``busy`` or ``ready``.
+        """One of ``not stopped``, ``stopping``, ``away``, ``connecting``, ``silent``, ``busy`` and ``ready``.
 
-        One that has not stopped, or has not answered yet, may still move when it is away.
+        A disconnected robot that has not stopped, or not replied yet, may still move.
         """
         if self.not_stopped or self.may_move or (self.connected and self.goes_on):
             return NOT_STOPPED
@@ -157,13 +160,13 @@ class RobotLink:
 
     @property
     def running(self) -> tuple[Invocation, ...]:
-        """The tries that have not ended."""
+        """Invocations that have not ended."""
         known = {made.id: made for made in (*self.tried, *self.invocations.values())}
         return tuple(made for made in known.values() if made.running)
 
     @property
     def state_words(self) -> str:
-        """How it is, as people read it: ``ready``, ``may still move``, ``does not answer``."""
+        """State in words: ``ready``, ``may still move``, ``does not answer``."""
         state = self.state
         if self.connected and self.mute and state == NOT_STOPPED and not self.not_stopped:
             return _("not responding")
@@ -177,16 +180,16 @@ class RobotLink:
 
     @property
     def chip(self) -> str:
-        """The words of its chip: ``virtual, ready``."""
+        """Label of its chip: ``virtual, ready``."""
         words = self.state_words
         return _("virtual, {state}").format(state=words) if self.virtual else words
 
 
 def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
-    """Return the robots to forget: those away beyond `MAX_AWAY`, as any program can invent new names.
+    """Return the robots to evict: disconnected ones beyond `MAX_AWAY`, as any program can invent new names.
 
-    Robots that never answered come first, then those that are away longest. Robots ``in_use``, robots that
-    have ever proven a Stop, and robots whose Stop is pending or failed are neither counted nor returned.
+    Robots that never replied come first, then those disconnected longest. Robots ``in_use``, robots that ever
+    confirmed a Stop, and robots whose Stop is pending or failed are neither counted nor returned.
     """
     away = [
         link
@@ -199,7 +202,7 @@ def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence
 
 
 def topics_of(robot: Robot) -> list[str]:
-    """Where it tells what happens to it: its sensors, events and state, no pictures."""
+    """Return the topics of a robot's sensors, events and state, without images."""
     topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
     topics += [event.topic for event in robot.events if event.topic]
     if robot.topics.state is not None:

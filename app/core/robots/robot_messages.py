@@ -1,4 +1,4 @@
-"""Messages that robots publish: their answers, heartbeats and sensor values, taken into their links."""
+"""Messages that robots publish: replies, heartbeats and sensor values."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 MAX_HELD = 64
-"""Answers held for each publisher that the graph does not list yet."""
+"""Maximum number of held replies of a publisher that the graph does not list yet."""
 
 
 class RobotMessages:
-    """Update robots from messages of their own programs. Not thread-safe: use it from the window's thread.
+    """Updates robots from messages of their own programs. Not thread-safe: use it from the window's thread.
 
-    Answers of publishers that the graph does not list yet are held until the next graph.
+    Replies of publishers that the graph does not list yet are held until the next graph.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class RobotMessages:
         self._settled: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
-        """Take a robot's answers, its newest sensor values and its drawing from ``batches`` by topic."""
+        """Apply a robot's replies, newest sensor values and drawing from ``batches`` by topic."""
         answers = batches.get(link.robot.topics.answer)
         for message in answers.messages if answers is not None else ():
             is_own = self._own.is_from(link, message)
@@ -51,7 +51,7 @@ class RobotMessages:
         link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
 
     def release_held(self, links: Mapping[str, RobotLink]) -> None:
-        """Take the held answers whose publishers the new graph lists; drop all others."""
+        """Apply held replies whose publishers the new graph lists; discard the others."""
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
@@ -60,11 +60,11 @@ class RobotMessages:
                     self._answer(link, message)
 
     def forget(self, name: str) -> None:
-        """Drop the held answers of a robot."""
+        """Discard the held replies of a robot."""
         self._held.pop(name, None)
 
     def take_settled(self) -> tuple[str, ...]:
-        """Return robots whose Stop was not proven and which now report that every action ended; each once."""
+        """Return and clear the robots with an unconfirmed Stop that now report the end of every action."""
         settled, self._settled = tuple(self._settled), {}
         return settled
 
@@ -80,7 +80,7 @@ class RobotMessages:
                 self._take_final(link, answer)
 
     def _take_final(self, link: RobotLink, answer: Payload) -> None:
-        # A final answer ends the motion, unless its error reports that the robot may still move.
+        # A final reply ends the motion, unless its error reports that the robot may still move.
         state = answer.get("state")
         if not isinstance(state, str) or state not in FINAL_STATES:
             return
@@ -91,7 +91,7 @@ class RobotMessages:
             self._moved.ended(link.name, id, link.identity)
 
     def _take_heartbeat(self, link: RobotLink, answer: Payload) -> None:
-        # Drivers leave out counts that are zero.
+        # Drivers omit counts that are zero.
         now_s = self._clock()
         link.rejected.take(answer.get("rejected", 0), now_s)
         link.errors.take(answer.get("errors", 0), now_s)

@@ -1,4 +1,4 @@
-"""Studio's part in the room of the virtual robots: it shows it, lets people change it, and keeps it."""
+"""Shared room of the virtual robots: shown, changed and saved by Studio."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from nep.protocol.graph_view import GraphView
 
 KEPT = "room"
 QUIET_S = 1.0
-"""A room in which nothing has moved for so long is kept in the settings."""
+"""Time without changes after which the room is saved."""
 NO_ROOM = lazy("can't share the room of the virtual robots: {error}")
 
 
 class SessionRoom:
-    """The room as all virtual robots and Studios on this network have it. One thread uses it (the window's).
+    """Room shared by all virtual robots and Studios of the network. Not thread-safe: window's thread only.
 
-    It is joined when the first robot is there; without one nobody needs it.
+    It is joined when the first robot appears.
     """
 
     def __init__(
@@ -39,7 +39,6 @@ class SessionRoom:
         clock: Callable[[], float] = time.monotonic,
         clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """``settings`` keep the room between starts; ``submit`` does something in the source's thread."""
         self._settings, self._watches, self._submit, self._clock = settings, watches, submit, clock
         self._map = RoomMap(clock_ns=clock_ns)
         self._map.merge(settings.get(KEPT, {}))
@@ -52,20 +51,20 @@ class SessionRoom:
 
     @property
     def revision(self) -> int:
-        """Grows with every change."""
+        """Counter that increases with every change."""
         return self._map.revision
 
     @property
     def room(self) -> Room:
-        """The room as it is now."""
+        """Current room."""
         if self._room[0] != self._map.revision:
             self._room = (self._map.revision, self._map.room())
         return self._room[1]
 
-    # -- what a person does ------------------------------------------------------------------------
+    # -- commands of the user -------------------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float, robots: Mapping[str, tuple[float, float, float]]) -> bool:
-        """Put a thing there, inside the walls; False when a robot (x, y, radius) is in the way."""
+        """Move a thing, within the walls; return False when a robot (x, y, radius) is in the way."""
         moved = self.room.moved(name, x, y).thing(name)
         for there in robots.values():
             if isinstance(moved, (Box, Person)) and _touches(moved, *there):
@@ -73,24 +72,24 @@ class SessionRoom:
         return self._tell() if self._map.move(name, x, y) else False
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Put one more thing there; its name, or None when there are enough of them."""
+        """Add a thing; return its name, or None when the limit is reached."""
         name = self._map.add(kind, x, y)
         self._tell()
         return name
 
     def remove(self, name: str) -> bool:
-        """Take a thing away; False when it is not there."""
+        """Remove a thing; return False when it doesn't exist."""
         return self._tell() if self._map.remove(name) else False
 
     def put_back(self) -> None:
-        """Everything is where it was at first; what was added goes."""
+        """Reset the room to its initial state."""
         self._map.put_back()
         self._tell()
 
-    # -- what the session tells --------------------------------------------------------------------
+    # -- input from the session -----------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Take over a new graph: the room is joined when there is somebody in it."""
+        """Apply a new graph; join the room when a robot is in it."""
         if self._watch is not None or TOPIC not in view.topics:
             return
         self._watch = self._watches.open([TOPIC])
@@ -99,10 +98,10 @@ class SessionRoom:
             self._publisher = node.new_pub(TOPIC, "json", latched=True)
 
         self._submit(NO_ROOM, open_it)
-        self._published = -1  # what was kept is news for the robots
+        self._published = -1  # the robots don't know the saved room
 
     def add_messages(self, batches: Mapping[str, Batch]) -> None:
-        """Take over what others say of the room."""
+        """Merge changes that others published."""
         batch = batches.get(TOPIC)
         for message in batch.messages if batch is not None else ():
             try:
@@ -113,7 +112,7 @@ class SessionRoom:
                 self._map.merge(told)
 
     def tick(self) -> None:
-        """Say and keep what is new; called with every tick of the session."""
+        """Publish and save changes. Called at every tick of the session."""
         revision = self._map.revision
         if self._published == -1 and self._publisher is not None:
             self._tell()
@@ -122,17 +121,18 @@ class SessionRoom:
         elif revision != self._kept and self._clock() - self._changed_s >= QUIET_S:
             self.keep()
             if revision != self._published:
-                self._tell()  # who comes later hears it from here, also when who changed it has gone
+                # later subscribers receive it from here, even if the program that changed it has ended
+                self._tell()
 
     def keep(self) -> None:
-        """Keep the room for the next start; what can't be written is told by the settings."""
+        """Save the room for the next start; errors are reported by the settings."""
         if self._map.revision != self._kept:
             self._kept = self._map.revision
             with suppress(SettingsError):
                 self._settings.set(KEPT, self._map.message())
 
     def close(self) -> None:
-        """Keep the room and leave its topic."""
+        """Save the room and close the publisher."""
         self.keep()
         if self._publisher is not None:
             self._publisher.close()

@@ -1,4 +1,4 @@
-"""Invocations of actions by the user: sent, monitored, and ended with one result."""
+"""Manual invocations of actions: sent, monitored, and ended with one result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _, number
 from nep.text import bounded_str
 
 FIRST_ANSWER_S = 3.0
-"""Timeout of the first answer to a command."""
+"""Timeout of the first reply to a command."""
 GRACE_S = 0.5
 """Delay after the time limit of an action, which the robot enforces itself, before Studio ends it."""
 BEATS_MISSED = 4
@@ -22,7 +22,7 @@ SHORTEST_SILENCE_S = 2.0
 
 
 class Tries:
-    """Invocations of the user. Not thread-safe: use it from the window's thread."""
+    """Manual invocations. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class Tries:
         clock: Callable[[], float],
         wall: Callable[[], float] = time.time,
     ) -> None:
-        """``send`` sends a command to a robot; ``rest`` is called with its name once it is idle."""
+        # `send` sends a command to a robot; `rest` is called with its name once it is idle.
         self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
 
     def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
@@ -64,7 +64,7 @@ class Tries:
             self._send_cancel(link, made)
 
     def answer(self, link: RobotLink, answer: Payload) -> None:
-        """Take an answer of the robot; answers to other programs only show that it is alive."""
+        """Apply a reply of the robot; replies to other programs only show that it is alive."""
         link.heard_s = link.answered_s = self._clock()
         link.mute = False
         for made in link.running:
@@ -76,7 +76,7 @@ class Tries:
         state = answer.get("state")
         if not isinstance(state, str) or (state not in FINAL_STATES and state not in ("accepted", "running")):
             return
-        # Most answers have feedback only, and a robot may flood Studio with them.
+        # Most replies have feedback only, and a robot may flood Studio with them.
         if "feedback" in answer:
             made.feedback = _object(answer["feedback"]) or made.feedback
         if "output" in answer:
@@ -94,7 +94,7 @@ class Tries:
             made.begun_s = self._clock()
 
     def look(self, links: Iterable[RobotLink]) -> None:
-        """End invocations of robots that stopped answering, and those beyond their time limit."""
+        """End invocations of robots that stopped replying, and those beyond their time limit."""
         now = self._clock()
         for link in links:
             for made in link.running:
@@ -119,7 +119,7 @@ class Tries:
             return
         left_s = made.left_s
         if left_s is not None and left_s < -GRACE_S:
-            link.mute = True  # until it answers
+            link.mute = True  # until it replies
             self._send_cancel(link, made)
             self._end(
                 link,

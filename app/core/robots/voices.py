@@ -1,4 +1,4 @@
-"""What virtual robots say and play, heard wherever a person is in Studio: one voice at a time, in turn."""
+"""Speech and sounds of virtual robots, audible in all of Studio: one voice at a time."""
 
 from __future__ import annotations
 
@@ -17,46 +17,49 @@ if TYPE_CHECKING:
     from app.core.storage.settings import Settings
 
 SOUND = "robots_heard"
-"""The setting: whether a person wants to hear the robots."""
+"""Setting: whether robots are audible."""
 ENDED = 0.9
-"""Who has said so much has not been interrupted: a voice may take a little longer than the bubble."""
+"""Share of a text after which it counts as finished: a voice may take longer than the speech bubble."""
 MOST_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
-"""A voice that takes longer than this is not waited for: its engine hangs."""
+"""Timeout of a voice (base, and per letter), after which its engine counts as hung."""
 MOST_NOTES, LONGEST_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Tones one after the other: hertz (0 is silence) and seconds."""
+"""Sequence of tones: frequency in hertz (0 is silence) and duration in seconds."""
 
 
 class Speaker(Protocol):
-    """Who makes robots heard. Nothing here waits or raises; a computer without sound is silent."""
+    """Sound output for robots. Nothing blocks or raises; a computer without sound stays silent."""
 
     @property
     def busy(self) -> bool:
-        """Whether a voice still speaks."""
+        """True if a voice is speaking."""
 
     @property
     def problem(self) -> str:
-        """Why robots are not heard on this computer, as a sentence; empty when they are, or nobody tried."""
+        """Sentence why robots are not audible on this computer.
+
+        "" when they are, or before the first attempt.
+        """
 
     def say(self, words: str, language: str, volume: float) -> None:
-        """Say this; ``language`` is a code such as ``en``, ``volume`` from 0 to 1."""
+        """Speak a text; ``language`` is a code such as ``en``, ``volume`` from 0 to 1."""
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Play these tones, also while a voice speaks."""
+        """Play tones, also while a voice speaks."""
 
     def stop_voice(self) -> None:
-        """End the voice at once."""
+        """Stop the voice immediately."""
 
     def stop(self) -> None:
-        """Be silent at once, voice and tones."""
+        """Stop voice and tones immediately."""
 
 
 @dataclass(frozen=True, slots=True)
 class Utterance:
-    """Words of a robot that are, or will be, heard."""
+    """Text that a robot speaks, pending or playing."""
 
     robot: str
     words: str
@@ -66,7 +69,7 @@ class Utterance:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What of a robot's drawing can be heard; `played` and `spoken` go from 0 to 1."""
+    """Audible part of a robot's drawing; `played` and `spoken` are progress from 0 to 1."""
 
     speech: str = ""
     spoken: float = 0.0
@@ -78,7 +81,7 @@ class Heard:
 
     @classmethod
     def parse(cls, drawing: Mapping[str, object]) -> Heard:
-        """What is missing or of a wrong type is silent."""
+        """Parse a drawing; missing and malformed parts are silent."""
         speech, sound = drawing.get("speech"), drawing.get("sound")
         played = sound if isinstance(sound, Mapping) else {}
         number = played.get("number")
@@ -94,9 +97,10 @@ class Heard:
 
 
 class RobotVoices:
-    """Follows what virtual robots say, and lets it be heard by its `speaker`, if it has one.
+    """Plays the speech and sounds of virtual robots on its `speaker`, if set.
 
-    One thread uses it (the window's). Robots speak one after the other; who is broken off is silent at once.
+    Not thread-safe: use it from the window's thread. Robots speak one after the other; interrupted speech
+    ends at once.
     """
 
     def __init__(
@@ -107,7 +111,7 @@ class RobotVoices:
         tell: Callable[[str, str, str], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``watch`` looks at a topic; ``tell`` writes into the Console: a level, who, a sentence."""
+        # `tell` writes to the Console: level, origin, sentence.
         self._settings, self._fleet, self._watch, self._tell = settings, fleet, watch, tell
         self._clock = clock
         self.speaker: Speaker | None = None
@@ -121,11 +125,11 @@ class RobotVoices:
 
     @property
     def on(self) -> bool:
-        """Whether a person wants to hear robots."""
+        """True if robots are audible."""
         return bool(self._settings.get(SOUND, True))
 
     def switch(self, *, on: bool) -> None:
-        """Let robots be heard, or not; raises SettingsError when that can't be kept."""
+        """Make robots audible or not. Raises SettingsError when that can't be saved."""
         try:
             self._settings.set(SOUND, on)
         finally:
@@ -134,16 +138,16 @@ class RobotVoices:
 
     @property
     def problem(self) -> str:
-        """Why robots are not heard, as a sentence; empty when there is no reason."""
+        """Sentence why robots are not audible, or ""."""
         return self.speaker.problem if self.speaker is not None else ""
 
     @property
     def saying(self) -> Utterance | None:
-        """What is heard now."""
+        """Text that is being spoken."""
         return self._now
 
     def follow(self) -> None:
-        """Take over what robots say now; called with every tick."""
+        """Apply what robots say now. Called at every tick."""
         if self.speaker is None:
             return
         there = {link.name: link for link in self._fleet.connected if _is_heard(link)} if self.on else {}
@@ -175,7 +179,6 @@ class RobotVoices:
             self.speaker.play(now.notes, now.volume)
 
     def _break_off(self, name: str, before: Heard, now: Heard) -> None:
-        """End what a robot has not said or played to its end."""
         if self.speaker is None:
             return
         if before.speech and before.spoken < ENDED and now.speech != before.speech:
@@ -195,7 +198,6 @@ class RobotVoices:
         self._waiting.append(said)
 
     def _go_on(self, speaker: Speaker) -> None:
-        """Let the next one speak when the last one has ended."""
         if self._now is not None and speaker.busy:
             if self._clock() < self._until_s:
                 return
@@ -207,14 +209,14 @@ class RobotVoices:
             speaker.say(said.words, said.language, said.volume)
 
     def silence(self) -> None:
-        """Nobody is heard any more, and nobody who waits."""
+        """Stop and discard all speech and sounds."""
         self._waiting.clear()
         self._now, self._plays = None, ""
         if self.speaker is not None:
             self.speaker.stop()
 
     def close(self) -> None:
-        """Be silent, and look at nobody."""
+        """Stop all sound and close the watches."""
         self.silence()
         for watch in self._watches.values():
             watch.close()
@@ -228,12 +230,12 @@ def _is_heard(link: RobotLink) -> bool:
 def _share(value: object, default: float = 0.0, whole: float = 1.0) -> float:
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         value = default
-    # First the bounds: JSON has whole numbers that no float can be.
+    # The bounds first: JSON has integers that don't fit a float.
     return float(min(whole, max(0.0, value))) / whole
 
 
 def _notes(value: object) -> Notes:
-    """The tones of a message, as many and as long as a person wants to hear."""
+    # Limited in number and duration.
     if not isinstance(value, list):
         return ()
     notes: list[tuple[float, float]] = []

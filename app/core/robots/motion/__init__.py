@@ -1,4 +1,4 @@
-"""What may move real robots: the question to a person, the gate before messages, commands of bridges.
+"""Motion of real robots: the question to the user, the gate before messages, commands of bridges.
 
-Proof that robots stand still is in `app.core.robots.stop`.
+The proof that robots have stopped is in `app.core.robots.stop`.
 """

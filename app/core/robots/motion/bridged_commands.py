@@ -1,4 +1,4 @@
-"""Commands that a bridge from another network publishes for robots here, read off the graph."""
+"""Commands that bridges publish for robots, detected in the graph."""
 
 from __future__ import annotations
 
@@ -10,19 +10,18 @@ from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
 
 class BridgedCommands:
-    """Reports robots that bridges sent commands to. One thread uses it (the window's).
+    """Reports robots that bridges sent commands to. Not thread-safe: use it from the window's thread.
 
-    A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on a robot's command topic:
-    the topic need not be subscribed.
+    A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on a robot's command topic,
+    so the topic need not be subscribed to.
     """
 
     def __init__(self, on_moved: OnMoved) -> None:
-        """Report to `on_moved`, with "bridge"."""
         self._on_moved = on_moved
         self._counts: dict[int, int] = {}
 
     def update(self, view: GraphView, robots: Iterable[Robot]) -> None:
-        """Take over a new graph: report robots that got commands from a bridge since the graph before."""
+        """Apply a new graph: report robots that received commands of a bridge since the previous one."""
         known = view.topics.get(BRIDGES_TOPIC)
         bridges = {publisher.node_id for publisher in known.publishers} if known is not None else set()
         counts: dict[int, int] = {}

@@ -1,7 +1,7 @@
-"""Gate before everything that is published on a topic that moves a robot: alarms, shelf, replays, clicks.
+"""Gate for all messages that move robots: alarms, library, replays, clicks.
 
-The window's thread asks the person (`permits`); any thread checks right before each message (`refusal`), so a
-robot that comes meanwhile is not moved. Which topics move robots decides `nep.programs.robots`.
+The window's thread asks the user (`permits`); any thread checks immediately before each message (`refusal`),
+so that a robot that connects meanwhile is not moved. `nep.programs.robots` decides which topics move robots.
 """
 
 from __future__ import annotations
@@ -23,35 +23,34 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class GatedRobots(Protocol):
-    """What the gate knows of the robots."""
+    """Information about the robots that the gate needs."""
 
     @property
     def moving(self) -> MovingTopics:
-        """The topics that move robots now; another object whenever that changes."""
+        """Topics that move robots; a new object whenever they change."""
 
     @property
     def movable(self) -> Iterable[Robot]:
-        """The robots that can be moved now."""
+        """Robots that can be moved."""
 
     @property
     def described(self) -> frozenset[str]:
-        """The description topics of `movable` that were read."""
+        """Description topics of `movable` robots that were parsed."""
 
 
 class MovableRobots:
-    """What `MotionGate` asks of the fleet. One thread uses it (the window's)."""
+    """Movable robots of the fleet for `MotionGate`. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, links: Mapping[str, RobotLink], names: Mapping[str, str]) -> None:
-        """`links` are the fleet's robots by name, `names` the robots' names by their description topics."""
         self._links, self._names = links, names
         self.view = GraphView(0, 0)
-        """The newest graph."""
+        """Newest graph."""
         self._key: object = None
         self._moving = MovingTopics()
 
     @property
     def movable(self) -> tuple[Robot, ...]:
-        """Those that can be moved: also a real one that is away, which may only have lost its connection."""
+        """Robots that can be moved, including disconnected real ones: only their connection may be lost."""
         return tuple(link.robot for link in self._movable)
 
     @property
@@ -60,13 +59,13 @@ class MovableRobots:
 
     @property
     def described(self) -> frozenset[str]:
-        """The description topics of the robots that are there, which were read."""
+        """Description topics of the connected robots."""
         there = {link.name for link in self._links.values() if link.connected}
         return frozenset(topic for topic, name in self._names.items() if name in there)
 
     @property
     def moving(self) -> MovingTopics:
-        """The topics that move robots now; another object whenever that changes."""
+        """Topics that move robots; a new object whenever they change."""
         links = self._movable
         now = [(link.robot, link.topics_before, link.identity) for link in links]
         described = self.described
@@ -86,19 +85,19 @@ class _Snapshot(NamedTuple):
 
 
 class MotionGate:
-    """Decide who may publish on topics that move robots. Methods are for the window's thread.
+    """Decides which messages may be published on topics that move robots.
 
-    `refusal` and `refusal_now` may be called in any thread; they answer from what `follow` saw.
+    Use it from the window's thread, except `refusal` and `refusal_now`, which are thread-safe and use the
+    state of the last `follow`.
     """
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
-        """Ask with `permission` about `robots`."""
         self._permission, self._robots = permission, robots
         self._seen: tuple[MovingTopics, int] | None = None
         self._snapshot = _Snapshot()
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the names of the robots that a message moves; the topic when the robot is unknown."""
+        """Return the names of the robots that a message moves; the topic if the robot is unknown."""
         return self._robots.moving.moved_by(topic, msg_type)
 
     def is_permitted(self, topic: str, msg_type: str = "") -> bool:
@@ -111,8 +110,8 @@ class MotionGate:
     ) -> bool:
         """Return whether a message may be published now.
 
-        If not, a person is asked, and `go_on` is called when the answer is yes. `reason` is a sentence that
-        tells the person what wants to publish.
+        If not, the user is asked, and `go_on` is called once permitted. `reason` is a sentence for the user
+        about what wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
         names = self.moved_by(topic, msg_type)
@@ -123,7 +122,7 @@ class MotionGate:
         return is_permitted
 
     def follow(self) -> None:
-        """Take over which robots there are and which may move, for `refusal`."""
+        """Update the state that `refusal` uses: robots and permissions."""
         now = self._robots.moving, self._permission.revision
         if now == self._seen:
             return
@@ -133,21 +132,22 @@ class MotionGate:
             for name, robot in known.items()
             if self._permission.allowed(robot) or not risky(robot, _actions(robot))
         }
-        strangers = self._permission.strangers - known.keys()  # a yes counts until the robot is known
+        # a permission counts until the robot is identified
+        strangers = self._permission.strangers - known.keys()
         self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described)
         self._seen = now
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
-        """Return why a message may not be published now; "" when it may. For any thread."""
+        """Return why a message may not be published now, or "". Thread-safe."""
         known = self._snapshot
         return _words(
             topic, [name for name in known.moving.moved_by(topic, msg_type) if name not in known.allowed]
         )
 
     def refusal_now(self, node: Node, topic: str, msg_type: str = "") -> str:
-        """As `refusal`, after asking the master who has come since: for the first message to new subscribers.
+        """Like `refusal`, but query the master first: for the first message to new subscribers.
 
-        May be called in any thread; waits for the master, 0.5 s at most.
+        Thread-safe; waits for the master at most 0.5 s.
         """
         refusal = self.refusal(topic, msg_type)
         if refusal:
@@ -155,7 +155,7 @@ class MotionGate:
         try:
             view = node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
-            return ""  # nobody can have come without it
+            return ""  # no node can have joined without the master
         known = self._snapshot
         newcomers = moving_topics(view, (), description_topics(view) - known.described)
         return _words(topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers])
@@ -171,5 +171,5 @@ def _words(topic: str, names: Sequence[str]) -> str:
 
 
 def _actions(robot: Robot) -> Sequence[str]:
-    """Everything, because nobody can tell from a message what it asks for."""
+    # All actions, because a message doesn't reveal which action it triggers.
     return [action.name for action in robot.actions]

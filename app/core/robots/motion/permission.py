@@ -1,9 +1,9 @@
-"""Which real robots may move: a person is asked once for each robot, before it moves for the first time.
+"""Motion permission: the user is asked once for each real robot before it first moves.
 
-A virtual robot may always, if Studio knows the program that it is (`app.core.robots.launcher`).
-Everything that makes a robot act comes through here: the forms, the palette, keys and programs, also those
-that publish on a robot's topics. Stop does not. A yes counts for the program that the robot is now, *always*
-for its name, model, program and computer.
+Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). Everything that
+makes a robot act passes here: forms, palette, keys and programs, also those that publish on a robot's topics.
+Stop doesn't. A permission is valid for the robot's current program; *always* for its name, model, program and
+computer.
 """
 
 from __future__ import annotations
@@ -24,10 +24,9 @@ MOST_NAMED = 4
 
 
 class MayNotMoveError(AppError):
-    """Nobody has said yet that these robots may move; the question stands."""
+    """These robots have no permission to move yet; the question is open."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Make the sentence from the robots' names."""
         self.names = tuple(names)
         super().__init__(
             _("{robots} may not move yet; answer the question above first").format(robots=listed(list(names)))
@@ -36,10 +35,10 @@ class MayNotMoveError(AppError):
 
 @dataclass(frozen=True)
 class Question:
-    """May these robots move? ``moves`` names for each what it would do, in the words of its description.
+    """Question whether robots may move. ``moves`` has the titles of the moving actions by robot.
 
-    ``strangers`` would be moved, too: names of robots that could not be read, or topics of unknown robots.
-    ``reason`` is a sentence that says what asks, "" when the person has just asked for it themselves.
+    ``strangers`` would move too: names of robots without a readable description, or topics of unknown robots.
+    ``reason`` is a sentence about the origin, or "" for the user's own command.
     """
 
     moves: Mapping[str, tuple[str, ...]]
@@ -49,17 +48,17 @@ class Question:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All of them, for people."""
+        """Names of all robots, for people."""
         return (*self.moves, *map(_stranger, self.strangers))
 
     @property
     def title(self) -> str:
-        """In bold: "Let Rover move?"."""
+        """Title: "Let Rover move?"."""
         return _("Allow {robots} to move?").format(robots=listed(list(self.names)))
 
     @property
     def sentence(self) -> str:
-        """What would move, and how it is stopped."""
+        """Sentences about the motion and how to stop it."""
         told = [self.reason] if self.reason else []
         told += [
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
@@ -77,25 +76,25 @@ class Question:
 
 
 class MotionPermission:
-    """Who may move. One thread uses it (the window's)."""
+    """Permissions of robots to move. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
         settings: ListSettings | None = None,
         identity_of: Callable[[str], Identity | None] = lambda _name: None,
     ) -> None:
-        """`settings` keep the robots that may always; `identity_of` tells the program that a robot is."""
+        # `settings` store the *always* permissions; `identity_of` returns a robot's program.
         self._settings, self._identity_of = settings, identity_of
         self._allowed: set[str] = set()
         self.strangers: frozenset[str] = frozenset()
-        """Robots without a readable description, and topics of unknown robots, that may move."""
+        """Permitted robots without a readable description, and topics of permitted unknown robots."""
         self._asked: tuple[tuple[str, str], ...] = ()
         self.question: Question | None = None
-        """What a person is to answer now."""
+        """Open question, or None."""
         self.revision = 0
 
     def allowed(self, robot: Robot) -> bool:
-        """Whether this robot may move without being asked for."""
+        """Return whether this robot may move without asking."""
         return robot.virtual or self._now(robot) in self._allowed or self._key(robot) in self._always()
 
     def permits(
@@ -105,9 +104,9 @@ class MotionPermission:
         strangers: Iterable[str] = (),
         reason: str = "",
     ) -> bool:
-        """Whether these robots may do these actions now, and ``strangers`` anything (see `Question`).
+        """Return whether these robots may perform these actions now, and ``strangers`` any (see `Question`).
 
-        If not, the question stands, and `go_on` is called when the answer is yes.
+        If not, the question is opened, and `go_on` is called once permitted.
         """
         asked = [(robot, risky(robot, actions)) for robot, actions in wanted if not self.allowed(robot)]
         open_ = [(robot, moves) for robot, moves in asked if moves]
@@ -120,7 +119,7 @@ class MotionPermission:
         return False
 
     def answer(self, *, let: bool, always: bool = False) -> None:
-        """The person has answered; a yes goes on with what was wanted. SettingsError if it can't be kept."""
+        """Apply the user's answer; a yes calls `go_on`. Raises SettingsError if *always* can't be saved."""
         question, self.question = self.question, None
         self.revision += 1
         if question is None or not let:
@@ -134,13 +133,13 @@ class MotionPermission:
             question.go_on()
 
     def withdraw(self) -> None:
-        """What was asked is not wanted any more (Stop was pressed, the robot has gone)."""
+        """Withdraw the question (Stop was pressed, the robot disconnected)."""
         if self.question is not None:
             self.question = None
             self.revision += 1
 
     def forget(self) -> None:
-        """Ask again before any robot moves."""
+        """Revoke all permissions."""
         self._allowed.clear()
         self.strangers = frozenset()
         self.revision += 1
@@ -148,12 +147,12 @@ class MotionPermission:
             self._settings.set(ALWAYS, [])
 
     def _key(self, robot: Robot) -> str:
-        """What *always* is kept for: who announces another robot under this name is not meant."""
+        # Key of *always*: another program that announces this name doesn't match.
         identity = self._identity_of(robot.name)
         return f"{robot.name} ({robot.model})" + (f", {identity.words}" if identity is not None else "")
 
     def _now(self, robot: Robot) -> str:
-        """What a yes counts for: this very program, until it is started anew."""
+        # Key of a permission for this very program until it is restarted.
         identity = self._identity_of(robot.name)
         return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
 
@@ -162,12 +161,12 @@ class MotionPermission:
 
 
 def _stranger(name: str) -> str:
-    """A robot of which only its name, or only a topic, is known."""
+    # A robot of which only the name or a topic is known.
     return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMANDS else name
 
 
 def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
-    """The titles of those actions that move the robot, each once; of many only the first."""
+    """Return the titles of the actions that move the robot, unique; of many only the first."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (
@@ -178,7 +177,7 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
 
 
 def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
-    """What a program asks of each of its robots: anything of those that it moves by publishing."""
+    """Return the actions that a program requests of each robot; all of them if it publishes to the robot."""
     asked, moved = program.actions, program.moves
     return [
         (

@@ -1,4 +1,4 @@
-"""Stop: who is told, who must answer, what is proven, and which robots may still move.
+"""Stop: recipients, required confirmations, proof, and the robots that may still move.
 
-What asks a person before a robot moves is in `app.core.robots.motion`.
+The question before a robot moves is in `app.core.robots.motion`.
 """

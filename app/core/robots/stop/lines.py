@@ -1,4 +1,4 @@
-"""The ways to a robot on which it is told to stop and answers, of its description and of earlier ones."""
+"""Connections for Stop: command and reply topics of a robot's present and earlier descriptions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 MOST_TOPICS = 32
-"""So many command topics of one robot are kept: the present ones, and the first of earlier descriptions."""
+"""Maximum number of command topics of one robot: the present ones, then those of earlier descriptions."""
 
 
 class StopPublisher(Protocol):
-    """What is needed of NEP's publisher."""
+    """Methods of nep's publisher that are used here."""
 
     @property
     def subscribers(self) -> int:
-        """How many subscribers are connected."""
+        """Number of connected subscribers."""
         ...
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of nodes that subscribe and have not connected."""
+        """Names of subscribed nodes that are not connected."""
         ...
 
     def publish(self, payload: object) -> None:
@@ -34,45 +34,45 @@ class StopPublisher(Protocol):
         ...
 
     def close(self) -> None:
-        """Stop publishing."""
+        """Close the publisher."""
         ...
 
 
 class StopSubscriber(Protocol):
-    """What is needed of NEP's subscriber."""
+    """Methods of nep's subscriber that are used here."""
 
     def close(self) -> None:
-        """Stop subscribing."""
+        """Close the subscriber."""
         ...
 
 
 class StopNode(Protocol):
-    """What is needed of NEP's node."""
+    """Methods of nep's node that are used here."""
 
     id: str
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> StopPublisher:
-        """A publisher; without `batch` no message waits for another."""
+        """Return a publisher; without `batch` no message waits for another."""
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> StopSubscriber:
-        """A subscriber whose messages go to `sink`, in the node's thread."""
+        """Return a subscriber that passes messages to `sink` in the node's thread."""
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
-        """Who publishes what."""
+        """Return the current graph."""
         ...
 
 
 @dataclass(frozen=True)
 class StopTarget:
-    """A robot that is to be stopped.
+    """Robot to be stopped.
 
-    ``identity`` is the program that it is (None: whoever announced it first), ``earlier`` are programs of
-    this name that may still run and move it, ``topics`` those of its earlier descriptions. One that is not
-    ``is_expected`` is told with the others, in case that it still hears, and nobody waits for its answer.
+    ``identity`` is its program (None: the first that announced it), ``earlier`` are programs of this name
+    that may still run and move it, ``topics`` are those of earlier descriptions. A robot that is not
+    ``is_expected`` receives the Stop in case it is still subscribed, but its reply is not awaited.
     """
 
     robot: Robot
@@ -83,13 +83,13 @@ class StopTarget:
 
     @property
     def ways(self) -> tuple[RobotTopics, ...]:
-        """Where it is told to stop: the topics of its description first, then those that it had before."""
+        """Topics for the Stop: those of its description, then those of earlier ones."""
         return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MOST_TOPICS]
 
 
 @dataclass
 class StopWay:
-    """Where one robot is told to stop, and where it answers."""
+    """Command topic of one robot and the subscription to its replies."""
 
     topic: str
     publisher: StopPublisher
@@ -97,15 +97,16 @@ class StopWay:
     was_connected: bool = False
 
     def is_connected(self, target: StopTarget, hearers: Collection[str]) -> bool:
-        """Whether what is published now arrives at the robot. ``hearers`` are the nodes that hear the topic.
+        """Return whether a message published now reaches the robot; ``hearers`` are the subscribed nodes.
 
-        Robots of RIZE can't be told apart on their common topic; they are taken for connected.
+        Robots of RIZE can't be distinguished on their common topic and count as connected.
         """
         program = target.identity
         if self.subscriber is None or program is None:
             is_there = self.subscriber is None or self.publisher.subscribers > 0
         else:
-            # By name: one that hung and was started anew may still be missing, although all are connected.
+            # By name: a hung program that was restarted may still be missing although all others are
+            # connected.
             connected, missing = self.publisher.subscribers, self.publisher.missing
             is_complete = program.node not in missing or connected >= len(hearers)
             is_there = program.node_id in hearers and connected > 0 and is_complete
@@ -113,7 +114,7 @@ class StopWay:
         return is_there
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the publisher and the subscriber."""
         self.publisher.close()
         if self.subscriber is not None:
             self.subscriber.close()
@@ -121,7 +122,7 @@ class StopWay:
 
 @dataclass
 class StopLine:
-    """The ways to one robot; ``error`` says why one of them is missing."""
+    """Connections to one robot; ``error`` is why one of them is missing."""
 
     target: StopTarget
     ways: dict[RobotTopics, StopWay] = field(default_factory=dict)
@@ -129,28 +130,28 @@ class StopLine:
 
     @property
     def name(self) -> str:
-        """The robot's."""
+        """Name of the robot."""
         return self.target.robot.name
 
     @property
     def answers(self) -> set[str]:
-        """The topics on which it answers."""
+        """Topics of its replies."""
         return {way.answer for way in self.target.ways}
 
     @property
     def is_whole(self) -> bool:
-        """Whether no way is missing."""
+        """True if all connections are open."""
         return self.ways.keys() >= set(self.target.ways)
 
     @property
     def unconnected(self) -> str:
-        """Why it can't have heard anything, in a sentence; empty once one of its ways was connected."""
+        """Sentence why it can't have received anything; empty once a connection was established."""
         if any(way.was_connected for way in self.ways.values()):
             return ""
         return _("{robot} is not connected yet").format(robot=self.name)
 
     @property
     def untold(self) -> str:
-        """Why the robot can't be told, in a sentence."""
+        """Sentence why the Stop can't be sent to the robot."""
         why = self.error or _("not connected yet; press Stop again")
         return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)

@@ -1,8 +1,8 @@
-"""Robots that received a command to move and have not proven to stand still since.
+"""Robots that received a command and have not been proven to stand still since.
 
 `MovedRobots` decides which robots a Stop must name. A robot is entered before any message that moves it is
-sent. It is removed when its own program confirms a Stop, when its own final answer ends the motion, or when
-the user confirms that it stands still. Freezing, crashing, leaving the graph and returning as another program
+sent. It is removed when its own program confirms a Stop, when its own final reply ends the motion, or when
+the user confirms that it has stopped. Freezing, crashing, leaving the graph and returning as another program
 do not remove it (docs/adr/0030-moved-robots.md).
 """
 
@@ -62,7 +62,7 @@ class UnprovenMotion:
 
     @property
     def is_known(self) -> bool:
-        """Whether the sender of the command is known."""
+        """True if the sender of the command is known."""
         return self.by not in UNKNOWN
 
     @property
@@ -81,14 +81,7 @@ class MovedRobots:
         clock: Callable[[], float] = time.monotonic,
         others_of: Callable[[str], Iterable[Identity]] = lambda _name: (),
     ) -> None:
-        """Start with an empty ledger.
-
-        Args:
-            program_of: Returns the current program of a robot.
-            has_ended: Returns whether a program has certainly ended.
-            clock: Returns monotonic seconds.
-            others_of: Returns other programs that receive a robot's commands and publish its answers.
-        """
+        # `others_of` returns other programs that receive a robot's commands and publish its replies.
         self._program_of, self._has_ended, self._clock = program_of, has_ended, clock
         self._others_of = others_of
         self._motions: dict[str, list[UnprovenMotion]] = {}
@@ -144,7 +137,7 @@ class MovedRobots:
         Args:
             names: Names of the robots.
             by: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
-            id: Id of the invocation whose final answer ends the motion; empty if there is none.
+            id: Id of the invocation whose final reply ends the motion; empty if there is none.
             program: Program of the robot; the current one by default.
         """
         for name in names:
@@ -163,14 +156,15 @@ class MovedRobots:
                 self._note_others(name, by, found)
 
     def _note_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
-        # Other programs of the same robot received the command, too: a frozen one may obey when it resumes.
+        # Other programs of the same robot received the command too: a frozen one may execute it when it
+        # resumes.
         known = {motion.program for motion in found if not motion.id}
         for other in self._others_of(name):
             if other not in known and len(found) < MAX_MOTIONS:
                 found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
 
     def take_newcomers(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
-        """Note the commands that programs may have received which a new graph lists for the first time.
+        """Record commands that newly listed programs may have received.
 
         A program can receive a command before the graph lists it. Call this once per graph. A graph is older
         than the call, so commands since the graph before the last one count.
@@ -192,7 +186,7 @@ class MovedRobots:
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def ended(self, name: str, id: str, program: Identity | None = None) -> None:
-        """Take a final answer of a robot's program, which ends the motion for this program."""
+        """Apply a final reply of a robot's program, which ends the motion for this program."""
 
         def stays(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
@@ -221,7 +215,7 @@ class MovedRobots:
         )
 
     def take(self, report: StopReport, mark: int) -> None:
-        """Take the report of a Stop that began at ``mark``: proven and unproven robots."""
+        """Apply the report of a Stop that began at ``mark``: proven and unproven robots."""
         self.note((name for name in report.silent if name not in self), "stop")
         for name in report.still:
             self.stood_still(name, report.programs(name), mark)
@@ -235,13 +229,13 @@ class MovedRobots:
             del self._sent[name]
 
     def confirm(self, names: Iterable[str]) -> None:
-        """Remove robots that the user has confirmed to stand still."""
+        """Remove robots that the user has confirmed to have stopped."""
         for name in names:
             self._motions.pop(name, None)
             self._sent.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
-        """Remove motions of ended programs: a virtual robot stands still once its program has ended."""
+        """Remove motions of ended programs: a virtual robot has stopped once its program has ended."""
         self._keep(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
     def _keep(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:

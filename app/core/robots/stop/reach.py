@@ -1,7 +1,7 @@
 """Targets of a Stop: robots that are connected, may move, were connected, or are not shown. No sockets.
 
-Not shown are robots beyond the limit of the list and those whose description can't be used: they are reached
-at the command topics that the graph knows.
+Not shown are robots beyond the limit of the list and those with an invalid description: they are reached at
+the command topics that the graph lists.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from app.robots.identity import hearing, identity_of, publishing
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
-"""Limit of robots with a connection for Stop; further ones are named as not reached."""
+"""Maximum number of unlisted robots with a connection for Stop; further ones are reported as not reached."""
 MAX_ABSENT = 64
-"""Limit of disconnected robots that had answered; they receive a stop in case they are still subscribed."""
+"""Maximum number of disconnected robots that had replied; they receive a Stop in case they are still
+subscribed."""
 _COMMAND, _ANSWER = "robot/command", "robot/answer"
 _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
 
@@ -26,7 +27,7 @@ _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, con
 def targets_of(
     links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
-    """Return the targets of a stop; answers of disconnected robots that do not move are not awaited."""
+    """Return the targets of a Stop; replies of disconnected robots that do not move are not awaited."""
     here, absent = [], []
     for link in links:
         is_expected = link.connected or link.name in moved
@@ -43,7 +44,7 @@ def targets_of(
 
 
 def _unknown(topic: str) -> StopTarget:
-    """Return a target for a command topic that moved a robot without a description."""
+    # Target for a command topic that moved a robot without a description.
     home = topic.rpartition("/")[0]
     return StopTarget(_bare(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
 
@@ -57,7 +58,7 @@ def unlisted_targets(
 ) -> tuple[StopTarget, ...]:
     """Return the targets of the robots with these description topics.
 
-    Those whose commands nobody hears are left out: nothing could be stopped.
+    Robots whose command topic has no subscriber are omitted: nothing could be stopped.
     """
     wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
     if not wanted:
@@ -86,7 +87,7 @@ def _name_of(topic: str) -> str:
 
 
 def _by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
-    """Return the topics of a type that each node subscribes to (commands) or publishes (answers)."""
+    # Topics of a type that each node subscribes to (commands) or publishes (replies).
     found: dict[str, list[str]] = {}
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:

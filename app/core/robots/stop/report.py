@@ -1,4 +1,4 @@
-"""What became of a stop, robot by robot, and the words for it."""
+"""Result of a Stop for each robot, and its sentences."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from nep.i18n import _
 
 STOPPING_SHOWN_AFTER_S = 0.1
 StopStatus = Literal["ok", "off", "error"]
-"""How a stop is shown everywhere: the green check is only for ``ok``."""
+"""Status of a Stop in the window: the green check is only for ``ok``."""
 
 
 @dataclass(frozen=True)
 class RobotStop:
-    """What became of one robot's stop.
+    """Result of a Stop for one robot.
 
-    ``answered``: its own program said that it stands still. ``refused``: that said that it does not, and why
-    (``error``). ``error`` without ``refused``: it could not be told. ``can_confirm`` is False for robots that
-    never answer a stop (RIZE), and for programs that only listen to a robot's commands. ``program`` names
-    another program than the robot's own that serves its commands; ``node`` is the id of the program
-    that answered. ``waits`` says that other programs of the same robot had not answered yet when this was
-    told. ``is_pending``: it is told as soon as it is connected. ``waited_ms`` is how long the command waited
-    until then.
+    ``answered``: its own program confirmed that it has stopped. ``refused``: its program reported that it has
+    not, with the reason in ``error``. ``error`` without ``refused``: the Stop could not be sent.
+    ``can_confirm`` is False for robots that never reply to a Stop (RIZE), and for programs that only
+    subscribe to a robot's commands. ``program`` is the name of another program that serves the robot's
+    commands; ``node`` is the id of the program that replied. ``waits`` is whether replies of other programs
+    of the robot are pending. ``is_pending``: the Stop is sent as soon as the robot is connected;
+    ``waited_ms`` is how long it waited for that.
     """
 
     name: str
@@ -40,12 +40,12 @@ class RobotStop:
 
     @property
     def who(self) -> str:
-        """The robot's name, and the program's when it is not the robot's own."""
+        """Name of the robot, with the program if it is not the robot's own."""
         return f"{self.name} (“{self.program}”)" if self.program else self.name
 
     @property
     def wrong(self) -> str:
-        """What is wrong, without a full stop: "Pepper did not answer"; nothing when it stopped."""
+        """Problem without a full stop: "Pepper did not answer"; "" when it stopped."""
         if self.answered or not self.can_confirm:
             return ""
         if self.program and self.refused:
@@ -54,7 +54,7 @@ class RobotStop:
 
     @property
     def sentence(self) -> str:
-        """In words: "Pepper stopped (41 ms)"."""
+        """Result in words: "Pepper stopped (41 ms)"."""
         if self.answered and self.waited_ms:
             words = _("{robot} stopped ({elapsed} ms; it was not connected for {waited} ms of them)")
             return words.format(
@@ -72,15 +72,15 @@ class RobotStop:
 
     @property
     def status(self) -> StopStatus:
-        """``ok`` when it answered, ``off`` when it can't confirm, else ``error``."""
+        """Status: ``ok`` when confirmed, ``off`` when it can't confirm, else ``error``."""
         return "off" if not self.can_confirm else "ok" if self.answered else "error"
 
 
 @dataclass(frozen=True)
 class StopReport:
-    """All robots' stops; ``elapsed_ms`` from the call to the last answer.
+    """Results of all robots; ``elapsed_ms`` is the time from the call to the last reply.
 
-    ``strangers``: whoever answered in a robot's name and is not that robot, as (robot, program).
+    ``strangers`` are other programs that replied in a robot's name, as (robot, program).
     """
 
     robots: tuple[RobotStop, ...]
@@ -89,14 +89,14 @@ class StopReport:
 
     @property
     def proven(self) -> bool:
-        """Whether there was a robot to stop, and every one that can confirm has."""
+        """True if there was a robot to stop, and every robot that can confirm has."""
         return bool(self.robots) and not self.unproven
 
     @property
     def status(self) -> StopStatus:
-        """``ok`` only for a complete proof: every robot said itself that it stands still.
+        """Overall status: ``ok`` only for a complete proof, when every robot itself confirmed.
 
-        ``off`` when nobody refused or was silent, but a robot can't confirm, or there was none to stop.
+        ``off`` when no robot refused or was silent, but one can't confirm or there was none.
         """
         if self.unproven:
             return "error"
@@ -104,17 +104,17 @@ class StopReport:
 
     @property
     def unproven(self) -> tuple[RobotStop, ...]:
-        """Those that should have said that they stand still and did not."""
+        """Results of robots that had to confirm and did not."""
         return tuple(robot for robot in self.robots if robot.can_confirm and not robot.answered)
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """The robots that are not proven to stand still, each once."""
+        """Names of robots without a confirmation, unique."""
         return tuple(dict.fromkeys(robot.name for robot in self.unproven))
 
     @property
     def by_name(self) -> Mapping[str, RobotStop]:
-        """What became of each robot: the worst of what its own and other programs that serve it said."""
+        """Result by robot: the worst of those of its own and other programs."""
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
             before = worst.get(robot.name)
@@ -123,29 +123,29 @@ class StopReport:
         return worst
 
     def programs(self, name: str) -> frozenset[str]:
-        """The programs of a robot that proved its stop, by node id."""
+        """Return the node ids of a robot's programs that confirmed."""
         return frozenset(robot.node for robot in self.robots if robot.name == name and robot.answered)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The robots, each once, however many programs serve one."""
+        """Names of the robots, unique."""
         return tuple(dict.fromkeys(robot.name for robot in self.robots))
 
     @property
     def still(self) -> tuple[str, ...]:
-        """The robots that are proven to stand still: all of their programs that must answer said so."""
+        """Names of robots that are proven to have stopped: all their programs confirmed."""
         silent = self.silent
         said = (robot.name for robot in self.robots if robot.can_confirm and robot.answered)
         return tuple(dict.fromkeys(name for name in said if name not in silent))
 
     def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
-        """The same, and a line for each of these robots that has none: it was not reached."""
+        """Return a report that also has a line for each of these robots that was not reached."""
         there = {robot.name for robot in self.robots}
         missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
     def with_late(self, late: RobotStop) -> StopReport:
-        """The same with what a robot said too late."""
+        """Return a report with a late reply."""
         lines = ((robot.name, robot.program) for robot in self.robots)
         if (late.name, late.program) not in lines:
             return self
@@ -155,14 +155,14 @@ class StopReport:
 
 
 def not_reached(name: str, why: str = "") -> RobotStop:
-    """The line of a robot that could not be told to stop, and why."""
+    """Return the result of a robot that the Stop could not be sent to, with the reason."""
     words = _("Stop was not sent to {robot}: {why}") if why else _("Stop was not sent to {robot}")
     return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 
 @dataclass(frozen=True, slots=True)
 class StopDone:
-    """Every robot was told to stop, and answered or not."""
+    """The Stop ended: all robots replied or timed out."""
 
     number: int
     report: StopReport
@@ -170,7 +170,7 @@ class StopDone:
 
 @dataclass(frozen=True, slots=True)
 class RobotAnswered:
-    """One robot answered while others are waited for."""
+    """One robot replied while others are pending."""
 
     number: int
     robot: RobotStop
@@ -178,7 +178,7 @@ class RobotAnswered:
 
 @dataclass(frozen=True, slots=True)
 class OneStopped:
-    """One robot was told to stop while nothing ran, when the ledger was at ``mark`` (`MovedRobots.mark`)."""
+    """One robot was stopped while nothing ran; the ledger was at ``mark`` (`MovedRobots.mark`)."""
 
     report: StopReport
     mark: int = 0
@@ -186,9 +186,9 @@ class OneStopped:
 
 @dataclass(frozen=True, slots=True)
 class LateAnswer:
-    """A robot answered when it was not waited for any more, or stands still after it had said no.
+    """A robot replied after the timeout, or confirmed after a refusal.
 
-    ``number`` is that of the stop; None for one robot's, which began at ``mark``.
+    ``number`` is that of the Stop; None for the Stop of one robot, which began at ``mark``.
     """
 
     number: int | None

@@ -1,4 +1,4 @@
-"""Pending stop of one robot: the programs that must answer, and their answers. No sockets."""
+"""Pending Stop of one robot: the programs that must reply, and their replies. No sockets."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from nep.errors import NepError
 from nep.messages.message import Message
 
 MAX_ANSWER_BYTES = 65_536
-"""Longer messages are not answers to a stop."""
+"""Maximum size of a reply to a Stop; longer messages are ignored."""
 SHOWN_WAIT_MS = 20.0
 """Shorter waits for the connection are not reported."""
 
 
 @dataclass
 class StopRequest:
-    """State of a stop: the programs that serve a robot and their answers, by node.
+    """State of a Stop: the programs that serve a robot and their replies, by node.
 
-    ``serving`` is empty until the programs are known. ``unknown`` has answers of publishers that the graph
+    ``serving`` is empty until the programs are known. ``unknown`` has replies of publishers that the graph
     does not list yet, ``foreign`` those of programs that do not serve the robot; they are decoded only once
-    their sender is known. ``delivered`` are the ways on which the command was sent while the robot was
+    their sender is known. ``delivered`` are the topics on which the command was sent while the robot was
     connected, the first at ``delivered_s``.
     """
 
@@ -44,33 +44,33 @@ class StopRequest:
 
     @property
     def is_settled(self) -> bool:
-        """Whether no answer is awaited."""
+        """True if no reply is awaited."""
         return bool(self.error) or self.is_answered
 
     @property
     def is_answered(self) -> bool:
-        """Whether all programs have answered."""
+        """True if all programs have replied."""
         return bool(self.serving) and None not in self.serving.values()
 
     @property
     def is_proven(self) -> bool:
-        """Whether all programs have confirmed that the robot stands still."""
+        """True if all programs have confirmed that the robot has stopped."""
         return bool(self.serving) and all(each and each.answered for each in self.serving.values())
 
     def sent(self, way: RobotTopics, now: float) -> None:
-        """Note that the command was sent on a connected way."""
+        """Record that the command was sent on a connected topic."""
         self.delivered.add(way)
         if self.delivered_s is None:
             self.delivered_s = now
 
     def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
-        """Return the answers that are not in ``told``, by node."""
+        """Return the replies that are not in ``told``, by node."""
         found, waits = self.serving.items(), None in self.serving.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
         return [(node, replace(each, waits=waits)) for node, each in said]
 
     def results(self) -> list[RobotStop]:
-        """Return a result for each program; programs without an answer are unproven."""
+        """Return a result for each program; programs without a reply are unproven."""
         unconnected = self.line.unconnected
         silent = RobotStop(
             self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
@@ -83,10 +83,10 @@ class StopRequest:
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
-        """Take a message of a program that must answer; return whether it changed the result.
+        """Apply a message of a program that must reply; return whether it changed the result.
 
-        A refusal may be followed by the word that it stands still after all; nothing else is taken back.
-        ``words`` makes the sentence of a refusal from the robot's error.
+        A refusal may be followed by a confirmation; nothing else is replaced. ``words`` formats the sentence
+        of a refusal from the robot's error.
         """
         told = answer_in(message)
         state = None if told is None else told.get("state")
@@ -109,7 +109,7 @@ class StopRequest:
         return True
 
     def impostors(self) -> list[str]:
-        """Return the nodes that answered this stop without serving the robot."""
+        """Return the nodes that replied to this Stop without serving the robot."""
         return [
             node
             for node, held in self.foreign.items()
@@ -120,7 +120,7 @@ class StopRequest:
 
 
 def answer_in(message: Message) -> Mapping[str, object] | None:
-    """Return the answer to a stop in a message, or None if it has none."""
+    """Return the reply to a Stop in a message, or None if it has none."""
     if message.size_bytes > MAX_ANSWER_BYTES:
         return None
     try:

@@ -38,22 +38,22 @@ _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_S = 120.0
-"""Late answers are accepted for this long."""
+"""Time during which late replies are accepted."""
 LATE_KEPT = 64
 MOST_SERVING = 32
-"""Limit of programs of one robot whose answers are awaited."""
+"""Maximum number of programs of one robot whose replies are awaited."""
 MOST_LISTENING = 4
-"""Limit of named programs that only subscribe to a robot's commands."""
+"""Maximum number of named programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
 """Interval of checks for a connection."""
 LOOK_S = 0.1
-"""Minimum interval of requests to the master while the publisher of an answer is unknown."""
+"""Minimum interval of graph queries while the publisher of a reply is unknown."""
 GRAPH_S = 0.3
 _NOBODY = "nobody"
 """Placeholder for the program of a robot until a graph lists it."""
 
 STOP_TIMEOUT_S = 1.0
-"""Timeout of a stop, unless the robot's description requires a longer one."""
+"""Timeout of a Stop, unless the robot's description requires a longer one."""
 MARGIN_S = 0.5
 LONGEST_STOP_S = 10.0
 
@@ -65,7 +65,7 @@ def patience_s(robots: Iterable[Robot], longest_s: float = LONGEST_STOP_S) -> fl
 
 
 class RobotStopper:
-    """Keep connections to all robots and stop them. Thread-safe."""
+    """Keeps connections to all robots and stops them. Thread-safe."""
 
     def __init__(
         self,
@@ -73,13 +73,13 @@ class RobotStopper:
         clock: Callable[[], float] = time.monotonic,
         longest_s: float = LONGEST_STOP_S,
     ) -> None:
-        """Start without robots; see `set_robots`. ``longest_s`` limits the wait for answers."""
+        # `longest_s` limits the wait for replies. Robots are added by `set_robots`.
         self._longest_s = longest_s
         self._node = node
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
         self._changed = threading.Condition()
-        self._making = threading.Lock()  # held while opening ways
+        self._making = threading.Lock()  # held while opening connections
         self._makers: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
         self._asked: dict[str, StopRequest] = {}
@@ -89,7 +89,7 @@ class RobotStopper:
         self._senders = Senders()
 
     def see(self, view: GraphView) -> None:
-        """Take a new graph, which decides whose answers count and which programs serve a robot."""
+        """Apply a new graph, which decides whose replies count and which programs serve a robot."""
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
@@ -102,7 +102,7 @@ class RobotStopper:
     def expect(self, targets: Iterable[StopTarget]) -> None:
         """Announce the current robots without connecting; `set_robots` connects.
 
-        Later stops wait for their connections.
+        Later Stops wait for their connections.
         """
         with self._changed:
             for target in targets:
@@ -142,14 +142,14 @@ class RobotStopper:
             return tuple(line.name for line in lines)
 
     def reaches(self, name: str) -> bool:
-        """Return whether the robot's program is connected, so that a stop would arrive now."""
+        """Return whether the robot's program is connected, so that a Stop would arrive now."""
         with self._changed:
             line = self._lines.get(name)
             way = None if line is None else line.ways.get(line.target.robot.topics)
             return line is not None and way is not None and self._is_connected(line, way)
 
     def deliver(self) -> None:
-        """Send pending stops to robots that have connected since. Call it with each tick.
+        """Send pending Stops to robots that have connected since. Call it at each tick.
 
         Stops stay pending for `LATE_S`.
         """
@@ -160,7 +160,7 @@ class RobotStopper:
             self._deliver(each)
 
     def forget_late(self, names: Iterable[str]) -> None:
-        """Drop pending stops of robots that the user has confirmed to stand still."""
+        """Discard pending Stops of robots that the user has confirmed to have stopped."""
         known = set(names)
         with self._changed:
             for id in [id for id, each in self._asked.items() if each.is_over and each.line.name in known]:
@@ -174,10 +174,10 @@ class RobotStopper:
             return {line.name: line.error for line in lines}
 
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
-        """Send a stop without waiting for answers.
+        """Send a Stop without waiting for replies.
 
-        ``ends`` is the key of a program (`app.robots.identity`), whose further commands robots refuse. Robots
-        that don't support it (RIZE) need another stop after the end of the program.
+        ``ends`` is the key of a program (`app.robots.identity`), whose further commands robots reject. Robots
+        that don't support it (RIZE) need another Stop after the end of the program.
         """
         for line in self._chosen(names):
             self._tell(line, _id(), ends)
@@ -191,16 +191,19 @@ class RobotStopper:
         on_late: Callable[[RobotStop], object] | None = None,
         is_for_all: bool = False,
     ) -> StopReport:
-        """Stop the robots (``names``, or all) and wait until each has answered.
+        """Stop the robots (``names``, or all) and wait until each has replied.
 
         Args:
             names: Robots to stop; the report has a line for each, including those that can't be reached.
             timeout_s: Longest wait; by default as long as the descriptions need, one second at least.
-            on_answer: Called in this thread with each answer, and at the end for each robot without one.
+            on_answer: Called in this thread with each reply, and at the end for each robot without one.
             ends: As in `send_stop`.
-            on_late: Called in the node's thread or in that of `see` when a robot answers after the timeout,
-                or confirms only then that it stands still.
-            is_for_all: Also send the stop to robots whose answer is not waited for.
+            on_late: Called in the node's thread or in that of `see` when a robot replies after the timeout,
+                or confirms only then that it has stopped.
+            is_for_all: Also send the Stop to robots whose reply is not awaited.
+
+        Returns:
+            One result for each robot.
         """
         names = None if names is None else tuple(names)
         began = self._clock()
@@ -224,7 +227,7 @@ class RobotStopper:
         deadline_s: float,
         on_answer: Callable[[RobotStop], object] | None,
     ) -> set[tuple[str, str]]:
-        """Wait until all requests are settled, or the deadline; return the reported (request, node) pairs."""
+        # Waits until all requests are settled, or the deadline; returns the reported (request, node) pairs.
         reported: set[tuple[str, str]] = set()
         while True:
             self._look_for(asked)
@@ -253,7 +256,7 @@ class RobotStopper:
     # ---- connections
 
     def _make(self, line: StopLine) -> None:
-        # Opens missing ways; a failure becomes the line's error. Call with `_making` held.
+        # Opens missing connections; a failure becomes the line's error. Call with `_making` held.
         error = ""
         for topics in line.target.ways:
             with self._changed:
@@ -286,7 +289,7 @@ class RobotStopper:
             raise
 
     def _make_missing(self, asked: Sequence[StopRequest]) -> None:
-        # Retries failed connections in a thread, so that the stop of other robots is not delayed.
+        # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
         missing = [each for each in asked if not each.line.is_whole]
         if not missing:
             return
@@ -342,7 +345,7 @@ class RobotStopper:
         return way.is_connected(line.target, hearers)
 
     def _deliver(self, asked: StopRequest) -> bool:
-        # Sends the command on newly connected ways; returns whether nothing is left to deliver.
+        # Sends the command on newly connected topics; returns whether nothing is left to deliver.
         with self._changed:
             if asked.is_answered or asked.line.target.robot.dialect == RIZE:
                 return True
@@ -361,7 +364,7 @@ class RobotStopper:
     def _tell(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
     ) -> str:
-        # Returns the reason if the stop could be sent on no way, else an empty string.
+        # Returns the reason if the Stop could be sent on no topic, else an empty string.
         robot = line.target.robot
         stop = robot.safe_stop.action
         if robot.dialect == RIZE:
@@ -381,7 +384,7 @@ class RobotStopper:
                 error = _("Stop can't be sent to {robot}: {why}").format(robot=robot.name, why=failed)
         return "" if sent else error
 
-    # ---- answers
+    # ---- replies
 
     def _is_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
         if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
@@ -389,7 +392,7 @@ class RobotStopper:
         return any(each.unknown for each in asked) and self._clock() - self._looked_s >= LOOK_S
 
     def _look_for(self, asked: Sequence[StopRequest]) -> None:
-        # Requests the graph while the programs of a robot or the publisher of an answer are unknown.
+        # Queries the graph while the programs of a robot or the publisher of a reply are unknown.
         with self._changed:
             waits = self._view is None or any(each.unknown for each in asked)
             now = self._clock()
@@ -402,10 +405,10 @@ class RobotStopper:
             for each in asked:
                 if not each.serving:
                     each.serving |= self._serving(each)
-                    self._judge_again(each)  # not late: the stop was sent just now
+                    self._judge_again(each)  # not late: the Stop was sent just now
 
     def _add_newcomers(self, asked: Sequence[StopRequest]) -> None:
-        # Programs newer than the last graph received the stop, too.
+        # Programs newer than the last graph received the Stop too.
         self._refresh_view()
         with self._changed:
             for each in asked:
@@ -418,13 +421,11 @@ class RobotStopper:
             self.see(self._node.graph(GRAPH_S))
 
     def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
-        """Return the programs that must answer, by node: the robot's own, then others that serve it.
-
-        Programs that receive its commands but can't answer are named.
-        """
+        # The programs that must reply, by node: the robot's own, then others that serve it. Programs that
+        # receive its commands but can't reply are named.
         target, view = asked.line.target, self._view or GraphView(0, 0)
         if target.robot.dialect == RIZE:
-            # RIZE never answers; a robot that could not be reached is not among them.
+            # RIZE never replies; a robot that could not be reached is not among them.
             return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
         identity = target.identity or first_to_announce(view, target.robot.topics.description)
         own = identity.node_id if identity is not None else _NOBODY
@@ -463,11 +464,9 @@ class RobotStopper:
             tell(said)
 
     def _judge_again(self, asked: StopRequest) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        """Process held answers whose publishers are known now; return late ones with their callbacks.
-
-        The lock is held here: whoever is told may need it. What is still unknown is let go of: its publisher
-        has not registered, or there is no master, and then nothing can be proven anyway.
-        """
+        # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
+        # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
+        # publisher has not registered, or the master is missing, and then nothing can be proven.
         held = asked.unknown.take()
         known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
         return [said for node, message in known for said in self._judge(asked, node, message)]
@@ -475,7 +474,7 @@ class RobotStopper:
     def _judge(
         self, asked: StopRequest, node: str | None, message: Message
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
-        """Take an answer of a program that must answer; return the callback if it is late."""
+        # Applies a reply of a program that must reply; returns the callback if it is late.
         if node is None or not asked.serving:
             asked.unknown.put(message)
             return []
@@ -519,7 +518,7 @@ class RobotStopper:
         return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(strangers)))
 
     def _forget_old(self) -> None:
-        # Drops stops whose late answers are no longer accepted.
+        # Discards Stops whose late replies are no longer accepted.
         now = self._clock()
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
