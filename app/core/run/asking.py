@@ -1,4 +1,4 @@
-"""The question of a running program that a person has not answered yet."""
+"""Open question of a running program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.core.run.runner import Runner, RunnerEvent
 
 @dataclass(frozen=True, slots=True)
 class AskedQuestion:
-    """A question as it is shown: of which run, its number there, its words, and what can be chosen."""
+    """Question of a run: its number, words and choices."""
 
     run: int
     number: int
@@ -18,28 +18,28 @@ class AskedQuestion:
 
 
 class Asking:
-    """One question at a time, as the program's process tells it."""
+    """Holds the program's question, one at a time."""
 
     def __init__(self) -> None:
         self.question: AskedQuestion | None = None
         self._runner: Runner | None = None
 
     def begin(self, runner: Runner) -> None:
-        """A program runs now, and may ask."""
+        """Begin with a new program."""
         self.question, self._runner = None, runner
 
     def take(self, event: RunnerEvent) -> None:
-        """The program asks, or takes its question back; other events are no matter of this."""
+        """Apply an event: a question or its withdrawal; others are ignored."""
         if event.kind == "ask" and self._runner is not None:
             number = event.question
             self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 
     def answer(self, question: AskedQuestion, words: str) -> None:
-        """A person answers this question; nothing happens when it is not asked any more."""
+        """Send the user's answer; no effect when the question is no longer open."""
         if self._runner is not None and question == self.question:
             self.question = None
             self._runner.answer(question.number, words)
 
     def clear(self) -> None:
-        """The program ends."""
+        """Clear the question: the program ends."""
         self.question = self._runner = None

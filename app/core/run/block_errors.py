@@ -1,4 +1,4 @@
-"""The errors that stand at blocks, each until its block is repaired or the next Run."""
+"""Errors shown at blocks until the block is repaired or the next run."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _CONTENT = ("type", "fields", "inputs", "extraState", "enabled", "disabledReason
 
 
 class BlockErrors:
-    """Sentences by the ids of blocks (``by_block``).
+    """Sentences by block id (``by_block``).
 
-    An error that kept a program from starting goes when the blocks no longer have it. One that stopped a
-    program goes when its block, or a block inside it, says something else than when Run was pressed.
+    An error that prevented the start is removed when the blocks no longer have it. One that stopped a program
+    is removed when its block, or a block inside it, differs from the run.
     """
 
     def __init__(self) -> None:
@@ -27,11 +27,11 @@ class BlockErrors:
         self._looked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
     def begin(self, wanted: Wanted) -> None:
-        """Forget the errors of the last run; this is to run now."""
+        """Clear the errors of the last run."""
         self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
 
     def put(self, errors: Mapping[str, str], *, not_started: bool) -> None:
-        """Remember errors, which kept the program from starting or stopped it."""
+        """Set errors that prevented the start or stopped the program."""
         self.by_block, self._not_started, self._looked = errors, not_started, None
 
     def forget_repaired(self) -> bool:

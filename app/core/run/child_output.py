@@ -1,4 +1,4 @@
-"""What a program's process says: lines of its protocol, with bounds on how many and how long."""
+"""Output of a program's process: protocol lines, limited in number and length."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import IO
 LONGEST_LINE = 1_000_000
 CHUNK = 65_536
 MARK = b'{"is"'
-"""How each line of the protocol begins; everything else is counted, not read."""
+"""First bytes of each protocol line; everything else is counted, not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
 REST_S = 0.02
@@ -18,34 +18,32 @@ LONGEST_TEXT = 2_000
 
 
 class Output:
-    """The lines of a pipe, at a rate that leaves the window its time: the pipe's writer waits meanwhile."""
+    """Lines of a pipe, throttled so that the window stays responsive: the writer blocks meanwhile."""
 
     def __init__(
         self, stream: IO[bytes], stopped: threading.Event, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`stopped` ends the resting between floods."""
+        # `stopped` ends the pauses between floods.
         self._stream, self._stopped, self._clock = stream, stopped, clock
         self.strange_bytes = 0
-        """How much of it was no line of the protocol."""
+        """Number of bytes that are not protocol lines."""
         self._second, self._lines, self._bytes = clock(), 0, 0
 
     def __iter__(self) -> Iterator[bytes]:
-        """Lines that may be of the protocol, until the pipe's end."""
+        # Possible protocol lines until the pipe's end.
         held = b""
         while chunk := self._read():
             whole, end, held = (held + chunk).rpartition(b"\n")
             yield from self._protocol(whole + end)
-            if len(held) > LONGEST_LINE:  # no end of line for a long time: it is none of ours
+            if len(held) > LONGEST_LINE:  # a line that is too long isn't a protocol line
                 self.strange_bytes += len(held) - 1
-                held = b"-"  # stands for a byte of it: neither is its end ours
+                held = b"-"  # placeholder, so that the rest of the line isn't parsed either
             self._rest(read=len(chunk))
         self.strange_bytes += len(held)
 
     def _protocol(self, whole: bytes) -> Iterator[bytes]:
-        """The lines of the protocol in whole lines. The others are skipped in one piece, not looked at.
-
-        A loop over a flood of short lines would keep the interpreter from the thread that stops the program.
-        """
+        # Other lines are skipped in one piece: a loop over a flood of short lines would keep the interpreter
+        # from the thread that stops the program.
         at = 0
         while at < len(whole):
             if whole.startswith(MARK, at):
@@ -60,7 +58,7 @@ class Output:
             found = whole.find(b"\n" + MARK, at)
             end = len(whole) if found < 0 else found + 1
             strange = whole[at:end]
-            while b"\n\n" in strange:  # empty lines say nothing
+            while b"\n\n" in strange:  # skip empty lines
                 strange = strange.replace(b"\n\n", b"\n")
             self.strange_bytes += len(strange.lstrip(b"\n"))
             at = end
@@ -72,7 +70,7 @@ class Output:
             return b""
 
     def _rest(self, *, lines: int = 0, read: int = 0) -> None:
-        """After too much in this second, leave the processor to others for a while."""
+        # Pauses when this second's limit is exceeded.
         now = self._clock()
         if now - self._second >= 1.0:
             self._second, self._lines, self._bytes = now, 0, 0
@@ -83,7 +81,7 @@ class Output:
 
 
 class Gate:
-    """Lets so many of a kind through in a second, and counts the others."""
+    """Rate limiter that counts what it rejects."""
 
     def __init__(self, per_second: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._per_second, self._clock = per_second, clock
@@ -91,7 +89,7 @@ class Gate:
         self.kept_back = 0
 
     def passes(self) -> bool:
-        """Whether one more may pass now."""
+        """Return whether one more may pass now."""
         now = self._clock()
         if now - self._second >= 1.0:
             self._second, self._passed = now, 0
@@ -102,7 +100,7 @@ class Gate:
         return True
 
     def take_kept_back(self) -> int:
-        """How many did not pass since the last time this was asked, once some can pass again."""
+        """Return and clear the number of rejected items, once some can pass again."""
         if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
             return 0
         count, self.kept_back = self.kept_back, 0
@@ -110,10 +108,10 @@ class Gate:
 
 
 def texts(said: object) -> tuple[str, ...]:
-    """The words of a list; none when it is something else."""
+    """Return the strings of a list; empty for any other type."""
     return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()
 
 
 def text_of(said: Mapping[str, object], name: str) -> str:
-    """A text that was said, of a length that can be shown."""
+    """Return a string field, shortened for display."""
     return str(said.get(name, ""))[:LONGEST_TEXT]

@@ -1,4 +1,4 @@
-"""A program's process and whatever it starts: bounded in memory, and ended as a whole."""
+"""Process of a program with its children: limited in memory, and killed as a whole."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ else:
     psutil = lazy_module("psutil")
 
 MOST_BYTES = 1_000_000_000
-"""How much memory a program may use, together with what it starts."""
+"""Maximum memory of a program and its children."""
 FAMILY_S = 1.0
-"""How often it is looked what the process has started; its own memory is looked at each time."""
+"""Interval of checks for new child processes; the program's own memory is checked each time."""
 
 
 class ChildProcess:
-    """The process with its three pipes. Methods may be called from any thread."""
+    """Process with its three pipes. Thread-safe."""
 
     def __init__(
         self,
@@ -39,12 +39,12 @@ class ChildProcess:
         most_bytes: int = MOST_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Start it; RunnerError if that is impossible."""
+        # Raises RunnerError if the process can't be started.
         self._most_bytes, self._clock = most_bytes, clock
         self._family: list[psutil.Process] = []
         self._next_family_s = clock() + FAMILY_S
         self.too_large = False
-        """Whether it was ended because of its memory."""
+        """True if it was killed because of its memory use."""
         try:
             self.popen = subprocess.Popen(
                 command,
@@ -54,7 +54,8 @@ class ChildProcess:
                 env={**os.environ, "PYTHONIOENCODING": "utf-8", "PYTHONUNBUFFERED": "1"},
                 cwd=cwd,
                 creationflags=NO_CONSOLE,
-                start_new_session=os.name == "posix",  # a group of its own, which can be ended at once
+                # a process group of its own, which can be killed at once
+                start_new_session=os.name == "posix",
             )
         except OSError as error:
             raise RunnerError(_("can't start the program's process: {error}").format(error=error)) from error
@@ -62,11 +63,11 @@ class ChildProcess:
 
     @property
     def ended(self) -> bool:
-        """Whether it has gone."""
+        """True if the process has ended."""
         return self.popen.poll() is not None
 
     def look(self) -> None:
-        """Notice what it has started, and end it when it uses too much memory."""
+        """Find its children, and kill it when it uses too much memory."""
         if self._process is None:
             return
         if self._clock() >= self._next_family_s:
@@ -77,7 +78,7 @@ class ChildProcess:
             self.kill()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for its end; whether it has ended."""
+        """Wait for its end; return whether it has ended."""
         try:
             self.popen.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -85,33 +86,33 @@ class ChildProcess:
         return True
 
     def kill(self) -> None:
-        """End it and whatever it has started, without asking."""
+        """Kill the process and its children."""
         if self._process is not None and not self.ended:
             self._family = [*self._family, *_descendants(self._process)]
         self.popen.kill()
         self.end_family()
 
     def end_family(self) -> None:
-        """End what it has left behind: its group, and those of its children that have left the group."""
+        """Kill remaining children: its process group, and those that left the group."""
         if os.name == "posix":
-            with contextlib.suppress(ProcessLookupError, PermissionError):  # nobody is left in it
+            with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is empty
                 os.killpg(self.popen.pid, signal.SIGKILL)
         for process in self._family:
             try:
-                process.kill()  # psutil makes sure that it is still the same one
+                process.kill()  # psutil checks that the id was not reused
             except psutil.Error:
                 continue
 
 
 def child_command() -> tuple[str, ...]:
-    """How to start a program's process: this Python, or the frozen Studio as its own child."""
+    """Return the command of a program's process: this Python, or the frozen Studio itself."""
     if getattr(sys, "frozen", False):
         return (sys.executable, "--child")
     return (sys.executable, "-m", "app.blocks.runtime.child")
 
 
 def home() -> Path | None:
-    """Where ``app`` is found when it is not installed."""
+    """Return the folder of ``app`` if it isn't installed."""
     return None if getattr(sys, "frozen", False) else Path(__file__).resolve().parents[3]
 
 

@@ -1,4 +1,4 @@
-"""Run, Pause, Step and Stop: the program's process and the robots' answers."""
+"""Run, Pause, Step and Stop: the program's process and the robots' replies."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from app.errors import AppError
 from nep.i18n import _
 
 PRESSED_TWICE_S = 0.5
-"""Two presses of Run within this time are one: a double click."""
+"""Time within which two presses of Run count as a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 
 _log = logging.getLogger("studio")
@@ -75,7 +75,6 @@ class Runs:
         clock: Callable[[], float] = time.monotonic,
         make_runner: Callable[[Callable[[RunnerEvent], object]], Runner] = Runner,
     ) -> None:
-        """Start idle. ``make_runner`` creates the runner of one program, which posts its events."""
         self._documents, self._fleet, self._network = documents, fleet, network
         self._alerts, self._console, self._post_event, self._clock = alerts, console, post_event, clock
         self._make_runner = make_runner
@@ -113,7 +112,7 @@ class Runs:
 
     @property
     def active(self) -> bool:
-        """Whether a program is running or paused."""
+        """True if a program is running or paused."""
         return self._run.state in {"running", "paused"}
 
     @property
@@ -157,7 +156,7 @@ class Runs:
             self._run = replace(self._run, edited=edited)
 
     def _follow_breakpoints(self) -> None:
-        """Send changed breakpoints to the running program."""
+        # Sends changed breakpoints to the running program.
         newest = self.document.newest() if self.document is not None else None
         if newest is None or self._runner is None or newest.breakpoints == self._breakpoints:
             return
@@ -204,7 +203,7 @@ class Runs:
             self._want(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
-        """Show the value of a variable in the current or last run; a new program would lack it."""
+        # A new program would lack the value of the current or last run.
         document = self._documents.current
         value = self.values.get(id) if self.document is document else None
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
@@ -216,7 +215,7 @@ class Runs:
         )
 
     def _want(self, wanted: Wanted) -> None:
-        """Run a behaviour once the running program has stopped and its robots are proven to stand still."""
+        # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
             return
@@ -264,7 +263,7 @@ class Runs:
             self._mark(stopped=())
 
     def stop(self) -> None:
-        """End the program and stop every robot; the run bar shows their answers."""
+        """Stop the program and every robot; the run bar shows their replies."""
         self.also_stops()
         self._asked_again.clear()
         self._next = None
@@ -302,12 +301,12 @@ class Runs:
             self._stop_one(name)
 
     def follow_robots(self) -> None:
-        """Inform the running program about new and restarted robots, as far as they may move."""
+        """Report new and restarted robots to the running program, as far as they may move."""
         if self.active:
             self._robots.follow()
 
     def confirm_still(self) -> None:
-        """Take the user's confirmation that the robots without an answer stand still."""
+        """Apply the user's confirmation that the robots without a reply have stopped."""
         if self._run.state == "unanswered" and self._run.report is not None:
             silent = self._run.report.silent
             self._fleet.stands_still(silent)
@@ -316,14 +315,14 @@ class Runs:
             self._settle()
 
     def _settle(self) -> None:
-        """Unlock Run once every robot of the last stop is proven or confirmed to stand still."""
+        # Unlocks Run once every robot of the last Stop is proven or confirmed to have stopped.
         report = self._run.report if self._run.state == "unanswered" else None
         if report is not None and not any(name in self._fleet.moved for name in report.silent):
             self._run = replace(self._run, state="ready", report=None)
             self._alerts.resolve("stop")
 
     def close(self) -> None:
-        """End the program, whose end stops its robots."""
+        """Stop the program, whose end stops its robots."""
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
@@ -371,7 +370,7 @@ class Runs:
         return self._run
 
     def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
-        """Apply the answers of robots to the newest stop."""
+        """Apply the replies of robots to the newest Stop."""
         if isinstance(event, OneStopped):
             self._news.tell_fleet(event.report, event.mark)
             self._news.tell_person(event.report, "stop")
@@ -389,7 +388,7 @@ class Runs:
                 self._take_report(event.report)
 
     def _take_report(self, report: StopReport) -> None:
-        # State first, words later: an error in the words must not leave it "stopping".
+        # State first, sentences later: an error in formatting must not leave it "stopping".
         state = "unanswered" if report.unproven else "proven" if report.proven else "ready"
         self._run = replace(self._run, state=state, report=report, last_status=report.status)
         self._news.tell_fleet(report, self._stop_mark)
@@ -402,7 +401,7 @@ class Runs:
             self._begin(wanted)
 
     def _on_late(self, event: LateAnswer) -> None:
-        # A late answer counts unless the state has changed since.
+        # A late reply counts unless the state has changed since.
         run = self._run
         if event.number is None:
             self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
@@ -468,7 +467,7 @@ class Runs:
         self._console.add("info", self._run.name, said)
 
     def _what_runs(self, wanted: Wanted) -> Program | None:
-        """Return the program if it has blocks to run and no problems; else show the reason in the run bar."""
+        # None if it has no blocks to run or has problems; the run bar shows the reason.
         program = wanted.program()
         wrong = {} if program is None else wanted.problems(program)
         if program is None or (program.starts and not wrong):
@@ -482,12 +481,12 @@ class Runs:
         return None
 
     def _begin_now(self, wanted: Wanted) -> None:
-        """Begin after the user's permission, unless another run has begun meanwhile."""
+        # After the user's permission, unless another run has begun meanwhile.
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
 
     def _on_print(self, event: RunnerEvent) -> None:
-        """Show a printed line: in the Console, or as the value of a tried block."""
+        # Shown in the Console, or as the value of a tried block.
         words = self._trial.take(event.text)
         if words is None:
             self._console.add("info", self._run.name, event.text)
@@ -509,14 +508,13 @@ class Runs:
         finished = event.ok and not self._run.errors
         if finished:
             self._mark()
-        # the end of a program is a stop like any other: every robot that it used must answer
+        # the end of a program is a Stop like any other: every robot that it used must reply
         self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
         self._run = replace(self._run, finished=finished)
         if not event.ok and not self._run.errors:
             self._alerts.put("program", "error", _("The behaviour ended unexpectedly."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
-        """Stop the robots ``names``, or all."""
         self.asking.clear()
         run = self._run
         now, elapsed_s = self._clock(), run.elapsed_s
@@ -525,7 +523,7 @@ class Runs:
             self._warnings.end()
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
-        # includes robots that have not answered an earlier stop, whose report is discarded
+        # includes robots that have not replied to an earlier Stop, whose report is discarded
         wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unheard)
         asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping)))
         self._run = replace(

@@ -1,4 +1,4 @@
-"""Whether the blocks of the behaviour that runs say something else than when Run was pressed."""
+"""Detection of changes to the running behaviour since Run was pressed."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from app.blocks.model.program import Program
 
 
 class RunDocument(Protocol):
-    """What is needed of the behaviour that runs."""
+    """Part of the running behaviour that is used here."""
 
     edits: int
 
     def newest(self) -> Program | None:
-        """The program of its newest edit that is compiled."""
+        """Return the program of the newest compiled edit."""
 
 
 class EditsSinceRun:
-    """Compares the program that runs with that of the blocks now; one that was undone is the same again.
+    """Compares the running program with the current blocks; an undone edit counts as unchanged.
 
-    A block that is only moved to another place changes nothing. Robots that come or go change the program,
-    too, but not the blocks.
+    Moving a block on the canvas changes nothing. Robots that connect or disconnect change the program but not
+    the blocks.
     """
 
     def __init__(self) -> None:
@@ -31,13 +31,13 @@ class EditsSinceRun:
         self._differs = False
 
     def ran(self, document: RunDocument | None, program: Program) -> None:
-        """This program of this behaviour runs now; None: edits are no matter of what runs."""
+        """Set the running program of a behaviour; None ignores edits."""
         self._document, self._ran = document, program.runnable
         self._edits = 0 if document is None else document.edits
         self._looked, self._differs = program, False
 
     def seen(self) -> bool:
-        """Whether the blocks say something else now; each program is compared once."""
+        """Return whether the blocks differ now; each program is compared once."""
         if self._document is None:
             return False
         newest = self._document.newest()
@@ -45,6 +45,6 @@ class EditsSinceRun:
             return self._differs
         self._looked = newest
         if self._document.edits == self._edits:
-            self._ran = newest.runnable  # robots came or went: Restart would not do what a person changed
+            self._ran = newest.runnable  # robots connected or disconnected: Restart would not apply an edit
         self._differs = newest.runnable != self._ran
         return self._differs

@@ -1,4 +1,4 @@
-"""Which robots a program that runs knows of: those that came, or were started anew, are told to it."""
+"""Robots known to a running program: new and restarted ones are reported to it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from nep.programs.robots.moving import MovingTopics
 
 
 def owners_of(fleet: Fleet) -> dict[str, str]:
-    """The nodes that the connected robots are, by the robots' names."""
+    """Return the node ids of the connected robots by name."""
     return {link.name: link.identity.node_id for link in fleet.connected if link.identity is not None}
 
 
 class ProgramRobots:
-    """Tells a program about its robots. One that may move is told of after a person was asked."""
+    """Reports robots to a program. A robot that may move is reported after the user's permission."""
 
     def __init__(self, fleet: Fleet) -> None:
-        """No program yet: `begin`."""
         self._fleet = fleet
         self._runner: Runner | None = None
         self._asked: Mapping[str, Sequence[str]] = {}
@@ -31,20 +30,20 @@ class ProgramRobots:
     def begin(
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
-        """A program runs that knows these ``owners``; ``asked`` is what it asks of its robots."""
+        """Begin with a running program that knows these ``owners``; ``asked`` are its actions by robot."""
         self._runner, self._told, self._revision = runner, owners, self._fleet.revision
         moving, connected = self._fleet.moving, {link.name for link in self._fleet.connected}
-        # it was started with the connected robots; of others, which can't be read, the next tick tells
+        # the program was started with the connected robots; unreadable ones are reported at the next tick
         self._moving = moving if connected.issuperset(moving.robots) else MovingTopics()
         self._topics = self._moving.topics
         self._asked = {robot.name: actions for robot, actions in asked}
 
     def end(self) -> None:
-        """The program has ended: it is told nothing more."""
+        """Stop reporting: the program has ended."""
         self._runner = None
 
     def follow(self) -> None:
-        """Tell the program which robots there are now, if that has changed."""
+        """Report the present robots to the program, if they changed."""
         if self._runner is None or not self._has_changed():
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)
@@ -72,7 +71,7 @@ class ProgramRobots:
             return
         owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
         anew = [name for name, id in owners.items() if name in self._asked and self._told.get(name) != id]
-        self._fleet.moved.note(anew, "behaviour")  # under the program that the robot is now
+        self._fleet.moved.note(anew, "behaviour")  # of the robot's current program
         self._told = {**self._told, **owners}
         self._topics = self._fleet.moving.topics
         self._runner.set_robots(owners, self._topics)

@@ -1,4 +1,4 @@
-"""What a program is warned of at its blocks: each warning stands there until the next Run or edit."""
+"""Warnings of a program at its blocks, shown until the next run or edit."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from nep.i18n import ngettext
 
 
 class RunWarnings:
-    """The newest warning of each block. The Console has it once, then when it was 10, 100, … times so."""
+    """Newest warning of each block. The Console shows its 1st, 10th, 100th, … occurrence."""
 
     def __init__(self, log: Callable[[str], object]) -> None:
-        """``log`` puts a warning into the Console."""
         self._log = log
         self.by_block: Mapping[str, str] = {}
         self._counts: dict[tuple[str, str], int] = {}
@@ -19,7 +18,7 @@ class RunWarnings:
         self._edits = 0
 
     def begin(self) -> None:
-        """Another run begins."""
+        """Clear everything for a new run."""
         self.by_block = {}
         self._counts, self._logged = {}, {}
 
@@ -31,7 +30,7 @@ class RunWarnings:
         return True
 
     def add(self, block: str, sentence: str, count: int, edits: int = 0) -> None:
-        """Add a warning that this run has given ``count`` times; ``edits`` of the behaviour so far."""
+        """Add a warning with its number of occurrences in this run, at the behaviour's edit count."""
         self._edits = edits
         key = (block, sentence)
         self._counts[key] = count
@@ -40,7 +39,7 @@ class RunWarnings:
             self._tell(key)
 
     def end(self) -> None:
-        """The run has ended: how often in the end."""
+        """Log the final counts."""
         for key, count in self._counts.items():
             if count != self._logged[key]:
                 self._tell(key)
@@ -51,7 +50,7 @@ class RunWarnings:
 
 
 def counted(sentence: str, count: int) -> str:
-    """The sentence, and how often: once is not said."""
+    """Return the sentence with its count if it occurred more than once."""
     if count == 1:
         return sentence
     return ngettext("{sentence} ({count} time)", "{sentence} ({count} times)", count).format(

@@ -1,4 +1,4 @@
-"""Runner: a program in a process of its own, which can be paused, stepped, and always ended."""
+"""Runner of a program in a process of its own, which can be paused, stepped, and always stopped."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ Kind = Literal[
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
 ASK_S = 0.04
-"""How long a stopped program may take to end by itself; then it is killed. Together well below 100 ms."""
+"""Time that a stopped program gets to end before it is killed; stopping takes well below 100 ms in all."""
 END_S = 2.0
-"""How long a process whose program has ended may take to end."""
+"""Time that a process gets to end after its program has ended."""
 LOOK_S = 0.1
-"""How often its memory is looked at."""
+"""Interval of the memory checks."""
 PIPE_S = 0.5
-"""How long its pipes may go on after it has gone: somebody that it has started may hold them."""
+"""Time that its pipes may stay open after its end: its child processes may hold them."""
 EVENTS_PER_S = 300
 MOST_BLOCKS = 100
 MOST_CHOICES, LONGEST_CHOICE = 12, 200
 WORTH_TELLING = 10_000
 LONGEST_ERROR = 100_000
 ERRORS_KEPT = 200
-"""Lines: also where each thread was when native code crashed."""
+"""Number of lines, which include the stack of each thread at a crash in native code."""
 
 _runs = itertools.count(1)
 _log = logging.getLogger("studio.runner")
@@ -53,15 +53,15 @@ _log = logging.getLogger("studio.runner")
 
 @dataclass(frozen=True)
 class RunnerEvent:
-    """What a program's process said.
+    """Event of a program's process.
 
-    ``run`` is the number of the runner's program. ``blocks`` run now (kind running), are held (paused; the
-    first is the next one), or failed (error). ``says`` is what happens, in words (for paused: the next block
-    in words); ``text`` a printed line, what a person should know (paused), an error's sentence, or at the end
-    why it did not end well, or what it asks (ask), whose number is ``question``; 0: it asks nothing any more.
-    One of ``choices`` is its answer, where there are any.
-    ``ok``: it ended, and no block failed. ``silent``: robots that did not answer the program's own stop at
-    its end. ``values`` are the variables whose values have changed. ``count``: a warning was so often so.
+    ``run`` is the number of the runner's program. ``blocks`` are running (kind running), held (paused; the
+    first is the next one), or failed (error). ``says`` describes what runs (paused: the next block). ``text``
+    is a printed line, a warning for the user (paused), an error's sentence, the reason of a failure at the
+    end, or a question (ask) with the number ``question``; 0 withdraws the question. ``choices`` are its
+    possible answers, if restricted. ``ok``: it ended without a failed block. ``silent``: robots that did not
+    reply to the program's own Stop at its end. ``values`` are the changed variables. ``count`` is the number
+    of occurrences of a warning.
     """
 
     kind: Kind
@@ -81,7 +81,7 @@ class RunnerEvent:
 class Runner:
     """Runs one program. `on_event` is called in threads of its own; "ended" comes exactly once, and last.
 
-    A program that floods Studio, takes too much memory or leaves processes behind is bounded, and told about.
+    A program that floods Studio, uses too much memory or leaves processes behind is limited, and reported.
     """
 
     def __init__(
@@ -92,12 +92,12 @@ class Runner:
         most_bytes: int = MOST_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`command` starts the child, by default this Python or this frozen Studio."""
+        # `command` starts the child; the default is this Python or this frozen Studio.
         self.run = next(_runs)
         self.program_key = uuid.uuid4().hex
-        """A stop with it ends the program: nothing it sent moves a robot later. Not told before."""
+        """Key of the program: a Stop with it invalidates its commands. Not published before."""
         self.program_id = program_of(self.program_key)
-        """Who the robots' commands are from."""
+        """Sender id of the program's commands."""
         self.state: State = "ready"
         self._on_event = on_event
         self._command = tuple(command) if command is not None else child_command()
@@ -112,7 +112,7 @@ class Runner:
 
     @property
     def pid(self) -> int | None:
-        """The child's process id, None before `start`."""
+        """Process id of the child, None before `start`."""
         return None if self._child is None else self._child.popen.pid
 
     def start(
@@ -126,10 +126,10 @@ class Runner:
         pace_s: float = 0.0,
         owners: Mapping[str, str] | None = None,
     ) -> None:
-        """Start the program; `robots` are the descriptions of those that are connected.
+        """Start the program; `robots` are the descriptions of the connected robots.
 
-        `owners` are the ids of the nodes that they are, by their names: only what these say counts. `pace_s`
-        is slow motion (`set_pace`). RunnerError if its process can't be started.
+        `owners` are their node ids by name: only messages of these nodes count. `pace_s` is slow motion
+        (`set_pace`). Raises RunnerError if the process can't be started.
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
@@ -152,7 +152,8 @@ class Runner:
         self._thread(self._write, "input")
         errors = self._thread(lambda: self._read_errors(child), "errors")
         reader = self._thread(lambda: self._read(child), "output")
-        self._thread(lambda: self._watch(child, reader, errors), "watch")  # last: it waits for the others
+        # last, because it waits for the others
+        self._thread(lambda: self._watch(child, reader, errors), "watch")
 
     def _thread(self, work: Callable[[], None], label: str) -> threading.Thread:
         thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
@@ -161,28 +162,28 @@ class Runner:
         return thread
 
     def set_pace(self, seconds: float) -> None:
-        """Slow motion: how long each script stays at a block before it is done; 0 for none."""
+        """Set slow motion: seconds that each script waits at a block; 0 for none."""
         self._orders.put({"do": "pace", "pace_s": seconds})
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
-        """Robots have come, or were started anew: the nodes that they are, and the topics that move them."""
+        """Report new or restarted robots: their node ids, and the topics that move them."""
         topics = {topic: list(names) for topic, names in guarded.items()}
         self._orders.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
     def put_variable(self, python: str, value: str | float | bool) -> None:
-        """Give a variable another value while the program runs; ``python`` is its name there."""
+        """Set a variable of the running program; ``python`` is its name there."""
         self._orders.put({"do": "variable", "python": python, "value": value})
 
     def set_breakpoints(self, blocks: Sequence[str]) -> None:
-        """The program pauses before these blocks from now on, and before no others."""
+        """Set the blocks before which the program pauses."""
         self._orders.put({"do": "breakpoints", "blocks": list(blocks)})
 
     def pause(self) -> None:
-        """Hold the program, and what its robots do; the event "paused" says when all stand still."""
+        """Pause the program and its robots; the event "paused" reports when all are still."""
         self._orders.put({"do": "pause"})
 
     def go_on(self) -> None:
-        """Let a paused program go on."""
+        """Resume a paused program."""
         if self.state == "paused":
             self.state = "running"
         self._orders.put({"do": "go"})
@@ -192,13 +193,13 @@ class Runner:
         self._orders.put({"do": "step"})
 
     def answer(self, question: int, words: str) -> None:
-        """What a person answers to a question of the program."""
+        """Answer a question of the program."""
         self._orders.put({"do": "answer", "question": question, "text": words})
 
     def stop(self) -> None:
-        """End the program: it is asked, and killed if it has not ended at once. It is gone within 100 ms.
+        """Stop the program: ask it to end, and kill it if it doesn't at once. It has ended within 100 ms.
 
-        Works in every state and from any thread. `app.core.robots.stop.stopper` stops its robots.
+        Works in every state. Thread-safe. `app.core.robots.stop.stopper` stops its robots.
         """
         child = self._child
         if child is None:
@@ -212,20 +213,20 @@ class Runner:
             child.wait(END_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the program has ended and its last event was told; whether it has."""
+        """Wait until the program has ended and its last event was delivered; return whether it has."""
         return self._ended.wait(timeout_s)
 
     def close(self) -> None:
-        """End the program and the threads."""
+        """Stop the program and the threads."""
         self.stop()
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(timeout=END_S)
 
-    # ---- inside
+    # ---- private
 
     def _write(self) -> None:
-        """Send orders; a thread of its own, because a child that hangs does not read."""
+        # In a thread of its own, because a child that hangs does not read.
         child = self._child
         if child is None or child.popen.stdin is None:
             return
@@ -235,10 +236,9 @@ class Runner:
                     stream.write(json.dumps(order).encode() + b"\n")
                     stream.flush()
         except (OSError, ValueError):
-            return  # it has ended; the reader tells
+            return  # the child has ended; the reader reports it
 
     def _read(self, child: ChildProcess) -> None:
-        """Tell what the child says, until its last word or the end of its pipe."""
         if child.popen.stdout is None:
             return
         output, gate = Output(child.popen.stdout, self._ended, self._clock), Gate(EVENTS_PER_S, self._clock)
@@ -264,7 +264,6 @@ class Runner:
         self._on_event(event)
 
     def _left_out(self, events: int, strange_bytes: int) -> None:
-        """Say how much was not shown."""
         if events:
             text = ngettext(
                 "{count} line was dropped: too many at once",
@@ -279,17 +278,16 @@ class Runner:
             self._on_event(RunnerEvent("print", self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
-        """Look after the child until it has gone, then tell its end."""
         while not child.ended and not self._output_over.wait(LOOK_S):
             child.look()
-        self._orders.put(None)  # its input ends, and with it a child that still waits for orders
+        self._orders.put(None)  # closes its input, which ends a child that still waits for commands
         hung = not child.wait(END_S)
         if hung:
             child.kill()
             child.wait(END_S)
-        child.end_family()  # what it has left behind would hold its pipes open
+        child.end_family()  # remaining children would hold its pipes open
         reader.join(timeout=PIPE_S)
-        errors.join(timeout=PIPE_S)  # its last words
+        errors.join(timeout=PIPE_S)  # its last output
         was_stopped = self.state == "stopping"
         self.state = "ended"
         last = self._last
@@ -303,7 +301,6 @@ class Runner:
         return round(self._clock() - self._began_s, 3)
 
     def _why(self, child: ChildProcess, *, hung: bool) -> str:
-        """Why a process ended that did not say so."""
         if child.too_large:
             return _("The program used more than {size} GB of memory and was stopped.").format(
                 size=number(self._most_bytes / 1e9)
@@ -324,7 +321,7 @@ class Runner:
         return f"{how}: {words.strip()}." if words else f"{how}."
 
     def _read_errors(self, child: ChildProcess) -> None:
-        """Keep the last lines of what went wrong; a line without an end is cut."""
+        # Keeps the last lines; a line without an end is cut.
         stream = child.popen.stderr
         if stream is None:
             return
@@ -335,7 +332,6 @@ class Runner:
             stream.close()
 
     def _event(self, line: bytes) -> RunnerEvent | None:
-        """The event of a line; None for what the child's protocol does not know."""
         try:
             said = json.loads(line)
         except (ValueError, RecursionError):

@@ -22,9 +22,9 @@ def stop_program(
     *,
     is_for_all: bool,
 ) -> None:
-    """End the program of ``runner`` and stop the robots ``names``; blocks until they answered or timed out.
+    """Stop the program of ``runner`` and the robots ``names``; blocks until they replied or timed out.
 
-    ``number`` identifies the stop in the posted events. ``ends`` and ``is_for_all`` as in
+    ``number`` identifies the Stop in the posted events. ``ends`` and ``is_for_all`` as in
     `app.core.robots.stop.stopper.RobotStopper.stop_all`.
     """
 
@@ -45,7 +45,7 @@ def stop_program(
 
 
 def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, mark: int) -> None:
-    """Stop one robot; blocks until it answered or timed out. ``mark`` is of `MovedRobots`."""
+    """Stop one robot; blocks until it replied or timed out. ``mark`` is of `MovedRobots`."""
 
     def late(robot: RobotStop) -> None:
         post_event(LateAnswer(None, robot, mark))

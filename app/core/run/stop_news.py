@@ -1,4 +1,4 @@
-"""What a stop brought is told to the person (Console, alerts) and to the fleet."""
+"""Reports of a Stop to the user (Console, alerts) and to the fleet."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from nep.i18n import _
 
 
 class StopNews:
-    """Tells of stops. One thread uses it (the window's)."""
+    """Reports Stops. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, fleet: Fleet, alerts: Alerts, console: Console) -> None:
         self._fleet, self._alerts, self._console = fleet, alerts, console
 
     def tell_fleet(self, report: StopReport, mark: int) -> None:
-        """Tell what a stop proved that began at ``mark`` (`MovedRobots.mark`), then the words for it."""
+        """Apply the result of a Stop that began at ``mark`` (`MovedRobots.mark`), then its sentences."""
         self._fleet.moved.take(report, mark)
         clock = clock_words(time.localtime())
         words = {name: (stop_words(each, clock), each.status) for name, each in report.by_name.items()}
         self._fleet.stopped(words, report)
 
     def doubts(self, report: StopReport) -> tuple[str, ...]:
-        """What is known of why robots that are not proven to stand still may move, and who is told later."""
+        """Return why robots without a confirmation may move, and which receive the Stop later."""
         pending = [name for name, robot in report.by_name.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.silent)
         return (
@@ -38,7 +38,7 @@ class StopNews:
         )
 
     def tell_person(self, report: StopReport, origin: str) -> None:
-        """Tell in the Console, for ``origin``, and by an alert as long as a robot may still move."""
+        """Report in the Console, for ``origin``, and by an alert while a robot may still move."""
         for name, program in report.strangers:
             said = _("“{program}” answered Stop in the name of {robot}; that does not count").format(
                 program=program, robot=name

@@ -1,4 +1,4 @@
-"""One stack of a behaviour that is tried alone: its words while it runs, and the value that it has."""
+"""Trial of one stack of a behaviour: its label while it runs, and its value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class TriedValue:
-    """The value of a block that was tried, in words; ``number``: of the try."""
+    """Value of a tried block, formatted; ``number`` counts the trials."""
 
     document: Document
     block: str
@@ -25,7 +25,7 @@ class TriedValue:
 
 
 class Trial:
-    """What is known of the stack that is tried, or was tried last; of a whole behaviour nothing."""
+    """State of the current or last trial; empty for a whole behaviour."""
 
     def __init__(self) -> None:
         self.value: TriedValue | None = None
@@ -34,18 +34,18 @@ class Trial:
         self._unit = ""
 
     def begin(self, wanted: Wanted) -> None:
-        """This is to run now; the value of the one before is forgotten."""
+        """Begin with a request; discards the value of the previous trial."""
         self._wanted, self._unit, self.value = wanted, "", None
 
     def start(self, program: Program, robots: Iterable[Robot]) -> str:
-        """Its program runs with these robots; the words of the block that is tried, "" of a behaviour."""
+        """Start with these robots; return the label of the tried block, "" for a behaviour."""
         if self._wanted is None:
             return ""
         self._unit = self._wanted.unit(program, robots)
         return self._wanted.words(program)
 
     def take(self, line: str) -> str | None:
-        """Take a line that the program has written as the value that is tried; None: it is none."""
+        """Return a printed line formatted as the tried value; None if the trial has no value."""
         wanted = self._wanted
         if wanted is None or wanted.stack is None or not wanted.gives_value:
             return None
@@ -54,5 +54,5 @@ class Trial:
         return words
 
     def show(self, document: Document, stack: Stack, words: str) -> None:
-        """This is the value of the block."""
+        """Set the value of the block."""
         self.value = TriedValue(document, stack.id, words, next(self._tries))

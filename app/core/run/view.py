@@ -1,4 +1,4 @@
-"""What the run bar says: the six states of Run and Stop in plain words, made from the state of a run."""
+"""Contents of the run bar: the six states of Run and Stop in words, made from the state of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nep.i18n import _, lazy, listed, ngettext, number
 
 MOST_NAMED = 4
 WIDEST_NAMES = 24
-"""Longer names of robots are not repeated on the button beside the sentence that has them."""
+"""Maximum length of robot names on the button; longer ones are only in the sentence beside it."""
 APPLIES_LATER = lazy("Your changes apply at the next Run")
 NOTHING = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
@@ -20,16 +20,15 @@ STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 @dataclass(frozen=True, slots=True)
 class RunState:
-    """Where the run is, as a value: what happens makes another one.
+    """State of a run, immutable: each event creates a new one.
 
-    ``state`` is ready, running, paused, stopping, proven or unanswered; ready with a ``report`` after a stop
-    that had no robot to tell. ``doubts`` say why robots may move that did not answer (`MovedRobots`).
-    ``warning`` is what a person should know before a paused program goes on. Times are monotonic seconds; the
-    program's clock stands while it is paused (``held_s``, ``pause_began_s``). ``again``: the stop before this
-    one is not proven. ``restarts``: something is run as soon as this stop is proven. ``edited``: the
-    behaviour is not what runs any more.
-    ``trying``: the words of the block that is tried alone, ``value`` what it gave. ``begun``: its scripts
-    run, so that it feels what happens to robots; its process is there some tenths of a second before.
+    ``state`` is ready, running, paused, stopping, proven or unanswered; ready with a ``report`` after a Stop
+    without robots. ``doubts`` are reasons why robots that did not reply may move (`MovedRobots`). ``warning``
+    is shown before a paused program resumes. Times are monotonic seconds; the program's clock stops while it
+    is paused (``held_s``, ``pause_began_s``). ``again``: the previous Stop is not proven. ``restarts``: a
+    program starts as soon as this Stop is proven. ``edited``: the behaviour differs from the running program.
+    ``trying`` is the label of a tried block, ``value`` its value. ``begun``: its scripts run and receive
+    events; its process starts some tenths of a second before.
     """
 
     state: str = "ready"
@@ -54,13 +53,13 @@ class RunState:
     finished: bool = False
     dashed: bool = False
     errors: Mapping[str, str] = field(default_factory=dict)
-    nothing_in: object = None  # the program that Run was pressed for: it had nothing to run, or `errors`
+    nothing_in: object = None  # the program that Run was pressed for, which had nothing to run, or `errors`
     last_words: str = ""
     last_status: StopStatus = "off"
     doubts: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
-        """Seconds that the program has run, pauses left out."""
+        """Return the running time in seconds without pauses."""
         held = self.held_s
         if self.pause_began_s is not None:
             held += now - self.pause_began_s
@@ -69,12 +68,12 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class RunView:
-    """Everything the run bar shows, large and compact.
+    """Contents of the run bar, large and compact.
 
-    ``result`` stands beside Stop with its icon and colour (``result_status``); ``last_stop`` is the small
-    reminder while a program runs, with its own (``last_stop_status``); ``confirm`` are the words of the
-    button with which a person says that a silent robot is still. ``edited``: what runs is not what the blocks
-    say now, so Restart is the next thing to do.
+    ``result`` is shown beside Stop with its icon and colour (``result_status``); ``last_stop`` is a small
+    reminder while a program runs, with its own status (``last_stop_status``); ``confirm`` is the label of the
+    button by which the user confirms that a silent robot has stopped. ``edited``: the running program differs
+    from the blocks, so that Restart is the suggested next step.
     """
 
     state: str
@@ -98,7 +97,10 @@ class RunView:
 
 
 def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
-    """The block at which a program is held: in words, or its name when they hold a quotation."""
+    """Return the label of the block at which a program is held.
+
+    Its words, or its name if they contain a quotation.
+    """
     if "“" not in says or not blocks:
         return says
     return labels.get(blocks[0], says)
@@ -113,10 +115,10 @@ def view_of(
     elsewhere: bool = False,
     slow: bool = False,
 ) -> RunView:
-    """The run bar for this state, the names of the connected robots, and the time; ``slow``: slow motion.
+    """Return the run bar for a state, the names of connected robots, and the time.
 
-    ``coming``: robots that are being started. ``elsewhere``: the run belongs to a behaviour whose tab does
-    not show, so the title names it, and Run is of the one that shows.
+    ``coming`` are robots that are starting. ``elsewhere``: the run belongs to a behaviour in another tab, so
+    the title names it, and Run is for the current one. ``slow``: slow motion.
     """
     view = replace(_view(run, connected, coming, now), slow=slow)
     if run.trying:
@@ -126,7 +128,7 @@ def view_of(
 
 
 def _tried(view: RunView, run: RunState) -> RunView:
-    """The same for a block that is tried alone; Run is of the whole behaviour."""
+    # Of a tried block; Run is for the whole behaviour.
     if view.state == "running":
         title = _("Trying “{block}”").format(block=run.trying)
         return replace(view, title=title, compact=title, run_word=RUN, edited=False)
@@ -143,14 +145,14 @@ def _tried(view: RunView, run: RunState) -> RunView:
 
 
 def _named(view: RunView, run: RunState, now: float) -> RunView:
-    """The same with the behaviour's name, for when another one's blocks are to be seen."""
+    # With the behaviour's name, because another tab is shown.
     if view.state in {"running", "paused"}:
         runs = view.state == "running"
         if view.edited:
             view = replace(view, edited=False, detail=run.says if runs else _paused_detail(run))
         view = replace(view, run_word=RUN if runs else view.run_word)
     if view.state == "running":
-        # just pressed: the words of before stay, and what ran has its time
+        # just pressed: the previous words stay, and the run's time
         if run.state == "stopping" and run.elapsed_s is None:
             return replace(view, title=_("{name} is ready").format(name=run.name))
         if not run.begun:
@@ -203,7 +205,7 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
 
 
 def _ended_without_robots(run: RunState) -> bool:
-    """Whether a program has ended that had no robot to stop: how it ended is told, and nothing is proven."""
+    # Only the end is reported; nothing is proven.
     ran = run.finished or bool(run.errors) or run.elapsed_s is not None
     return run.state == "ready" and run.report is not None and ran
 
@@ -249,20 +251,20 @@ def _paused_detail(run: RunState) -> str:
 
 
 def _stopping_early(run: RunState, now: float) -> RunView:
-    # an answer within 100 ms is no state of its own: the words of before stay, only Run can't be pressed
+    # replies within 100 ms get no state of their own: the words stay, and only Run is disabled
     title = _("Ready")
     if run.elapsed_s is not None:
         title = _("Running, {time}").format(time=seconds(run.elapsed_s))
     view = replace(
         _stopping(run, now), state="running", title=title, detail=run.says, stop_word=STOP, result=None
     )
-    if run.restarts:  # nothing flashes: the buttons stay as they were
+    if run.restarts:  # the buttons stay as they were, so that nothing flashes
         view = replace(view, can_pause=True, can_step=True, can_restart=True, run_word=RESTART)
     return view
 
 
 def _stopping(run: RunState, now: float) -> RunView:
-    # one that refuses, or that somebody else serves too, is done only when all of it has stopped
+    # a robot that refuses, or that other programs serve too, is done only when all of it has stopped
     newest = {robot.name: robot for robot in run.answered}
     done = {robot.name for robot in run.answered if robot.answered and not newest[robot.name].waits}
     done -= {robot.name for robot in run.answered if robot.wrong}
@@ -316,7 +318,6 @@ def _proven(run: RunState, _now: float) -> RunView:
 
 
 def _ended_title(run: RunState, name: str = "") -> str:
-    """How it ended, and after how long; with the behaviour's name when another one's blocks are seen."""
     kind = "problem" if run.errors else "finished" if run.finished else "stopped"
     words = _ENDED[kind, bool(name), run.elapsed_s is not None]
     return _(words).format(name=name, time=seconds(run.elapsed_s or 0.0))
@@ -339,13 +340,13 @@ def _unanswered(run: RunState, now: float) -> RunView:
 
 
 def seconds(value: float) -> str:
-    """``14 s``, ``2 min 5 s``: whole seconds, as a person reads a clock."""
+    """Format a duration in whole seconds: ``14 s``, ``2 min 5 s``."""
     whole = int(value)
     return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
 def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
-    """The line under Ready; of robots that are being started while there is none yet."""
+    """Return the line below Ready: connected robots, else those that are starting."""
     if not names and coming:
         words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
         return words.format(robots=listed(coming))
@@ -356,7 +357,7 @@ def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
 
 
 def result_words(report: StopReport) -> str:
-    """What a stop brought: ``all 2 robots stopped (41 ms)``; its icon is that of `StopReport.status`."""
+    """Format a Stop's result: ``all 2 robots stopped (41 ms)``; its icon is that of `StopReport.status`."""
     names, still = report.names, report.still
     unsure = [robot.who for robot in report.robots if not robot.can_confirm]
     if report.unproven:
@@ -381,10 +382,10 @@ def _some_stopped(stopped: int, count: int) -> str:
 
 
 def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
-    """Title, detail, compact sentence and the confirming button when robots are not proven to stand still.
+    """Return title, detail, compact sentence and button label when robots have not confirmed.
 
-    What a robot said itself ("Arm may still move: the brake is stuck") comes first, in its own words.
-    ``doubts`` say what moved them (`RunState`).
+    A robot's own report ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts`` are
+    what moved them (`RunState`).
     """
     still = report.still
     names = listed(report.silent)
@@ -404,13 +405,13 @@ def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[st
     count, title = len(report.silent), _wrong_words(report)
     switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
     still_words = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
-    if len(names) > WIDEST_NAMES:  # the sentence beside the button must have room
+    if len(names) > WIDEST_NAMES:  # leave room for the sentence beside the button
         still_words = ngettext("It isn't moving", "They aren't moving", count)
     return title, detail, switch.format(wrong=title), still_words
 
 
 def _wrong_words(report: StopReport) -> str:
-    """What is wrong with those that are not proven: what they said, who could not be told, who is silent."""
+    # First what robots reported, then those that the Stop could not be sent to, then silent ones.
     told = [robot.wrong for robot in report.unproven if robot.refused]
     untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
     silent = [robot.who for robot in report.unproven if not robot.error]
@@ -428,7 +429,7 @@ def _wrong_words(report: StopReport) -> str:
 
 
 def stop_words(robot: RobotStop, clock: str) -> str:
-    """What one robot did with a stop, for its health: ``answered in 41 ms, at 8:40``."""
+    """Format one robot's reply to a Stop for its health: ``answered in 41 ms, at 8:40``."""
     if not robot.can_confirm:
         return _("sent at {time}; this robot can't confirm").format(time=clock)
     if robot.answered:
@@ -442,5 +443,5 @@ def stop_words(robot: RobotStop, clock: str) -> str:
 
 
 def clock_words(now: time.struct_time) -> str:
-    """``8:41``."""
+    """Format a time of day: ``8:41``."""
     return f"{now.tm_hour}:{now.tm_min:02d}"

@@ -1,4 +1,4 @@
-"""What a person wants to be run: a behaviour, or one stack of it that is tried alone."""
+"""Requests to run a behaviour, or one stack of it alone."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from nep.i18n import _
 
 
 class OpenBehaviours(Protocol):
-    """What a run needs of the behaviours that are open."""
+    """Open behaviours as far as a run needs them."""
 
     @property
     def current(self) -> Document:
-        """The one that shows; Run runs it."""
+        """Behaviour of the current tab, which Run runs."""
 
     def title(self, document: Document) -> str:
-        """What people call it."""
+        """Return the title of a behaviour."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A behaviour, or one ``stack`` of it; ``paused``: it stands before its first block."""
+    """Request to run a behaviour, or one ``stack`` of it; ``paused``: hold before the first block."""
 
     document: Document
     paused: bool = False
     stack: Stack | None = None
 
     def program(self) -> Program | None:
-        """What runs then; None when there is no such stack any more."""
+        """Return the program to run; None if the stack no longer exists."""
         return self.document.program() if self.stack is None else self.document.try_program(self.stack)
 
     @property
     def gives_value(self) -> bool:
-        """Whether it is a value, which the program writes."""
+        """True if the stack is a value, which the program prints."""
         return self.stack is not None and self.stack.is_value
 
     def unit(self, program: Program, robots: Iterable[Robot]) -> str:
-        """The unit of a sensor's value that is tried; "" for any other value."""
+        """Return the unit of a tried sensor value; "" for any other value."""
         if (
             self.stack is None
             or len(program.sensors) != 1
@@ -59,7 +59,7 @@ class Wanted:
         return pretty_unit(sensor.unit) or ""
 
     def problems(self, program: Program) -> dict[str, str]:
-        """Why it can't run, by block; a whole behaviour runs without the robots that are not there."""
+        """Return errors by block; a whole behaviour runs without missing robots."""
         wrong = {each.block_id: each.sentence for each in program.problems if each.severity == "error"}
         found = {block: sentence for block, sentence in wrong.items() if block}
         if self.stack is None or found:
@@ -67,7 +67,7 @@ class Wanted:
         return _absent(program, self.stack)
 
     def words(self, program: Program) -> str:
-        """The words of the block that is tried; "" for a whole behaviour."""
+        """Return the label of the tried block; "" for a whole behaviour."""
         if self.stack is None:
             return ""
         labels: Mapping[str, str] = program.labels
@@ -77,7 +77,7 @@ class Wanted:
 
 
 def _absent(program: Program, stack: Stack) -> dict[str, str]:
-    """What is said of a block whose robot is not there: nothing would happen."""
+    # A block whose robot is missing would do nothing.
     if stack.id not in program.absent:
         return {}
     mends = (each.mend_action or "" for each in program.problems if each.block_id == stack.id)

@@ -1,4 +1,4 @@
-"""Acting by hand: messages that a person keeps and sends, services that they call, the switch for both.
+"""Manual acting: saved messages, services to call, and the switch for both.
 
-Nothing here knows the window.
+Independent of the window.
 """

@@ -1,7 +1,7 @@
-"""What a person sends and calls by hand in this session: the shelf, the switch, what goes on.
+"""Manual publishing and calling in a session: the shelf, the switch, sending in progress.
 
-Everything goes to the live network. While a recording shows nothing is written and called by hand: what it
-plays can be sent then (`app.core.recording.replay.sending`).
+Everything goes to the live network. While a recording is shown, nothing can be written or called manually;
+its messages can be sent then (`app.core.recording.replay.sending`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _MOVED_BY: Mapping[Asker, str] = {"publish": "shelf"}
 
 
 class ActingSession(Protocol):
-    """What acting uses of the session that it belongs to."""
+    """Parts of the session that manual acting uses."""
 
     settings: Settings
     alerts: Alerts
@@ -56,12 +56,12 @@ class ActingSession(Protocol):
 
     @property
     def is_replaying(self) -> bool:
-        """Whether a recording shows in place of the live network."""
+        """True if a recording is shown instead of the live network."""
 
 
 @dataclass(frozen=True, slots=True)
 class ArmQuestion:
-    """A topic moves these robots: a person is asked again before anything is sent there."""
+    """Question before messages are sent on a topic that moves these robots."""
 
     topic: str
     robots: tuple[str, ...]
@@ -69,7 +69,7 @@ class ArmQuestion:
 
     @property
     def sentence(self) -> str:
-        """What would move; no names: a robot that the recording knows, or any that listens."""
+        """Sentence about the motion, without names if the robots are unknown here."""
         said = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
             said = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
@@ -78,7 +78,7 @@ class ArmQuestion:
 
 
 class SessionActing:
-    """Acting by hand. One thread uses it (the window's), but for `disarm`."""
+    """Manual acting. Not thread-safe except `disarm`: use it from the window's thread."""
 
     def __init__(
         self,
@@ -87,27 +87,27 @@ class SessionActing:
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
     ) -> None:
-        """Read what was kept beside the settings; without a ``path`` it is kept in memory alone."""
         self._session, self._clock = session, clock
         self.arming = Arming(clock)
         self.submit = session.source.submit
-        """Gives Studio's node on the live network to a job."""
+        """Runs a job with Studio's node on the live network."""
         self.gate = session.fleet.gate
         self.on_moved: OnMoved = ignore_moved
-        """Told the robots that something moves, and by what: "shelf", "image" or "replay"."""
+        """Called with the robots that a message moves and its kind of sender: "shelf", "image" or "replay".
+        """
         self.outbox = Outbox(self.arming, self.submit, clock, self.gate)
         self.calls = ServiceCalls(self.arming, self.submit, clock, clock_s)
         self.recorded_commands: frozenset[str] = frozenset()
-        """Topics by which robots are told what to do, as a recording says; until it is switched off."""
+        """Command topics of robots named in a recording; cleared when switched off."""
         self.question: ArmQuestion | None = None
-        """What a person is to answer before a robot's topic is armed."""
+        """Open question before a robot's topic is armed."""
         self.last: dict[str, SendResult] = {}
-        """By message how it ended the last time; of those that are on the shelf."""
+        """Last result of each message on the shelf, by message id."""
         self.armed_s = ARMED_S
         self.revision = 0
         self._clock_s = clock_s
         self.sent = SentLog()
-        """What was sent and called since the start."""
+        """Messages sent and services called since the start."""
         self.sent_at_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
@@ -116,12 +116,12 @@ class SessionActing:
         self.shelf = self._read(self.path)
         self._written = self.shelf.revision
 
-    # ---- the switch
+    # ---- switch
 
     def arm(self, *, for_replay: bool = False) -> str:
-        """Switch it on for `armed_s`; why it can't be, as a sentence.
+        """Switch on for `armed_s`; return a sentence why it can't be, or "".
 
-        While a recording shows only who sends ``for_replay`` can.
+        While a recording is shown, only ``for_replay`` is possible.
         """
         if self._session.is_replaying and not for_replay:
             return _("A recording is open. Return to live to send.")
@@ -135,7 +135,7 @@ class SessionActing:
         return ""
 
     def disarm(self) -> None:
-        """Switch it off, and end all sending; from when this returns on nothing is sent."""
+        """Switch off and end all sending; nothing is sent after this returns. Thread-safe."""
         was_on = self.arming.disarm()
         self.question, self.recorded_commands = None, frozenset()
         self.outbox.end_all()
@@ -147,9 +147,9 @@ class SessionActing:
     def allow(
         self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
     ) -> str:
-        """Let something be sent there, and do ``then``; why it can't be, as a sentence.
+        """Allow sending to a target, then call ``then``; return a sentence why it can't be, or "".
 
-        A topic that moves robots is asked for again: then `question` stands, unless the person ``is_sure``.
+        For a topic that moves robots `question` is opened first, unless the user ``is_sure``.
         """
         if not is_sure and self.asks(target):
             names = tuple(name for name in self._moved(target) if name != target.name)
@@ -170,14 +170,14 @@ class SessionActing:
             self.allow(target, then, is_sure=True)
 
     def answer(self, *, let: bool) -> None:
-        """The person has answered the `question`."""
+        """Apply the user's answer to `question`."""
         question, self.question = self.question, None
         self.revision += 1
         if question is not None and let:
             question.go_on()
 
     def forbid(self, target: Target) -> None:
-        """Send nothing there any more."""
+        """Disallow sending to a target."""
         self.arming.forbid(target)
         for each in self.outbox.all_repeated:
             if each.order.target == target:
@@ -185,26 +185,26 @@ class SessionActing:
         self.revision += 1
 
     def asks(self, target: Target) -> bool:
-        """Whether a person has to be asked again before anything is sent there: it moves a robot."""
+        """Return whether the user must be asked before sending there, because it moves a robot."""
         if target.kind != "topic" or self.arming.is_confirmed(target.name):
             return False
         return target.name in self.recorded_commands or bool(self._moved(target))
 
     @property
     def is_asking(self) -> bool:
-        """Whether a person is asked, here or before a real robot moves for the first time."""
+        """True if a question is open, here or before a real robot moves for the first time."""
         return self.question is not None or self._session.fleet.permission.question is not None
 
     def _moved(self, target: Target) -> tuple[str, ...]:
         return self.gate.moved_by(target.name) if target.kind == "topic" else ()
 
     def may_go_on(self, target: Target) -> bool:
-        """Whether what is sent again and again may still be: a robot may have come that it moves."""
+        """Return whether repeated sending may continue: a robot that it moves may have connected."""
         is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
         return is_permitted and not self.asks(target)
 
     def tell_moved(self, target: Target, asker: Asker) -> None:
-        """Something is about to be sent there: tell `on_moved` the robots that it moves."""
+        """Report the robots that a message moves to `on_moved`. Call it before sending."""
         moved = self._moved(target)
         if moved:
             self.on_moved(moved, _MOVED_BY.get(asker, asker))
@@ -212,19 +212,19 @@ class SessionActing:
     # ---- messages
 
     def new_message(self, topic: str, msg_type: str, text: str) -> KeptMessage | None:
-        """Keep a new message; None when the shelf is full."""
+        """Add a message to the shelf; return None when it is full."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
         made = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
         return made if self.shelf.put(made) else None
 
     def problem_of(self, message: KeptMessage) -> str:
-        """Why a message can't be sent, as a sentence; empty when it can, once it is armed."""
+        """Return a sentence why a message can't be sent, or "" when it can be once armed."""
         if not is_written(message.msg_type):
             said = _("Messages of type {type} can't be edited by hand.")
             return said.format(type=message.msg_type)
         read = None if is_plain(message.msg_type) else read_json(message.text)
         if read is not None and read.fault is not None:
-            return read.fault.sentence  # before the topic: its line is red
+            return read.fault.sentence  # before the topic: its line is marked red
         if not message.topic.strip():
             return _("Choose a topic first.")
         if read is None:
@@ -234,9 +234,9 @@ class SessionActing:
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
 
     def send(self, message: KeptMessage, *, rate_hz: float = 0.0) -> str:
-        """Send it once, or again and again at a rate; why it can't be, as a sentence.
+        """Send a message once or at a rate; return a sentence why it can't be, or "".
 
-        While it is not armed it is armed first, with this topic alone; a robot's topic is asked for again.
+        While switched off, it is first armed for this topic alone; a robot's topic is asked for again.
         """
         problem = self.problem_of(message)
         if problem:
@@ -247,7 +247,7 @@ class SessionActing:
         return self.send_order(order, rate_hz=rate_hz)
 
     def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
-        """Send what can be sent, as `send` does; why it can't be, as a sentence."""
+        """Send an order as `send` does; return a sentence why it can't be sent, or ""."""
         not_now = self._not_now()
         if not_now:
             return not_now
@@ -263,13 +263,12 @@ class SessionActing:
         return ""
 
     def _not_now(self) -> str:
-        """Why nothing can be written or called by hand now: a recording shows, which can be armed itself."""
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
-        """None when something may be sent there now; else why not.
+        """Return None when messages may be sent there now; else the reason.
 
-        "" when a person is asked, or ``go_on`` was called already.
+        "" when a question is open or ``go_on`` was called already.
         """
         if not self.arming.is_on:
             why_not = self.arm()
@@ -288,7 +287,7 @@ class SessionActing:
         return None if self.gate.permits(target.name, still) else ""
 
     def repeat(self, number: int) -> str:
-        """Do what an entry of `sent` tells of once more, while that is armed; why it can't be."""
+        """Repeat an entry of `sent` while its target is armed; return why it can't be, or ""."""
         record = self.sent.get(number)
         if record is None or record.again is None:
             return _("This can't be sent again.")
@@ -297,14 +296,14 @@ class SessionActing:
         return record.again()
 
     def end(self, message_id: str) -> None:
-        """Send it no longer."""
+        """End sending a message."""
         self.outbox.end(message_id)
         self.revision += 1
 
     # ---- services
 
     def call(self, service: str, text: str, timeout_s: float) -> str:
-        """Call a service with this JSON, armed first if need be; why it can't be, as a sentence."""
+        """Call a service with a JSON request, armed first if necessary; return why it can't be, or ""."""
         try:
             request = read_json(text).filled({})
         except NepError as error:
@@ -323,16 +322,16 @@ class SessionActing:
         self.revision += 1
         return ""
 
-    # ---- what the session does
+    # ---- interface of the session
 
     def tick(self) -> None:
-        """Take over what has happened; the switch goes off when its time is over or another source shows."""
+        """Process results; switch off when the time is over or another source is shown."""
         if self._session.sources_shown != self._source_seen:
             self._source_seen = self._session.sources_shown
             self.disarm()
         if self.arming.is_over:
             self.disarm()
-        for each in self.outbox.all_repeated:  # a robot may have come that this topic moves
+        for each in self.outbox.all_repeated:  # a robot that this topic moves may have connected
             target = each.order.target
             if not self.may_go_on(target):
                 self.outbox.end(each.order.id)
@@ -376,7 +375,7 @@ class SessionActing:
         )  # fmt: skip
 
     def tell(self, level: str, target: Target, words: str, sent: int = 0) -> None:
-        """Write down what a recording sends; ``sent`` messages have gone out."""
+        """Log what a recording sends; ``sent`` messages have been sent."""
         self.revision += 1
         self._say(level, f"{target.name}: {words}")
         self._log("replay", target.name, words, sent=sent, is_bad=level == "warn")
@@ -391,19 +390,19 @@ class SessionActing:
         self._session.console.add(level, "studio", words)
 
     def check(self) -> None:
-        """Once a second: what changed is kept."""
+        """Save changes. Called once a second."""
         self._write()
         try:
             if self._worker.take(FILE):
                 self._session.alerts.resolve("messages:kept")
         except OSError as error:
-            self._written = -1  # tried again in a second
+            self._written = -1  # retried at the next check
             said = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
             title = _("The saved messages can't be saved.")
             self._session.alerts.put("messages:kept", "warn", title, said, count=0)
 
     def close(self) -> None:
-        """Send nothing any more, and keep what is not kept yet."""
+        """End all sending and save changes."""
         self.disarm()
         self.outbox.close()
         self.calls.close()
@@ -411,7 +410,7 @@ class SessionActing:
         self._worker.finish(FILE)
         self._worker.close()
 
-    # ---- its file
+    # ---- file
 
     def _write(self) -> None:
         path, revision = self.path, self.shelf.revision
@@ -427,8 +426,6 @@ class SessionActing:
         self._worker.ask(FILE, write)
 
     def _read(self, path: Path) -> Shelf:
-        """What was kept; what is damaged is put aside, and said."""
-
         def parse(data: bytes) -> tuple[Shelf, str]:
             shelf, unread = read_shelf(data)
             said = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
@@ -442,12 +439,11 @@ class SessionActing:
         return kept.value if kept.value is not None else Shelf()
 
 
-def _nothing() -> None:
-    """The person starts it again."""
+def _nothing() -> None: ...
 
 
 def result_words(result: SendResult) -> str:
-    """How it ended, in a few words: "heard by 2", "412 sent, 3 left out, being late"."""
+    """Format a result: "heard by 2", "412 sent, 3 left out, being late"."""
     if result.kind == "sent":
         return heard_words(result.heard)
     if result.kind == "began":
@@ -461,7 +457,7 @@ def result_words(result: SendResult) -> str:
 
 
 def heard_words(count: int) -> str:
-    """How many hear it: "heard by 2", "nobody hears it"."""
+    """Format the number of subscribers: "heard by 2", "nobody hears it"."""
     return (
         ngettext("received by {count}", "received by {count}", count).format(count=count)
         if count
@@ -470,14 +466,14 @@ def heard_words(count: int) -> str:
 
 
 def call_words(record: CallRecord) -> str:
-    """How a call ended: "answered in 412 ms", "no answer in 2 s"."""
+    """Format the result of a call: "answered in 412 ms", "no answer in 2 s"."""
     if record.state == "answered":
         return _("replied in {time}").format(time=time_words(record.took_s))
     return record.sentence
 
 
 def time_words(seconds: float) -> str:
-    """A time that is measured: "412 ms", "1.42 s"."""
+    """Format a measured duration: "412 ms", "1.42 s"."""
     if seconds < 1:
         return _("{count} ms").format(count=max(1, round(seconds * 1000)))
     return _("{count} s").format(count=f"{seconds:.2f}")

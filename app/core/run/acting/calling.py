@@ -1,4 +1,4 @@
-"""Calls of services by hand, one at a time: each with its answer and its time, or why there is none."""
+"""Manual service calls, one at a time, each with its reply and duration, or the reason of a failure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMEOUT_S = 2.0
 LEAST_S, MOST_S = 0.1, 120.0
 HISTORY_KEPT = 200
 ANSWERS_KEPT = 20
-"""Of so many calls the answers are kept, too; of the others that there was one, and when."""
+"""Number of newest calls whose replies are kept; of older ones only the fact and time."""
 ANSWER_LETTERS = 1_000_000
 MOST_CLIENTS = 20
 
@@ -33,10 +33,10 @@ State = Literal["waiting", "answered", "failed", "canceled"]
 
 @dataclass(frozen=True, slots=True)
 class CallRecord:
-    """One call. ``at_s`` is when it began (epoch seconds), ``took_s`` how long until it ended.
+    """One call. ``at_s`` is its start (epoch seconds), ``took_s`` its duration.
 
-    ``sentence`` says why there is no answer. ``answer`` is the value and ``text`` the same as JSON, of which
-    ``is_cut`` tells whether it goes on; both are forgotten when newer calls have theirs (``is_kept``).
+    ``sentence`` is the reason of a failure. ``answer`` is the value and ``text`` the same as JSON, shortened
+    if ``is_cut``; both are discarded when newer calls have theirs (then ``is_kept`` is False).
     """
 
     number: int
@@ -52,12 +52,12 @@ class CallRecord:
     is_cut: bool = False
     is_kept: bool = True
     was_begun: bool = False
-    """Whether it went out."""
+    """True if the request was sent."""
 
 
 @dataclass(slots=True, eq=False)
 class _UnderWay:
-    """The call that is waited for; ``end`` may be called by any thread, once it counts."""
+    """Call in flight; its end may be set by any thread and counts once."""
 
     number: int
     turn: int
@@ -78,7 +78,7 @@ class _Ended:
 
 
 class ServiceCalls:
-    """Calls while the switch is on, one at a time. One thread uses it (the window's)."""
+    """Calls while the switch is on, one at a time. Not thread-safe: use it from the window's thread."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class ServiceCalls:
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
     ) -> None:
-        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`)."""
+        # `submit` runs a job with Studio's node (`app.core.network.source.Source.submit`).
         self._arming, self._submit, self._clock, self._clock_s = arming, submit, clock, clock_s
         self._numbers = itertools.count(1)
         self._records: deque[CallRecord] = deque(maxlen=HISTORY_KEPT)
@@ -100,22 +100,25 @@ class ServiceCalls:
 
     @property
     def records(self) -> Sequence[CallRecord]:
-        """All that are remembered, oldest first."""
+        """Past calls, oldest first."""
         return self._records
 
     @property
     def waiting(self) -> CallRecord | None:
-        """The call whose answer is waited for."""
+        """Call in flight, or None."""
         last = self._records[-1] if self._records else None
         return last if last is not None and last.state == "waiting" else None
 
     @property
     def waited_s(self) -> float:
-        """How long already."""
+        """Time since the call in flight began, in seconds."""
         return self._clock() - self._now.asked_s if self._now is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
-        """Call it; ``words`` are the request as it is shown. Raises `NepError` while one is waited for."""
+        """Call a service; ``words`` is the request for display.
+
+        Raises `NepError` while a call is in flight.
+        """
         if self.waiting is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
         timeout_s = min(MOST_S, max(LEAST_S, timeout_s))
@@ -127,11 +130,11 @@ class ServiceCalls:
         return record
 
     def give_up(self) -> None:
-        """Wait no longer for the answer; it may still be carried out."""
+        """Cancel waiting for the reply; the server may still execute the call."""
         self._end_now("canceled", _("canceled; the server may still carry it out"))
 
     def tick(self) -> list[CallRecord]:
-        """Take over how calls have ended; those that did since the last time, also those given up."""
+        """Apply finished calls; return those that ended since the last call, including cancelled ones."""
         while self._ended:
             ended = self._ended.popleft()
             place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
@@ -139,7 +142,7 @@ class ServiceCalls:
                 continue
             self._take(place, ended)
         waiting, now = self.waiting, self._now
-        has_begun = now is None or now.future is not None  # then its client counts the time
+        has_begun = now is None or now.future is not None  # from then on its client measures the timeout
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
             said = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._end_now("failed", said)
@@ -147,7 +150,7 @@ class ServiceCalls:
         return done
 
     def clear(self) -> None:
-        """Forget what was called, but for what is waited for."""
+        """Discard past calls except one in flight."""
         waiting = self.waiting
         self._records.clear()
         if waiting is not None:
@@ -155,11 +158,11 @@ class ServiceCalls:
         self.revision += 1
 
     def close(self) -> None:
-        """Wait for nothing any more; its node closes the clients."""
+        """Cancel the call in flight; the node closes the clients."""
         self._end_now("canceled", _("canceled; the server may still carry it out"))
         self._clients.clear()
 
-    # ---- inside
+    # ---- private
 
     def _put(self, record: CallRecord) -> None:
         self._records.append(record)
@@ -196,7 +199,7 @@ class ServiceCalls:
         self._take(len(self._records) - 1, _Ended(now.number, state, self.waited_s, sentence))
 
     def _begin(self, node: Node, now: _UnderWay, record: CallRecord, request: object) -> None:
-        """In the thread of the network."""
+        # Runs in the network thread.
         began_s = time.monotonic()
         try:
             client = self._client(node, record.service)
@@ -210,7 +213,7 @@ class ServiceCalls:
 
             if not self._arming.if_armed(now.turn, target, call_it):
                 raise NepError(_("not called: no longer armed"))
-        except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this call
+        except Exception as error:  # noqa: BLE001 - reported as the result of this call
             said = str(error) if isinstance(error, NepError) else error_words(error)
             self._ended.append(_Ended(record.number, "failed", 0.0, said))
             return
@@ -226,14 +229,14 @@ class ServiceCalls:
         return known
 
     def _answered(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
-        """In the client's own thread."""
+        # Runs in the client's thread.
         took_s = time.monotonic() - began_s
         try:
             answer = future.result()
             text = pretty(answer)
         except CancelledError:
             return
-        except Exception as error:  # noqa: BLE001 - what the server's callback raised may be anything
+        except Exception as error:  # noqa: BLE001 - the server's callback may raise anything
             self._ended.append(_Ended(record.number, "failed", took_s, reason_of(error, record.timeout_s)))
             return
         is_cut = len(text) > ANSWER_LETTERS
@@ -244,7 +247,7 @@ class ServiceCalls:
 
 
 def reason_of(error: Exception, timeout_s: float) -> str:
-    """Why there is no answer, in a few words: "no answer in 2 s", "refused: no face in sight"."""
+    """Return the reason of a missing reply: "no answer in 2 s", "refused: no face in sight"."""
     if isinstance(error, NoServerError):
         return _("no server")
     if isinstance(error, WaitTimeoutError):

@@ -1,8 +1,7 @@
-"""A message as a person types it: JSON with places for values, checked while it is typed.
+"""Editable message text: JSON with placeholders, checked while typing.
 
-A place is a name in braces where a value may stand, outside of texts: ``{"yaw": {yaw}}``. Two fill
-themselves, anew for each message: ``{new id}`` is a text that nobody has used, ``{now}`` the seconds since
-1970.
+A placeholder is a name in braces in place of a value, outside of strings: ``{"yaw": {yaw}}``. Two are filled
+automatically for each message: ``{new id}`` is a unique string, ``{now}`` the time in seconds since 1970.
 """
 
 from __future__ import annotations
@@ -20,21 +19,20 @@ from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
 
 MOST_LETTERS = 256 * 1024
-"""Longer texts are not typed by hand, and are not read while one types."""
+"""Maximum length of an editable text; longer ones are not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
 AUTOMATIC: Mapping[str, Callable[[], object]] = {
     NEW_ID: lambda: uuid.uuid4().hex,
     NOW: lambda: round(time.time(), 6),
 }
-# A text comes first, so that braces inside of it are none; one that has no end goes to the end of its line.
+# Strings are matched first, so that braces inside them don't count; an open one ends with its line.
 _PLACE = re.compile(r'"(?:[^"\\\n]|\\.)*"?|\{ ?(?P<name>[^\W\d][\w ]{0,38}\w|[^\W\d]) ?\}')
 
 
 class JsonText:
-    """A text that was read: its ``fault`` (None: it is JSON), and the names of its ``places`` in order."""
+    """Parsed text: its ``fault`` (None for valid JSON), and the names of its ``places`` in order."""
 
     def __init__(self, text: str) -> None:
-        """Read it; whatever it is, nothing is raised."""
         self.text = text
         self.places: tuple[str, ...] = ()
         self.fault: JsonFault | None = None
@@ -47,7 +45,7 @@ class JsonText:
             if found["name"] is not None:
                 self._spans.append((found.start(), found.end(), found["name"]))
         self.places = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
-        # as texts of the same length they are values, and every letter stays where it is
+        # replaced by strings of the same length, so that every character stays in its position
         parts, after = [], 0
         for start, end, _name in self._spans:
             parts += [text[after:start], '"', text[start + 1 : end - 1], '"']
@@ -56,16 +54,16 @@ class JsonText:
 
     @property
     def to_fill(self) -> tuple[str, ...]:
-        """The places that a person fills."""
+        """Placeholders that the user fills in."""
         return tuple(name for name in self.places if name not in AUTOMATIC)
 
     @property
     def fills_itself(self) -> bool:
-        """Whether it is another message each time."""
+        """True if it has automatic placeholders, so that each message differs."""
         return any(name in AUTOMATIC for name in self.places)
 
     def filled(self, values: Mapping[str, object]) -> object:
-        """The value with these in its places. Raises `NepError` with a sentence for what can't be made."""
+        """Return the value with its placeholders filled. Raises `NepError` with a sentence if it can't be."""
         if self.fault is not None:
             raise NepError(self.fault.sentence)
         missing = [name for name in self.to_fill if name not in values]
@@ -78,7 +76,7 @@ class JsonText:
             after = end
         whole = "".join([*parts, self.text[after:]])
         fault = find_json_fault(whole)
-        if fault is not None:  # a number as the name of a field
+        if fault is not None:  # a number as a field name
             raise NepError(fault.sentence)
         made: object = json.loads(whole)
         return made
@@ -86,12 +84,12 @@ class JsonText:
 
 @lru_cache(maxsize=64)
 def read_json(text: str) -> JsonText:
-    """A text that was read, perhaps some time ago: lists ask for it again and again."""
+    """Return a parsed text, cached: lists ask for it repeatedly."""
     return JsonText(text)
 
 
 def value_typed(text: str) -> object:
-    """Return the value that a person typed: JSON or a number with a decimal comma, else the text itself."""
+    """Parse a typed value: JSON or a number with a decimal comma, else the text itself."""
     said = text.strip()
     if said and find_json_fault(said) is None:
         return json.loads(said)
@@ -102,7 +100,7 @@ def value_typed(text: str) -> object:
 
 
 def pretty(value: object) -> str:
-    """A value as a person reads and changes it; what no JSON has stands as text."""
+    """Format a value as editable JSON; values that JSON lacks become strings."""
     return json.dumps(value, indent=2, ensure_ascii=False, default=_otherwise)
 
 
@@ -112,6 +110,6 @@ def _otherwise(value: object) -> object:
     if isinstance(value, (bytes, bytearray, memoryview)):
         return bytes(value).hex(" ")
     try:
-        return list(value)  # type: ignore[call-overload]  # whatever can be listed
+        return list(value)  # type: ignore[call-overload]  # any iterable
     except TypeError:
         return str(value)

@@ -1,4 +1,4 @@
-"""A pixel of a picture that a person clicked, as a message."""
+"""Clicked pixel of an image, as a message."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Literal
 from nep.geometry import Header, Point, Time
 
 TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
-"""Types that a point may be sent as; "json" has all that is known of it."""
+"""Message types of a point; "json" has all fields."""
 Button = Literal["left", "middle"]
 
 
 def topic_of(pictures: str) -> str:
-    """Where points in the pictures of a topic are sent, unless a person says otherwise."""
+    """Return the default topic for points in the images of a topic."""
     return f"{pictures.rstrip('/')}/point"
 
 
 @dataclass(frozen=True, slots=True)
 class PicturePoint:
-    """A pixel of a picture of ``width`` x ``height``, however it was zoomed, turned and flipped.
+    """Pixel of an image of ``width`` x ``height``, independent of zoom, rotation and mirroring.
 
-    ``x`` counts from the left and ``y`` from the top edge of the picture as it was received, from 0;
-    ``stamp_ns`` is the picture's own time, None where its publisher tells none.
+    ``x`` counts from the left and ``y`` from the top edge of the received image, from 0; ``stamp_ns`` is the
+    image's own time, or None if its publisher sends none.
     """
 
     x: int
@@ -34,11 +34,11 @@ class PicturePoint:
 
     @property
     def share(self) -> tuple[float, float]:
-        """Where the middle of the pixel is, as shares of the picture's width and height."""
+        """Centre of the pixel as fractions of the image's width and height."""
         return (self.x + 0.5) / max(1, self.width), (self.y + 0.5) / max(1, self.height)
 
     def payload(self, pictures: str, msg_type: str) -> dict[str, object]:
-        """The message of one of `TYPES`; ``pictures`` is the topic that the picture came from."""
+        """Return the message of one of `TYPES`; ``pictures`` is the image's topic."""
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
         place = asdict(Point(float(self.x), float(self.y), 0.0))
         if msg_type == Point.MSG_TYPE:

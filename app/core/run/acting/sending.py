@@ -1,6 +1,6 @@
-"""Messages on their way: once, or again and again at even distances, never in a burst.
+"""Sending messages once or at a rate, evenly spaced, without bursts.
 
-Publishers are made in the thread of the network; what is sent again and again has one thread for all of it.
+Publishers are created in the network thread; one thread sends all repeated messages.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from nep.nodes.publisher import Publisher
 
 LEAST_HZ, MOST_HZ = 0.1, 50.0
 LATE_S = 10.0
-"""What waited for a master for longer is not sent any more."""
+"""Maximum age of a message that waits for a master; older ones are discarded."""
 MOST_AT_ONCE = 10
-"""So many are sent again and again at the same time."""
+"""Maximum number of messages sent repeatedly at the same time."""
 MOST_KEPT = 20
 RESULTS_KEPT = 200
 
 
 @dataclass(frozen=True, slots=True)
 class SendOrder:
-    """What is to be sent: ``make`` gives the message, each time anew, and raises `NepError` when it can't.
+    """Message to send: ``make`` returns a new payload each time, or raises `NepError`.
 
-    ``source`` is the message as a person wrote it, ``asker`` where they asked for it; ``told`` is called with
-    how it ended, by who takes the results.
+    ``source`` is the text that the user wrote, ``asker`` the origin of the request; ``told`` is called with
+    the result by the code that takes results.
     """
 
     id: str
@@ -51,16 +51,16 @@ class SendOrder:
 
     @property
     def target(self) -> Target:
-        """Where it is sent to."""
+        """Topic to send to."""
         return Target("topic", self.topic)
 
 
 @dataclass(frozen=True, slots=True)
 class SendResult:
-    """How it ended: ``kind`` is "sent", "began", "ended" or "failed"; ``heard`` programs listen.
+    """Result: ``kind`` is "sent", "began", "ended" or "failed"; ``heard`` is the number of subscribers.
 
-    ``count`` messages were sent at a rate, ``skipped`` were left out because their time had gone by. ``text``
-    is the one that was sent once, "" of one that is too large to be kept.
+    ``count`` messages were sent at a rate; ``skipped`` were omitted because they were late. ``text`` is the
+    message that was sent once, or "" if it is too large to keep.
     """
 
     order: SendOrder
@@ -74,7 +74,7 @@ class SendResult:
 
 @dataclass(slots=True, eq=False)
 class Repeated:
-    """What is sent again and again; only its thread changes it."""
+    """Repeated message; only its thread changes it."""
 
     order: SendOrder
     rate_hz: float
@@ -90,13 +90,16 @@ class Repeated:
 
     @property
     def rate_now_hz(self) -> float:
-        """Messages a second since it began, as they were sent; 0 before there are two."""
+        """Measured rate in messages per second; 0 before the second message."""
         passed_s = time.monotonic() - self.since_s
         return (self.count - 1) / passed_s if self.count > 1 and passed_s > 0 else 0.0
 
 
 class Outbox:
-    """Sends while the switch is on. One thread uses it (the window's); `take` gives what has happened."""
+    """Sends while the switch is on.
+
+    Not thread-safe: use it from the window's thread. `take` returns results.
+    """
 
     def __init__(
         self,
@@ -105,10 +108,7 @@ class Outbox:
         clock: Callable[[], float] = time.monotonic,
         gate: MotionGate | None = None,
     ) -> None:
-        """``submit`` gives Studio's node to a job (`app.core.network.source.Source.submit`).
-
-        ``gate`` knows which messages would move a robot that may not; without it all are sent.
-        """
+        # `gate` knows which messages would move a robot without permission; without it all are sent.
         self._gate = gate
         self._heard: dict[Publisher, int] = {}
         self._arming, self._submit, self._clock = arming, submit, clock
@@ -121,32 +121,32 @@ class Outbox:
         self._is_closed = False
 
     def take(self) -> list[SendResult]:
-        """What has happened since the last time."""
+        """Return and clear the results."""
         taken = []
         while self._results:
             taken.append(self._results.popleft())
         return taken
 
     def repeated(self, order_id: str) -> Repeated | None:
-        """How a message that is sent again and again goes on."""
+        """Return the state of a repeated message."""
         with self._changed:
             return self._repeated.get(order_id)
 
     @property
     def all_repeated(self) -> tuple[Repeated, ...]:
-        """All that are sent again and again."""
+        """All repeated messages."""
         with self._changed:
             return tuple(self._repeated.values())
 
     def is_going(self, order_id: str) -> bool:
-        """Whether it is sent again and again, or is about to be."""
+        """Return whether a message is sent repeatedly, or is about to be."""
         with self._changed:
             return order_id in self._repeated or order_id in self._begun
 
-    # ---- what a person asks
+    # ---- requests
 
     def send(self, order: SendOrder) -> None:
-        """Send it once."""
+        """Send a message once."""
         turn, asked_s = self._arming.turn, self._clock()
 
         def send_it(node: Node) -> None:
@@ -163,7 +163,7 @@ class Outbox:
         self._submit("", self._guarded(order, asked_s, send_it))
 
     def begin(self, order: SendOrder, rate_hz: float) -> bool:
-        """Send it again and again from now on; False when too much goes on."""
+        """Send a message repeatedly; return False when `MOST_AT_ONCE` is reached."""
         rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
@@ -172,13 +172,13 @@ class Outbox:
             self._begun[order.id] = token
 
         def begin_it(node: Node) -> None:
-            codec_for(order.msg_type).encode(order.make())  # what can't be sent is said before anything is
+            codec_for(order.msg_type).encode(order.make())  # errors are reported before anything is sent
             publisher = self._publisher(node, order)
             now = time.monotonic()
             made = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
                 if self._begun.get(order.id) is not token:
-                    return  # a person ended it meanwhile
+                    return  # ended meanwhile
                 self._repeated[order.id] = made
                 if self._thread is None and not self._is_closed:
                     self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
@@ -198,7 +198,7 @@ class Outbox:
         return True
 
     def end(self, order_id: str) -> None:
-        """Send it no more."""
+        """End a repeated message."""
         with self._changed:
             self._begun.pop(order_id, None)
             ended = self._repeated.pop(order_id, None)
@@ -207,7 +207,7 @@ class Outbox:
             self._tell_end(ended)
 
     def end_all(self) -> None:
-        """Send nothing any more, and publish those topics no longer."""
+        """End all sending and close the publishers."""
         with self._changed:
             self._begun.clear()
             ids = list(self._repeated)
@@ -217,7 +217,7 @@ class Outbox:
             self._submit("", lambda _node: self._leave())
 
     def close(self) -> None:
-        """End everything; waits for its thread, which does not wait for others."""
+        """End everything and wait for the thread, which waits for no other."""
         self.end_all()
         with self._changed:
             self._is_closed = True
@@ -225,11 +225,9 @@ class Outbox:
         if self._thread is not None:
             self._thread.join(2.0)
 
-    # ---- in the thread of the network
+    # ---- in the network thread
 
     def _guarded(self, order: SendOrder, asked_s: float, job: Job) -> Job:
-        """The job; what it raises is told as the result."""
-
         def run(node: Node) -> None:
             try:
                 if self._clock() - asked_s > LATE_S:
@@ -237,13 +235,13 @@ class Outbox:
                 job(node)
             except NepError as error:
                 self._tell(SendResult(order, "failed", str(error)))
-            except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this message
+            except Exception as error:  # noqa: BLE001 - reported as the result of this message
                 self._tell(SendResult(order, "failed", error_words(error)))
 
         return run
 
     def _check(self, node: Node, order: SendOrder, publisher: Publisher) -> None:
-        """Raise `NepError` when it would move a robot that may not: one may have come meanwhile."""
+        # Raises `NepError` if it would move a robot without permission, which may have connected meanwhile.
         if self._gate is None:
             return
         heard = publisher.subscribers
@@ -271,7 +269,7 @@ class Outbox:
         with self._changed:
             used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
         if self._arming.is_on:
-            return  # it was armed again meanwhile
+            return  # armed again meanwhile
         for key in [each for each in self._publishers if each not in used]:
             self._close(key)
 
@@ -289,7 +287,7 @@ class Outbox:
             kind = "failed" if sentence else "ended"
             self._tell(SendResult(ended.order, kind, sentence, ended.heard, ended.count, ended.skipped))
 
-    # ---- the thread of what is sent again and again
+    # ---- thread of repeated messages
 
     def _run(self) -> None:
         while True:
@@ -311,7 +309,7 @@ class Outbox:
             made = codec_for(each.order.msg_type).encode(each.order.make())
             self._check(each.node, each.order, each.publisher)
             is_done = self._arming.if_armed(each.turn, each.order.target, lambda: self._publish(each, made))
-        except Exception as error:  # noqa: BLE001 - the others go on
+        except Exception as error:  # noqa: BLE001 - the other messages continue
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)
         if is_done:
             each.heard = each.publisher.subscribers
@@ -323,14 +321,14 @@ class Outbox:
         self._tell_end(each, problem)
 
     def _publish(self, each: Repeated, made: object) -> None:
-        with self._changed:  # what a person ended is not sent once more
+        with self._changed:  # an ended message is not sent once more
             if self._repeated.get(each.order.id) is each:
                 each.publisher.publish(made)
                 each.count += 1
 
     @staticmethod
     def _next(each: Repeated) -> int:
-        """When the next one is due; how many are left out because their time has gone by."""
+        # Sets the next due time; returns the number of messages omitted because they are late.
         period_s = 1 / each.rate_hz
         late = max(0, int((time.monotonic() - each.due_s) / period_s))
         each.due_s += (1 + late) * period_s
@@ -338,5 +336,4 @@ class Outbox:
 
 
 def _text_of(value: object) -> str:
-    """A message as a person reads it."""
     return value if isinstance(value, str) else pretty(value)

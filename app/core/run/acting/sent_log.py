@@ -1,4 +1,4 @@
-"""What was sent and called by hand or from a recording: when, where to, who asked, and what came of it."""
+"""Log of messages and calls sent manually or from a recording: time, target, origin and result."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from app.core.run.acting.arming import Target
 
 MOST_KEPT = 200
 KEPT_BYTES = 16 * 1024
-"""A larger message is listed, and can't be copied or repeated from there."""
+"""Size limit of stored messages; larger ones are listed but can't be copied or repeated."""
 
 Asker = Literal["publish", "service", "replay", "image", "switch"]
 
 
 @dataclass(frozen=True, slots=True)
 class SentRecord:
-    """One entry. ``at_s`` is the last time that it happened (epoch seconds), ``count`` how often in a row.
+    """Log entry. ``at_s`` is the time of its last occurrence (epoch seconds), ``count`` the number in a row.
 
-    ``name`` is the topic or service, "" of the switch; ``words`` say what came of it, well or not
-    (``is_bad``). ``text`` is the message or request, "" where it is too large or is none, ``source`` the same
-    as a person wrote it; ``again`` sends or calls it once more and gives why it can't, None where that makes
-    no sense.
+    ``name`` is the topic or service, "" for the switch; ``words`` is the result, an error if ``is_bad``.
+    ``text`` is the message or request, "" if too large or none; ``source`` the same as the user wrote it.
+    ``again`` repeats it and returns why it can't, None where that makes no sense.
     """
 
     at_s: float
@@ -39,41 +38,41 @@ class SentRecord:
 
     @property
     def target(self) -> Target:
-        """Where it went."""
+        """Topic or service."""
         return Target("service" if self.asker == "service" else "topic", self.name)
 
     def is_like(self, other: SentRecord) -> bool:
-        """Whether both tell the same of the same."""
+        """Return whether both describe the same operation and result."""
         facts = (self.asker, self.name, self.words, self.is_bad, self.source)
         return facts == (other.asker, other.name, other.words, other.is_bad, other.source)
 
 
 class SentLog:
-    """The last 200 entries, oldest first, and how much was sent in all. One thread uses it (the window's)."""
+    """Newest `MOST_KEPT` entries, oldest first, and the total. Not thread-safe: window's thread only."""
 
     def __init__(self) -> None:
         self._records: deque[SentRecord] = deque(maxlen=MOST_KEPT)
         self._last = 0
         self.total = 0
-        """Messages and calls that went out."""
+        """Number of messages and calls sent."""
         self.since_s: float | None = None
-        """When the first of them did (epoch seconds)."""
+        """Time of the first of them (epoch seconds)."""
         self.revision = 0
 
     @property
     def records(self) -> Sequence[SentRecord]:
-        """All that are kept, oldest first."""
+        """Entries, oldest first."""
         return self._records
 
     def get(self, number: int) -> SentRecord | None:
-        """The entry of that number, while it is kept."""
+        """Return the entry with this number, or None if it was evicted."""
         return next((each for each in self._records if each.number == number), None)
 
     def put(self, record: SentRecord, sent: int) -> None:
-        """This happened; ``sent`` messages or calls went out by it. The log gives it its number.
+        """Add an entry and number it; ``sent`` is the number of messages or calls sent.
 
-        The same once more is counted in the entry that is the newest. A text that is too large is not kept,
-        and neither is how to do it again.
+        A repetition of the newest entry only increases its count. Large texts and the means to repeat them
+        are not stored.
         """
         self.revision += 1
         if sent > 0:
@@ -89,11 +88,11 @@ class SentLog:
             self._records.append(replace(record, number=self._last))
 
     def clear(self) -> None:
-        """Forget the entries; what was sent in all is still known."""
+        """Remove the entries; the total stays."""
         self._records.clear()
         self.revision += 1
 
 
 def is_large(text: str) -> bool:
-    """Whether a text is not kept."""
+    """Return whether a text exceeds `KEPT_BYTES`."""
     return len(text) > KEPT_BYTES or len(text.encode("utf-8", "replace")) > KEPT_BYTES

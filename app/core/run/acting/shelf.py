@@ -1,4 +1,4 @@
-"""The shelf: messages that a person keeps to send them again, in one file beside the settings."""
+"""Shelf: messages saved for sending again, stored in one file beside the settings."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ MOST_VALUES = 50
 NAME_LETTERS = 80
 VALUE_LETTERS = 2000
 MOST_BYTES = 64 * 2**20
-"""What is larger is no shelf, and is not read."""
+"""Maximum file size; larger files are not read."""
 
 
 class NewerShelfError(NepError):
-    """The file is of a newer Studio."""
+    """The file was written by a newer version of Studio."""
 
 
 def new_message_id() -> str:
-    """An id that no other message has."""
+    """Return a unique message id."""
     return secrets.token_hex(4)
 
 
 @dataclass(frozen=True, slots=True)
 class KeptMessage:
-    """A message with a name. ``values`` are what a person typed for its places, by their names."""
+    """Saved message. ``values`` are the user's values of its placeholders, by name."""
 
     id: str
     name: str
@@ -46,7 +46,7 @@ class KeptMessage:
     rate_hz: float = 1.0
 
     def payload(self) -> object:
-        """The message, made anew: ids and times that fill themselves. Raises `NepError` with a sentence."""
+        """Return a new payload with automatic ids and times. Raises `NepError` with a sentence."""
         if is_plain(self.msg_type):
             return self.text
         typed = {name: value_typed(value) for name, value in self.values if value.strip()}
@@ -54,17 +54,17 @@ class KeptMessage:
 
     @property
     def source(self) -> str:
-        """What a person wrote, with the values that they typed."""
+        """Text that the user wrote, with the values of its placeholders."""
         return "\n".join((self.text, *(f"{name}: {value}" for name, value in self.values)))
 
     def with_value(self, name: str, value: str) -> KeptMessage:
-        """The same with another value in a place."""
+        """Return a copy with another value of a placeholder."""
         others = {**dict(self.values), name: value[:VALUE_LETTERS]}
         return replace(self, values=tuple(others.items())[-MOST_VALUES:])
 
 
 class Shelf:
-    """Messages in the order in which they were kept, and the last request of each service. Bounded."""
+    """Saved messages in order, and the last request of each service. Limited in number."""
 
     def __init__(
         self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
@@ -76,20 +76,20 @@ class Shelf:
 
     @property
     def messages(self) -> tuple[KeptMessage, ...]:
-        """All of them."""
+        """All messages."""
         return tuple(self._messages)
 
     @property
     def requests(self) -> Mapping[str, str]:
-        """By service what was asked last, as JSON."""
+        """Last request by service, as JSON."""
         return self._requests
 
     def get(self, id: str) -> KeptMessage | None:
-        """The message of that id."""
+        """Return the message with this id."""
         return next((each for each in self._messages if each.id == id), None)
 
     def put(self, message: KeptMessage) -> bool:
-        """Keep it, or change the one of this id; False when the shelf is full."""
+        """Add a message or replace the one with this id; return False when the shelf is full."""
         place = self._place(message.id)
         if place is None:
             if len(self._messages) >= MOST_MESSAGES:
@@ -103,7 +103,7 @@ class Shelf:
         return True
 
     def copy(self, id: str) -> KeptMessage | None:
-        """One more like it, right below; None when there is no such message, or no room."""
+        """Insert a copy below a message; return None if it doesn't exist or the shelf is full."""
         place = self._place(id)
         if place is None or len(self._messages) >= MOST_MESSAGES:
             return None
@@ -114,7 +114,7 @@ class Shelf:
         return made
 
     def free_name(self, wanted: str) -> str:
-        """The name, with a number where another message has it: "Stand still 2"."""
+        """Return the name, numbered if another message has it: "Stand still 2"."""
         taken = {each.name for each in self._messages}
         number, name = 2, wanted[:NAME_LETTERS]
         while name in taken:
@@ -123,7 +123,7 @@ class Shelf:
         return name
 
     def remove(self, id: str) -> KeptMessage | None:
-        """Take it away; `put_back` is its undo."""
+        """Remove and return a message; `put_back` undoes it."""
         place = self._place(id)
         if place is None:
             return None
@@ -133,7 +133,7 @@ class Shelf:
         return removed
 
     def put_back(self) -> KeptMessage | None:
-        """Put what was removed last in its place again."""
+        """Restore the last removed message at its position."""
         if self._removed is None or len(self._messages) >= MOST_MESSAGES:
             return None
         (message, place), self._removed = self._removed, None
@@ -142,7 +142,7 @@ class Shelf:
         return message
 
     def remember(self, service: str, request: str) -> None:
-        """This was asked of a service."""
+        """Store the last request of a service."""
         if self._requests.get(service) != request and len(request) <= MOST_LETTERS:
             self._requests.pop(service, None)
             self._requests[service] = request
@@ -154,11 +154,11 @@ class Shelf:
         return next((place for place, each in enumerate(self._messages) if each.id == id), None)
 
 
-# ---- its file
+# ---- file
 
 
 def shelf_text(shelf: Shelf) -> bytes:
-    """The bytes of a file with these."""
+    """Return the file content of a shelf."""
     value = {
         "format": FORMAT,
         "messages": [
@@ -179,9 +179,9 @@ def shelf_text(shelf: Shelf) -> bytes:
 
 
 def read_shelf(data: bytes) -> tuple[Shelf, int]:
-    """The shelf in the bytes of a file, and how many messages could not be read.
+    """Parse a file; return the shelf and the number of unreadable messages.
 
-    Raises `NewerShelfError`, and `NepError` for what is no shelf at all.
+    Raises `NewerShelfError`, and `NepError` if it isn't a shelf.
     """
     try:
         value = json.loads(data.decode("utf-8-sig"))

@@ -1,4 +1,4 @@
-"""What a message may look like: as the last one of its topic, or as its type declares."""
+"""Templates of messages: the last one of a topic, or an empty one of a type."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from nep.messages.message import Message
 from nep.recordings.formats.schemas import schema_of
 
 WRITTEN = frozenset({"json", "msgpack", "string"})
-"""The codecs whose messages can be written by hand."""
+"""Codecs of messages that can be written as text."""
 _SCALARS: Mapping[str, object] = {"string": "", "boolean": False, "integer": 0, "number": 0.0, "array": []}
 _DEEPEST = 10
 
 
 def is_written(msg_type: str) -> bool:
-    """Whether messages of this type can be written by hand: no pictures, no bytes."""
+    """Return whether messages of this type can be written as text: no images, no bytes."""
     return codec_for(msg_type).name in WRITTEN
 
 
 def is_plain(msg_type: str) -> bool:
-    """Whether such a message is any text, and no JSON."""
+    """Return whether messages of this type are plain text, not JSON."""
     return codec_for(msg_type).name == "string"
 
 
 def text_of_message(message: Message) -> str:
-    """A message as text to begin with. Raises `NepError` for what can't be written by hand."""
+    """Return a message as editable text. Raises `NepError` if it can't be written as text."""
     if message.size_bytes > MOST_LETTERS:
         raise NepError(_("The last message is too large to edit by hand."))
     if not is_written(message.msg_type):
@@ -40,7 +40,7 @@ def text_of_message(message: Message) -> str:
 
 
 def text_of_type(msg_type: str) -> str:
-    """What a type's messages have, each field with nothing in it; an empty map where nothing is declared."""
+    """Return an empty message of a type; an empty map where the type declares no fields."""
     if is_plain(msg_type):
         return ""
     return pretty(_example(orjson.loads(schema_of(msg_type)), 0))
