@@ -1,1 +1,1 @@
-"""Recordings as Studio makes and lists them: the recorder's process, and the files in a folder."""
+"""Recordings: the recorder's process, and the list of files in a folder."""

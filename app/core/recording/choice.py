@@ -1,4 +1,4 @@
-"""What a person chose to record, by names or by patterns, and how it is kept between starts."""
+"""Selection of what to record, by names or patterns, and its form in the settings."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from nep.system.lazy_import import lazy_module
 if TYPE_CHECKING:
     from nep.recordings import recorder
 else:
-    recorder = lazy_module("nep.recordings.recorder")  # no start waits for it
+    recorder = lazy_module("nep.recordings.recorder")  # loaded lazily, so that no start waits for it
 
 MODES = ("all", "chosen", "pattern")
 LEAST_S, MOST_S, USUAL_S = 5, 3_600, 60
 LEAST_GB, MOST_GB, USUAL_GB = 0.1, 1_000.0, 2.0
 LEAST_MIN, MOST_MIN = 0.1, 10_080.0
-"""How soon and how late a recording may end by itself, in minutes; its sizes are those of the ring."""
+"""Limits of the recording's duration in minutes; its size limits are those of the flight recorder."""
 MOST_NAMES = 1_000
 MOST_LETTERS = 80
-"""Of a name for a file: with what is put behind it all file systems take it."""
+"""Maximum length of a file name, which with its suffix all file systems accept."""
 NOT = lazy("not")
 _NEVER_IN_NAMES = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
@@ -32,11 +32,11 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECA
 
 @dataclass(frozen=True, slots=True)
 class RecordingChoice:
-    """Which topics are recorded.
+    """Topics to record.
 
-    ``mode``: "all"; "chosen", those in ``topics``; "pattern", what fits ``patterns`` (all, when there are
-    none) and none of ``left_out``. It ends after ``ends_min`` minutes or with ``ends_gb`` (of 10^9 bytes),
-    whichever comes first; None is never.
+    ``mode`` is "all"; "chosen" for those in ``topics``; or "pattern" for topics that match ``patterns`` (all
+    if empty) and none of ``left_out``. The recording ends after ``ends_min`` minutes or at ``ends_gb`` (10^9
+    bytes), whichever comes first; None is no limit.
     """
 
     mode: str = "all"
@@ -47,7 +47,7 @@ class RecordingChoice:
     ends_gb: float | None = None
 
     def end(self, elapsed_s: float, size_bytes: float, speed: float | None) -> tuple[float, float] | None:
-        """(seconds, bytes) that it will have at its end with so many bytes a second; None: nobody knows."""
+        """Return the expected (seconds, bytes) at the end for a rate in bytes per second; None if unknown."""
         ends = [] if self.ends_min is None else [60.0 * self.ends_min]
         if self.ends_gb is not None and speed:
             ends.append(elapsed_s + (1e9 * self.ends_gb - size_bytes) / speed)
@@ -58,7 +58,7 @@ class RecordingChoice:
 
     @property
     def selection(self) -> recorder.TopicSelection:
-        """As the recorder takes it. Raises `BadTopicError` for what can be no topic."""
+        """Selection for the recorder. Raises `BadTopicError` for an invalid topic."""
         if self.mode == "chosen":
             return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
@@ -67,18 +67,18 @@ class RecordingChoice:
 
     @property
     def problem(self) -> str:
-        """Why nothing can be recorded so, in a sentence; "" when it can."""
+        """Sentence why the selection can't be recorded, or ""."""
         if self.mode == "chosen" and not self.topics:
             return _("No topic is selected.")
         try:
-            self.selection  # noqa: B018  it is asked whether it can be
+            self.selection  # noqa: B018  raises for invalid patterns
         except BadTopicError as error:
             return f"{str(error)[:1].upper()}{str(error)[1:]}."
         return ""
 
 
 def read_choice(told: object) -> RecordingChoice:
-    """The choice that settings keep; whatever does not fit is as at first."""
+    """Parse the selection in the settings; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RecordingChoice()
     mode = told.get("mode")
@@ -93,7 +93,7 @@ def read_choice(told: object) -> RecordingChoice:
 
 
 def plain_choice(choice: RecordingChoice) -> dict[str, object]:
-    """The choice as settings keep it."""
+    """Return the selection in the form of the settings."""
     return {
         "mode": choice.mode,
         "topics": list(choice.topics),
@@ -112,9 +112,9 @@ def _names(told: object) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class RingWish:
-    """Whether the flight recorder is on, for how many seconds, and in how many GB (10^9 bytes) at most.
+    """Settings of the flight recorder: on or off, seconds, and maximum size in GB (10^9 bytes).
 
-    It keeps what fits ``patterns`` (all, when there are none) and none of ``left_out``.
+    It stores topics that match ``patterns`` (all if empty) and none of ``left_out``.
     """
 
     is_on: bool = False
@@ -125,12 +125,12 @@ class RingWish:
 
     @property
     def problem(self) -> str:
-        """Why nothing can be kept so, in a sentence; "" when it can."""
+        """Sentence why these topics can't be recorded, or ""."""
         return RecordingChoice("pattern", (), self.patterns, self.left_out).problem
 
 
 def read_wish(told: object) -> RingWish:
-    """What settings keep of it; whatever does not fit is as at first."""
+    """Parse the flight recorder's settings; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RingWish()
     seconds, size_gb = told.get("seconds"), told.get("size_gb")
@@ -144,7 +144,7 @@ def read_wish(told: object) -> RingWish:
 
 
 def plain_wish(wish: RingWish) -> dict[str, object]:
-    """The wish as settings keep it."""
+    """Return the flight recorder's settings in their stored form."""
     return {
         "is_on": wish.is_on,
         "seconds": wish.seconds,
@@ -164,7 +164,10 @@ def _within(value: object, least: float, most: float) -> bool:
 
 
 def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """(wanted, left out) of "/arm/* *action* not /arm/raw": words, and what follows "not" is left out."""
+    """Parse "/arm/* *action* not /arm/raw" into (wanted, unwanted) patterns.
+
+    "not" starts the unwanted ones.
+    """
     wanted: list[str] = []
     unwanted: list[str] = []
     is_not = False
@@ -180,16 +183,16 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def file_stem(name: str) -> str:
-    """The name as every system takes it for a file, "" when nothing of it is left."""
+    """Return a name that is valid as a file name on every system; "" when nothing of it is left."""
     plain = _NEVER_IN_NAMES.sub(" ", name)
     plain = " ".join(plain.split())[:MOST_LETTERS].strip(" .")
     return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
 
 
 def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
-    """This path, or with a number behind its name when there is such a file already.
+    """Return this path, numbered if it exists.
 
-    A folder has no suffix: the points in its name are of times.
+    A folder has no suffix: dots in its name belong to times.
     """
     stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
     made, number = wanted, 2

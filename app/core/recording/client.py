@@ -1,7 +1,7 @@
-"""The recorder's process, as the window sees it: begin, end, keep the last seconds, and what is wrong.
+"""Client of the recorder's process: start, stop, save the flight recorder, report problems.
 
-The process is `nep.recordings.child`: what it does goes on while the window is busy, and it finishes a
-recording also when Studio has gone. Orders are written and answers read by threads; the window never waits.
+The process is `nep.recordings.child`: it works while the window is busy, and it finishes a recording even
+after Studio has ended. Threads write commands and read replies; the window never blocks.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from nep.masters.process import NO_CONSOLE
 from nep.recordings.formats.figures import TopicFigures, read_figures
 
 LOW_DISK_BYTES = 1_000_000_000
-"""With less of it free on the disk a person is warned; with 200 MB the recorder ends by itself."""
+"""Free disk space below which the user is warned; at 200 MB the recorder stops by itself."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
-"""After how long a flight recorder whose process has gone is started again: twice as long each time."""
+"""Pause before a flight recorder whose process ended is restarted, and its maximum; doubled each time."""
 END_WAIT_S = 2.0
 MOST_ORDERS = 1000
 MOST_KEEPING = 100
@@ -37,7 +37,7 @@ _TAIL_BYTES = 2000
 
 @dataclass(frozen=True, slots=True)
 class RecorderSaid:
-    """The process of this number told an event, as `nep.recordings.child` describes them."""
+    """Event of the process with this number, as described in `nep.recordings.child`."""
 
     process: int
     content: Mapping[str, object]
@@ -45,7 +45,7 @@ class RecorderSaid:
 
 @dataclass(frozen=True, slots=True)
 class RecorderGone:
-    """The process of this number has ended, or could not be started; ``detail`` is what it said at last."""
+    """The process with this number has ended or could not be started; ``detail`` is its last output."""
 
     process: int
     detail: str
@@ -53,7 +53,7 @@ class RecorderGone:
 
 @dataclass(frozen=True, slots=True)
 class RingChoice:
-    """What the flight recorder keeps, in which folder, and how much of it."""
+    """Selection, folder and limits of the flight recorder."""
 
     folder: Path
     seconds: float = 60.0
@@ -64,13 +64,13 @@ class RingChoice:
 
 @dataclass(frozen=True, slots=True)
 class RecorderState:
-    """What the recorder does now.
+    """State of the recorder.
 
-    ``phase``: "" nothing, "starting", "recording", "ending". ``lost``: messages that did not come, by their
-    publishers' numbers; ``unkept``: that came and could not be written. ``free_bytes``: on its disk, None
-    while that is not known. ``ring_s``, ``ring_bytes``: what could be kept, None while there is no flight
-    recorder. ``keeping``: files that are being made of it. ``last``: the file that was finished last;
-    ``limit``: why that ended by itself, as it was to: "time", "size", or "".
+    ``phase`` is "" (idle), "starting", "recording" or "ending". ``lost`` counts missing messages by their
+    sequence numbers; ``unkept`` messages that could not be written. ``free_bytes`` is the free space of its
+    disk, None while unknown. ``ring_s`` and ``ring_bytes`` are the content of the flight recorder, None while
+    it is off. ``keeping`` are files being saved from it. ``last`` is the file that was finished last,
+    ``limit`` the limit at which it ended: "time", "size", or "".
     """
 
     phase: str = ""
@@ -90,31 +90,34 @@ class RecorderState:
 
 
 class OrderLine(Protocol):
-    """A process that carries out orders."""
+    """Process that executes commands."""
 
     def order(self, content: Mapping[str, object]) -> bool:
-        """Give it an order; False when there is no room for more. Never waits."""
+        """Send a command; return False when the queue is full. Never blocks."""
 
     def close(self, wait_s: float) -> None:
-        """No more orders come; wait so long for its end. It finishes what it has in any case."""
+        """Close the input and wait for the end at most ``wait_s`` seconds.
+
+        It finishes its work in any case.
+        """
 
 
 StartRecorder = Callable[[int, str, Callable[[object], object]], OrderLine]
-"""Starts the process of a number for a master's address; events are given to the last, from any thread."""
+"""Starts the process of a number for a master's address; its events go to the callback, from any thread."""
 
 
 class RecorderProcess:
-    """`nep.recordings.child` with its pipes. See `StartRecorder`."""
+    """Process `nep.recordings.child` with its pipes (see `StartRecorder`)."""
 
     def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
-        """Start it, in a thread; what happens is posted as `RecorderSaid`, and at last a `RecorderGone`."""
+        # Starts in a thread; posts `RecorderSaid` events, and finally a `RecorderGone`.
         self._number, self._address, self._post_event = number, address, post_event
         self._orders: queue.Queue[bytes | None] = queue.Queue(MOST_ORDERS)
         self._has_ended = threading.Event()
         threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
 
     def order(self, content: Mapping[str, object]) -> bool:
-        """See `OrderLine`."""
+        """Queue a command; return False when the queue is full."""
         try:
             self._orders.put_nowait(orjson.dumps(content) + b"\n")
         except queue.Full:
@@ -122,8 +125,8 @@ class RecorderProcess:
         return True
 
     def close(self, wait_s: float) -> None:
-        """See `OrderLine`."""
-        with suppress(queue.Full):  # then it does not read, and what it has is ended with this process
+        """Close the input and wait for the end of the process."""
+        with suppress(queue.Full):  # then it does not read, and its work ends with this process
             self._orders.put_nowait(None)
         self._has_ended.wait(wait_s)
 
@@ -148,7 +151,7 @@ class RecorderProcess:
             stdout=subprocess.PIPE,
             stderr=log,
             creationflags=NO_CONSOLE,
-            start_new_session=True,  # Ctrl+C in a terminal is Studio's, which ends it well
+            start_new_session=True,  # Ctrl+C in a terminal is for Studio, which stops it properly
         )
         writer = threading.Thread(target=self._write, args=(process,), name="recorder-orders", daemon=True)
         writer.start()
@@ -160,14 +163,14 @@ class RecorderProcess:
                         self._post_event(RecorderSaid(self._number, content))
             code = process.wait()
             with suppress(queue.Full):
-                self._orders.put_nowait(None)  # lets the thread end that waits for orders
+                self._orders.put_nowait(None)  # ends the thread that waits for commands
             writer.join(END_WAIT_S)
         return "" if code == 0 else _tail(log) or _("it ended with exit code {code}").format(code=code)
 
     def _write(self, process: subprocess.Popen[bytes]) -> None:
         if process.stdin is None:
             return
-        with suppress(OSError):  # it has gone, which the other thread tells
+        with suppress(OSError):  # it has ended, which the other thread reports
             while (line := self._orders.get()) is not None:
                 process.stdin.write(line)
                 process.stdin.flush()
@@ -176,7 +179,7 @@ class RecorderProcess:
 
 
 def _tail(log: IO[bytes]) -> str:
-    """The last line of what it said."""
+    # Last line of the output.
     size = log.seek(0, 2)
     log.seek(max(0, size - _TAIL_BYTES))
     lines = log.read().decode("utf-8", "replace").split("\n")
@@ -184,7 +187,7 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class RecorderClient:
-    """Gives orders to the recorder and knows what it does. One thread uses it (the window's)."""
+    """Sends commands to the recorder and tracks its state. Not thread-safe: window's thread only."""
 
     def __init__(
         self,
@@ -195,7 +198,7 @@ class RecorderClient:
         start: StartRecorder = RecorderProcess,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``post_event`` brings what the process's threads tell to `on_event`. Nothing is started yet."""
+        # `post_event` passes events of the process's threads to `on_event`.
         self._address, self._alerts, self._post_event = address, alerts, post_event
         self._start, self._clock = start, clock
         self._line: OrderLine | None = None
@@ -213,9 +216,9 @@ class RecorderClient:
         }
         self.state = RecorderState()
         self.revision = 0
-        """Grows when the state has changed."""
+        """Counter that increases with each change of the state."""
 
-    # ---- what a person does
+    # ---- commands of the user
 
     def record(
         self,
@@ -227,9 +230,9 @@ class RecorderClient:
         seconds: float | None = None,
         most_bytes: int | None = None,
     ) -> bool:
-        """Begin a recording; all topics when none are named. False when one goes on already.
+        """Start recording these topics (all if empty); return False when a recording is in progress.
 
-        It ends by itself after so many ``seconds``, or with ``most_bytes``, whichever comes first.
+        It ends after ``seconds`` or at ``most_bytes``, whichever comes first.
         """
         if self.state.phase:
             return False
@@ -253,27 +256,27 @@ class RecorderClient:
         return True
 
     def stop(self) -> None:
-        """End the recording; it is whole when ``phase`` is "" again."""
+        """Stop recording; the file is complete when ``phase`` is "" again."""
         if self.state.phase in {"starting", "recording"}:
             self._set(replace(self.state, phase="ending"))
             self._order(op="stop")
 
     def note(self, text: str) -> None:
-        """Put a bookmark with these words into the recording."""
+        """Add a bookmark with this text to the recording."""
         if self.state.phase == "recording":
             self._order(op="note", text=text)
 
     def say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
-        """Put what happens now into what is recorded and into the flight recorder; else it is dropped.
+        """Add an event to the recording and the flight recorder, if they are on.
 
-        ``to``: into one of them alone, "recording" or "ring".
+        ``to`` restricts it to "recording" or "ring".
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
         if self._line is not None and is_heard:
             self._line.order({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def follow_ring(self, choice: RingChoice | None) -> None:
-        """Have the flight recorder on with this choice, or off. It comes back by itself when it has gone."""
+        """Switch the flight recorder on with this selection, or off. It restarts after a failure."""
         if choice == self._ring:
             return
         was_on, self._ring = self._ring is not None, choice
@@ -285,7 +288,7 @@ class RecorderClient:
             self._begin_ring(choice)
 
     def keep(self, path: Path, seconds: float, note: str = "") -> bool:
-        """Make a recording of the last seconds; False without a flight recorder, or with too many at once."""
+        """Save the last seconds to a file; return False without a flight recorder, or with too many saves."""
         if self._ring is None or self._line is None or len(self.state.keeping) >= MOST_KEEPING:
             return False
         self._set(replace(self.state, keeping=(*self.state.keeping, path)))
@@ -293,20 +296,20 @@ class RecorderClient:
         return True
 
     def check(self) -> None:
-        """Once a second: a flight recorder that is wanted and has gone is started again."""
+        """Restart a flight recorder that ended unexpectedly. Called once a second."""
         if self._ring is not None and self._line is None and self._clock() >= self._again_at:
             self._begin_ring(self._ring)
 
     def close(self, wait_s: float = END_WAIT_S) -> None:
-        """Studio ends. The process finishes what it has, also beyond the time that is waited here."""
+        """Close the process, which finishes its work even beyond the time waited here."""
         line, self._line = self._line, None
         if line is not None:
             line.close(wait_s)
 
-    # ---- what the process tells
+    # ---- events of the process
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
-        """Take over what a thread posted; what an earlier process says does not count any more."""
+        """Apply a posted event; those of earlier processes are ignored."""
         if event.process != self._number or self._line is None:
             return
         if isinstance(event, RecorderGone):
@@ -361,7 +364,7 @@ class RecorderClient:
         status = content.get("status")
         problem = status.get("problem") if isinstance(status, Mapping) else ""
         if isinstance(problem, str) and problem:
-            self._ring = None  # a person switches it on again, when there is room
+            self._ring = None  # the user switches it on again when there is space
             self._tell_of_ring(problem)
         if self._ring is None:
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
@@ -387,7 +390,6 @@ class RecorderClient:
             self._alerts.put("recorder:ended", "error", _("The recording could not be closed."), sentence)
 
     def _on_gone(self, detail: str) -> None:
-        """The process has ended by itself."""
         before, self._line = self.state, None
         self._again_at = self._clock() + self._again_s
         self._again_s = min(2 * self._again_s, AGAIN_AT_MOST_S)
@@ -401,7 +403,7 @@ class RecorderClient:
         if self._ring is not None:
             self._tell_of_ring(detail)
 
-    # ---- inside
+    # ---- private
 
     def _tell_of_ring(self, reason: str) -> None:
         title = _("The flight recorder is off: the last seconds can't be saved.")

@@ -1,4 +1,4 @@
-"""Which behaviours run and which alarms are on, told to the recorder: they stand in each recording."""
+"""Events for recordings: runs of behaviours and alarms."""
 
 from __future__ import annotations
 
@@ -14,28 +14,27 @@ from nep.programs.alarms import AlarmEvent
 from nep.programs.alarms.sentences import what_words
 
 MOST_PRESENT = 200
-"""Alarms that are on at once and are told again and again; those beyond are told once."""
+"""Maximum number of present alarms that are repeated; further ones are sent once."""
 MOST_LETTERS = 200
 _GOES_ON = frozenset({"running", "paused"})
 
 
 class Say(Protocol):
-    """Gives something to the recorder."""
+    """Sends an event to the recorder."""
 
     def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
-        """The role of a channel ("runs", "alarms"), what stands in it; "recording" or "ring": that alone."""
+        """Send to a channel ("runs", "alarms"); ``to`` restricts it to "recording" or "ring"."""
 
 
 class RecordedEvents:
-    """Tells what happens as it happens. One thread uses it (the window's).
+    """Sends events to the recorder. Not thread-safe: use it from the window's thread.
 
-    What goes on is told again (`repeat`): to a recording that begins later, and once a second to the flight
-    recorder, so that it stands in what is kept of the last seconds. In a long recording it stands only where
-    it changes: to read it there the whole file would have to be read.
+    Present runs and alarms are repeated (`repeat`): to a recording that starts later, and once a second to
+    the flight recorder, so that every saved part contains them. A long recording has only the changes.
     """
 
     def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
-        """``say`` gives it to the recorder; ``clock_ns`` tells ns since 1970, as the recorder's does."""
+        # `clock_ns` is ns since 1970, as in the recorder.
         self._say, self._clock_ns = say, clock_ns
         self._numbers = count(1)
         self._present: dict[str, tuple[str, Mapping[str, object]]] = {}
@@ -43,14 +42,14 @@ class RecordedEvents:
         self._run_told: dict[str, object] = {}
 
     def repeat(self, to: str) -> None:
-        """Tell the "recording" or the "ring" once more what goes on."""
+        """Send the present runs and alarms to the "recording" or the "ring" again."""
         for role, told in self._present.values():
             self._say(role, told, to)
 
     # ---- behaviours
 
     def follow_run(self, run: RunState) -> None:
-        """Look at how the run is now; asked at each tick."""
+        """Apply the state of the run. Called at each tick."""
         before, self._run = self._run, run
         if run is before:
             return
@@ -65,7 +64,7 @@ class RecordedEvents:
             self._put("runs", self._run_told)
 
     def _end_run(self, run: RunState | None) -> None:
-        """It has ended; of one whose end nobody saw (``run`` is None) it is not known how."""
+        # `run` is None if the end was not observed.
         self._run_told["until_ns"] = self._clock_ns()
         self._present.pop(str(self._run_told.get("id")), None)
         if run is None:
@@ -75,7 +74,7 @@ class RecordedEvents:
             self._tell_result(run)
 
     def _tell_result(self, run: RunState) -> None:
-        """How it ended; told again with how long the robots took when they have answered."""
+        # Sent again with the robots' time once they have replied.
         told = {**self._run_told, **_result(run)}
         if told != self._run_told:
             self._run_told = told
@@ -86,7 +85,7 @@ class RecordedEvents:
     # ---- alarms
 
     def take_alarm(self, event: AlarmEvent) -> None:
-        """An alarm came on, went off, or is still on."""
+        """Apply an alarm event: on, off, or still on."""
         key = f"alarm-{event.rule.id}"
         known = self._present.get(key)
         if event.kind == "off":
@@ -102,7 +101,7 @@ class RecordedEvents:
         told["topic"] = "" if condition.is_about_node else condition.name
         self._put("alarms", told, key)
 
-    # ---- inside
+    # ---- private
 
     def _new(self, id: str, name: str) -> dict[str, object]:
         since_ns = self._clock_ns()
@@ -115,12 +114,11 @@ class RecordedEvents:
 
 
 def _is_same(before: RunState, run: RunState) -> bool:
-    """Whether it is the same run: its clock is set once more when its scripts begin, and never else."""
+    # The clock of the same run is set once more when its scripts begin.
     return run.started_s == before.started_s or (run.begun and not before.begun)
 
 
 def _result(run: RunState) -> dict[str, object]:
-    """How it ended: "ended" by itself, "failed" at a block, or "stopped"."""
     if run.errors:
         return {"result": "failed", "words": next(iter(run.errors.values()))[:MOST_LETTERS]}
     if run.finished:

@@ -1,4 +1,4 @@
-"""An export that goes on beside the window, tells how far it is, and can be cancelled."""
+"""Export of a recording in the background, with progress and cancellation."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from nep.recordings.formats.damage import damage_words
 
 
 class _CancelledError(Exception):
-    """A person gave it up."""
+    """The user cancelled the export."""
 
 
 class RecordingExport:
-    """One export, in a thread of its own. All that is here may be asked from any thread."""
+    """Export in a thread of its own. Thread-safe."""
 
     def __init__(
         self,
@@ -27,18 +27,16 @@ class RecordingExport:
         part: Part = ALL_OF_IT,
         opener: RecordingOpener | None = None,
     ) -> None:
-        """Begin; ``kind`` is one of `nep.recordings.export.FORMATS`, the folder is made.
-
-        ``opener`` is closed at the end.
-        """
+        # `kind` is one of `nep.recordings.export.FORMATS`; the folder is created. `opener` is closed at the
+        # end.
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.damage = ""
-        """What of the recording could not be read, in words; "" for nothing."""
+        """Description of the unreadable parts of the recording, or ""."""
         self._part = part
         self.folder = folder
         self.files: tuple[Exported, ...] = ()
         self.problem = ""
-        """Why it failed, in words; "" when it did not."""
+        """Reason of a failure, or ""."""
         self._recording, self._kind = recording, kind
         self._progress = (0, 0)
         self._is_cancelled = threading.Event()
@@ -48,32 +46,32 @@ class RecordingExport:
 
     @property
     def is_over(self) -> bool:
-        """Whether it is finished, has failed, or was cancelled."""
+        """True if it has finished, failed, or was cancelled."""
         return self._is_over.is_set()
 
     @property
     def was_cancelled(self) -> bool:
-        """Whether a person gave it up."""
+        """True if the user cancelled it."""
         return self._is_cancelled.is_set()
 
     @property
     def share(self) -> float | None:
-        """How far it is, 0 to 1; None while that is not known."""
+        """Progress from 0 to 1; None while unknown."""
         done, total = self._progress
         return done / total if total else None
 
     def cancel(self) -> None:
-        """Give it up: a file that is not whole is removed, those before it stay."""
+        """Cancel the export: an incomplete file is removed, complete ones stay."""
         self._is_cancelled.set()
 
     def close(self, wait_s: float = 2.0) -> None:
-        """Give it up and wait so long for its end."""
+        """Cancel the export and wait for its end at most ``wait_s`` seconds."""
         self.cancel()
         self._thread.join(wait_s)
         self._opener.close()
 
     def words(self) -> str:
-        """What came of it, in a sentence without a full stop; "" while it goes on."""
+        """Return the result as a sentence without a full stop, or "" while it runs."""
         if not self.is_over:
             return ""
         if self.was_cancelled and not self.files:

@@ -1,4 +1,4 @@
-"""A recording at a glance: some pictures along its time, and how much came when. Read in a thread."""
+"""Preview of a recording: images along its time, and message counts. Read in a thread."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
 _BUDGET = (1_000_000_000, 20.0)
-"""Bytes and seconds of work for one recording."""
+"""Limit of bytes and seconds for one recording."""
 _MAX_TOPICS = 10_000
 SAMPLES = 4
-"""So many messages of a topic are looked at where nobody has counted its bytes."""
+"""Number of messages of a topic that are read to estimate its size."""
 MOST_SAMPLED = 200
-"""Topics of a recording of which that is done; of the others no size is known."""
+"""Maximum number of topics whose size is estimated; that of others is unknown."""
 
 
 @dataclass(frozen=True)
 class FilmStripLook:
-    """What is in a recording from ``start_ns`` to ``end_ns``.
+    """Preview of a recording from ``start_ns`` to ``end_ns``.
 
-    ``pictures`` are those in the middles of equal parts of its time, of the topic that has most, None where
-    one can't be read; none without such a topic. ``counts``: messages of all topics in each equal part;
-    ``by_topic``: of each. ``message_bytes``: of a message of each topic, on average, where it is known.
+    ``pictures`` are images at the centres of equal parts of the time, of the topic with most images; None
+    where one can't be read, empty without such a topic. ``counts`` are the messages of all topics in equal
+    parts, ``by_topic`` those of each topic. ``message_bytes`` is the average message size by topic, where
+    known.
     """
 
     path: Path
@@ -42,15 +43,14 @@ class FilmStripLook:
     message_bytes: Mapping[str, float] = field(default_factory=dict)
 
     def size_of(self, topic: RecordedTopic) -> float | None:
-        """About how many bytes all messages of a topic have; None where it is not known."""
+        """Return the estimated size of all messages of a topic in bytes; None if unknown."""
         each = self.message_bytes.get(topic.name)
         return None if each is None else each * topic.message_count
 
     def about(self, begin_ns: int, end_ns: int, topics: Collection[str]) -> tuple[float, float | None]:
-        """About how many messages of these topics came from a time to another, and their bytes.
+        """Estimate the number and bytes of messages of these topics in a time range.
 
-        Of a part of the time it is as exact as ``counts`` are fine. The bytes are None where those of one of
-        the topics are not known.
+        The precision is that of ``counts``. The bytes are None if they are unknown for one of the topics.
         """
         count = size = 0.0
         is_known = True
@@ -64,7 +64,7 @@ class FilmStripLook:
         return count, size if is_known else None
 
     def _share(self, counts: Sequence[int], begin_ns: int, end_ns: int) -> float:
-        """How much of what is counted in equal parts is between two times, 0 to 1."""
+        # Share of the counted messages within the range, 0 to 1.
         if begin_ns <= self.start_ns and end_ns >= self.end_ns:
             return 1.0
         whole = sum(counts)
@@ -79,7 +79,7 @@ class FilmStripLook:
 def film_strip(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
 ) -> FilmStripLook | None:
-    """Look at a recording: so many pictures, each for a view of that size; None when it can't be read."""
+    """Read the preview of a recording with this number and size of images; None if it can't be read."""
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
             if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
@@ -110,7 +110,7 @@ def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | No
 
 
 def _message_bytes(recording: Recording) -> dict[str, float]:
-    """By topic: what the recorder counted; of others those of a few messages along the time."""
+    # From the recorder's counts, else from a few messages along the time.
     figures = recording.figures()
     made = {
         topic: each.size_bytes / each.received
@@ -130,9 +130,9 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
 def part_of(
     look: FilmStripLook, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
 ) -> Part:
-    """The part between two times (both are in it) with the topics that patterns mean; all without any.
+    """Return the part in a time range (inclusive) with topics that match the patterns; all without patterns.
 
-    Its topics are empty when none fits. Raises `BadTopicError` for what can be no topic.
+    Its topics are empty if none matches. Raises `BadTopicError` for an invalid pattern.
     """
     topics = None
     if wanted or unwanted:

@@ -1,4 +1,4 @@
-"""The recordings of a folder with what is in each, read outside of the window's thread."""
+"""Recordings of a folder and their contents, read in a thread."""
 
 from __future__ import annotations
 
@@ -21,26 +21,25 @@ from nep.recordings.reader import Recording
 SUFFIX = ".mcap"
 MOST_FILES = 2_000
 AT_ONCE = 50
-"""So many files are opened before what is known so far is shown."""
+"""Number of files that are read before a partial result is shown ..."""
 MOST_S = 2.0
-"""... and for so long: each of them may take some seconds."""
+"""... and time limit: a file may take some seconds."""
 MOST_TOPICS = 200
 CACHE_BYTES = 8_000_000
-"""Of one recording that is open for a moment only."""
+"""Cache size for a recording that is open only briefly."""
 SCAN_BUDGET = (256_000_000, 3.0)
-"""Bytes and seconds of work that a look into one file may take."""
+"""Limit of bytes and seconds for scanning one file."""
 _OWNER = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingFacts:
-    """A file of the folder.
+    """File of the folder.
 
-    ``problem`` says why it cannot be read; "" when it can. ``not_scanned``: why it was not looked into; it
-    may be opened all the same. ``is_complete``: it was closed; else it is read as far as it is whole.
-    ``is_kept``: made by a flight recorder. ``is_read``: whether
-    more than name, size and time is known yet. ``topics``: the first 200 names. ``lost``: messages that did
-    not come or could not be written, None where nobody counted.
+    ``problem`` is why it can't be read, or "". ``not_scanned`` is why it was not scanned; it may still be
+    openable. ``is_complete``: it was closed properly; otherwise its intact part is read. ``is_kept``: saved
+    by a flight recorder. ``is_read``: more than name, size and time are known. ``topics`` are the first 200
+    names. ``lost`` counts messages that were lost or could not be written, None if not counted.
     """
 
     path: Path
@@ -62,10 +61,10 @@ class RecordingFacts:
 
 @dataclass(frozen=True, slots=True)
 class FolderLook:
-    """What is in the folder, the newest first.
+    """Contents of the folder, newest first.
 
-    ``problem`` says why it cannot be looked at. ``left_out``: older files beyond the most that are listed.
-    ``is_whole``: all files have been read; else look again.
+    ``problem`` is why it can't be read. ``left_out`` counts older files beyond the limit. ``is_whole``: all
+    files have been read; otherwise call `RecordingFolder.look` again.
     """
 
     files: Sequence[RecordingFacts] = ()
@@ -75,13 +74,13 @@ class FolderLook:
 
 
 def usual_folder() -> Path:
-    """Where recordings go unless a person chooses another folder."""
+    """Return the default folder of recordings."""
     home = os.environ.get("NEP_STUDIO_HOME")
     return Path(home or platformdirs.user_documents_dir()) / _("Recordings")
 
 
 def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
-    """A name for a recording that no file of the folder has yet."""
+    """Return an unused path for a recording."""
     stem = f"{word}-{now.strftime('%Y-%m-%d-%H-%M-%S')}"
     made, number = folder / f"{stem}{SUFFIX}", 2
     while made.exists():
@@ -90,26 +89,25 @@ def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
 
 
 class RecordingFolder:
-    """Looks at a folder again and again, and opens only what is new. One thread uses it (the window's)."""
+    """Scans a folder repeatedly, and opens only new files. Not thread-safe: window's thread only."""
 
     def __init__(self, folder: Path, opener: RecordingOpener | None = None) -> None:
-        """Nothing is looked at before `look`. ``opener`` is closed with it."""
         self.folder = folder
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self._worker: BackgroundWorker[FolderLook] = BackgroundWorker("recordings-folder")
         self._known: dict[Path, tuple[tuple[int, int], RecordingFacts]] = {}
-        """By the thread of the worker alone."""
+        """Used by the worker thread only."""
 
     def look(self, being_written: Path | None = None) -> None:
-        """Look at it once more, in another thread; `take` has what is found. That file is not opened."""
+        """Start a scan in another thread; `take` returns the result. ``being_written`` is not opened."""
         self._worker.ask(_OWNER, lambda: self._look(being_written))
 
     def take(self) -> FolderLook | None:
-        """What a look has found, once; None while nothing new is known."""
+        """Return a new scan result once; None while there is none."""
         return self._worker.take(_OWNER)
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop scanning."""
         self._opener.close()
         self._worker.close()
 
@@ -144,7 +142,7 @@ class RecordingFolder:
 
 
 def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
-    """The same with what the file says of itself, or why it cannot be read or was not scanned."""
+    """Return the facts with those read from the file, or why it can't be read or was not scanned."""
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words = recording.words
@@ -173,13 +171,13 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
 def _lost(recording: Recording) -> int | None:
     try:
         figures = recording.figures()
-    except RecordingTooLargeError:  # of a file that was not closed all of them must be read
+    except RecordingTooLargeError:  # a file that was not closed would have to be read completely
         return None
     return sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None
 
 
 def picture_in(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
-    """A picture of its fullest topic of pictures, for a view of that size; None where it has none."""
+    """Return an image of the topic with most images, for a view of this size; None if there is none."""
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             topics = [each for each in recording.topics.values() if each.codec == "image"]

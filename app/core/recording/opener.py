@@ -1,4 +1,4 @@
-"""Where recordings are read: in a process of their own, so that no file can take Studio with it.
+"""Reading recordings in a separate process, so that no file can crash Studio.
 
 Tests, and programs without a window, may read them in their own process.
 """
@@ -19,7 +19,7 @@ __all__ = ["LocalOpener", "RecordingOpener", "process_opener"]
 
 
 class RecordingOpener(Protocol):
-    """Opens recordings. See `nep.recordings.apart.remote.ReaderProcess`."""
+    """Opens recordings (see `nep.recordings.apart.remote.ReaderProcess`)."""
 
     def open(
         self,
@@ -32,11 +32,11 @@ class RecordingOpener(Protocol):
         """Open a recording. Raises `RecordingError`."""
 
     def close(self) -> None:
-        """End at once, also while a recording is read. May be called twice."""
+        """Stop at once, also while a recording is read. Idempotent."""
 
 
 def process_opener() -> RecordingOpener:
-    """Return what reads recordings in a process of its own, which is started with the first one."""
+    """Return an opener that reads recordings in a separate process, started with the first one."""
     return ReaderProcess(module_command("nep.recordings.apart.reader_process"))
 
 
@@ -51,11 +51,11 @@ class LocalOpener:
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """See `RecordingOpener`."""
+        """Open a recording. Raises `RecordingError`."""
         limit = None if budget is None else ReadBudget(path, *budget)
         return Recording(
             path, file=FileReader(path, cache_bytes=cache_bytes, progress=progress, budget=limit)
         )
 
     def close(self) -> None:
-        """See `RecordingOpener`."""
+        """Do nothing: it has no process."""

@@ -1,4 +1,4 @@
-"""What a session records: when a person wants it, the last seconds always, and where the files are."""
+"""Recordings of a session: started by the user, the flight recorder, and their folder."""
 
 from __future__ import annotations
 
@@ -41,26 +41,25 @@ from nep.system.lazy_import import lazy_module
 if TYPE_CHECKING:
     from app.core.recording import folder as folders
     from app.core.recording import opener as openers
-else:  # they read recordings: no start waits for that
+else:  # they import the reading of recordings, which no start should wait for
     folders = lazy_module("app.core.recording.folder")
     openers = lazy_module("app.core.recording.opener")
 
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
 CHOOSE_FOLDER = "recording.folder"
-"""The window's command that asks for another folder."""
+"""Window command for choosing another folder."""
 _GB = 1_000_000_000
 _KEPT_FILE = re.compile(r"[\w.-]+\.mcap\b")
 
 
-def _nobody(_path: Path, _kind: str) -> None:
-    """Nobody wants to know what was made."""
+def _nobody(_path: Path, _kind: str) -> None: ...
 
 
 class SessionRecordings:
-    """The recordings of a session. One thread uses it (the window's), which `on_event` brings what happens.
+    """Recordings of a session. Not thread-safe: use it from the window's thread, also `on_event`.
 
-    ``on_made`` is told of each file that is finished, with "recorded" or "kept".
+    ``on_made`` is called with each finished file, and "recorded" or "kept".
     """
 
     def __init__(
@@ -75,10 +74,7 @@ class SessionRecordings:
         now: Callable[[], datetime] = datetime.now,
         reads_apart: bool = True,
     ) -> None:
-        """Read what was chosen; nothing is started before `start`, or before something is recorded.
-
-        ``reads_apart``: recordings are read in processes of their own.
-        """
+        # `reads_apart`: recordings are read in separate processes.
         self._reads_apart = reads_apart
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
@@ -87,28 +83,26 @@ class SessionRecordings:
         self.wish = read_wish(settings.get(RING_KEY, {}))
         self.on_made: Callable[[Path, str], object] = _nobody
         self.recorded = self.choice
-        """What the recording that goes on has."""
+        """Selection of the recording in progress."""
         self._began: float | None = None
         self._keeping: dict[Path, Done | None] = {}
 
-    # ---- where the files are
+    # ---- folder
 
     @property
     def folder(self) -> Path:
-        """Where recordings go."""
+        """Folder of recordings."""
         chosen = self._settings.get(FOLDER_KEY, "")
         return Path(chosen) if chosen else folders.usual_folder()
 
     def set_folder(self, folder: Path) -> None:
-        """Let recordings go there from now on."""
+        """Set and save the folder of recordings."""
         self._put(FOLDER_KEY, str(folder))
         self._alerts.resolve(NO_FOLDER)
 
     def _ready_folder(self) -> Path | None:
-        """The folder, which is there; None when it can't be, which an alert says.
-
-        A folder that a person chose is not made anew: its disk may be away.
-        """
+        # None if it doesn't exist, which an alert reports. A chosen folder is not created: its disk may not
+        # be mounted.
         folder = self.folder
         problem = ""
         try:
@@ -133,30 +127,30 @@ class SessionRecordings:
         return None
 
     def new_opener(self) -> openers.RecordingOpener:
-        """Return what opens recordings; who has it closes it."""
+        """Return a new opener of recordings, which the caller closes."""
         return openers.process_opener() if self._reads_apart else openers.LocalOpener()
 
     # ---- recording
 
     @property
     def is_recording(self) -> bool:
-        """Whether a recording begins, goes on, or is being finished."""
+        """True if a recording is starting, in progress, or being finished."""
         return bool(self.client.state.phase)
 
     @property
     def elapsed_s(self) -> float:
-        """For how long this one has been recorded; 0 when nothing is, or its process is only beginning."""
+        """Duration of the recording in seconds; 0 when idle or while its process starts."""
         return 0.0 if self._began is None else max(0.0, self._clock() - self._began)
 
     def choose(self, choice: RecordingChoice) -> None:
-        """Record this the next time, and after the next start."""
+        """Set and save the selection for the next recordings."""
         self.choice = choice
         self._put(CHOICE_KEY, plain_choice(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
-        """Begin; ``choice`` is for this time only. Gives why not in a sentence, "" when it begins.
+        """Start a recording; return a sentence why it can't start, or "".
 
-        Without a ``name`` the file has the time as its name.
+        ``choice`` applies to this recording only. Without a ``name`` the file is named by the time.
         """
         choice = choice if choice is not None else self.choice
         if self.is_recording:
@@ -183,20 +177,20 @@ class SessionRecordings:
         return ""
 
     def stop(self) -> None:
-        """End the recording."""
+        """Stop the recording."""
         self.client.stop()
 
-    # ---- the flight recorder
+    # ---- flight recorder
 
     @property
     def is_ring_on(self) -> bool:
-        """Whether the last seconds can be kept, or will soon."""
+        """True if the flight recorder is on."""
         return self.client.state.ring_s is not None
 
     def set_wish(self, wish: RingWish) -> None:
-        """Have the flight recorder on or off, now and after the next start.
+        """Set and save the flight recorder's settings.
 
-        Another choice of topics begins it anew: what was there to be kept is gone.
+        Another selection of topics restarts it: its content is discarded.
         """
         self.wish = wish
         self._put(RING_KEY, plain_wish(wish))
@@ -214,9 +208,9 @@ class SessionRecordings:
         )
 
     def keep(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
-        """Make a recording of the last seconds; gives why not in a sentence, "" when it is being made.
+        """Save the last seconds to a file; return a sentence why that can't start, or "".
 
-        ``done`` is told when it is there, or why it is not.
+        ``done`` is called with the result when the file is finished.
         """
         if not self.wish.is_on:
             return _("The flight recorder is off.")
@@ -234,26 +228,26 @@ class SessionRecordings:
         return ""
 
     def carry(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        """An alarm keeps the last seconds."""
+        """Save the last seconds as the action of an alarm."""
         said = what_words(event.rule.condition, event.seen)
         why_not = self.keep(said, action.seconds, done)
         if why_not:
             words = _("nothing saved: {reason}")
             done(False, words.format(reason=f"{why_not[:1].lower()}{why_not[1:]}".rstrip(".")))
 
-    # ---- what the session does
+    # ---- interface of the session
 
     def start(self) -> None:
-        """Begin what was on when Studio ended."""
+        """Start the flight recorder if it was on when Studio closed."""
         self._follow_wish()
 
     def check(self) -> None:
-        """Once a second."""
+        """Check the recorder. Called once a second."""
         self.client.check()
         self.events.repeat("ring")
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
-        """Take over what the recorder's process told."""
+        """Apply an event of the recorder's process."""
         was = self.client.state
         self.client.on_event(event)
         state = self.client.state
@@ -274,15 +268,15 @@ class SessionRecordings:
                 done(is_there, words.format(file=path.name))
 
     def close(self) -> None:
-        """End: what is being recorded is finished by its process, also when that takes longer than Studio."""
+        """Close; the process finishes a recording in progress, even after Studio has ended."""
         self.client.close()
 
     def _put(self, key: str, value: object) -> None:
-        with suppress(SettingsError):  # an alert says that settings can't be kept
+        with suppress(SettingsError):  # an alert reports that settings can't be saved
             self._settings.set(key, value)
 
 
 def kept_file(words: str) -> str:
-    """The name of the file in "kept alarm-2026-11-27-10-00-00.mcap"; "" where there is none."""
+    """Return the file name in "kept alarm-2026-11-27-10-00-00.mcap", or ""."""
     found = _KEPT_FILE.search(words)
     return found[0] if found is not None else ""

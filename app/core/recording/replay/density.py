@@ -1,4 +1,4 @@
-"""How full a recording is, where something was lost, what went on: read in a thread, for a time line."""
+"""Message density, losses, runs and alarms of a recording, read in a thread for the timeline."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from nep.recordings.formats.figures import TopicFigures
 from nep.recordings.reader import Recording
 
 MOST_MARKS = 2_000
-"""Of one topic; what was lost later is counted with the last one."""
+"""Maximum number of marks of one topic; later losses are added to the last one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Density:
-    """The messages of each topic in each of so many equal parts of [``start_ns``, ``end_ns``)."""
+    """Messages of each topic in each of ``buckets`` equal parts of [``start_ns``, ``end_ns``)."""
 
     start_ns: int
     end_ns: int
@@ -26,14 +26,14 @@ class Density:
     counts: Mapping[str, Sequence[int]]
 
     def peak(self, topic: str) -> int:
-        """The most messages of a topic in one part."""
+        """Return the highest number of messages of a topic in one part."""
         counts = self.counts.get(topic)
         return max(counts, default=0) if counts is not None else 0
 
 
 @dataclass(frozen=True, slots=True)
 class LossMark:
-    """So many messages were lost, or were not kept, in the second that ended then."""
+    """Messages that were lost or not stored in the second that ends at ``at_ns``."""
 
     at_ns: int
     count: int
@@ -47,10 +47,9 @@ class _Made:
 
 
 class Densities:
-    """Of one recording. One thread uses it (the window's); what it asks for is there some ticks later."""
+    """Densities of one recording. Not thread-safe: window's thread only. Results arrive some ticks later."""
 
     def __init__(self, recording: Recording) -> None:
-        """Look for losses, runs and alarms at once."""
         self._recording = recording
         self._worker: BackgroundWorker[_Made] = BackgroundWorker("studio-density")
         self.newest: Density | None = None
@@ -62,7 +61,7 @@ class Densities:
         self._worker.ask("spans", lambda: _Made(spans=spans_of(recording)))
 
     def want(self, start_ns: int, end_ns: int, buckets: int) -> None:
-        """This part is shown; asked again and again it is read once."""
+        """Request the density of the shown part; repeated requests are read once."""
         wanted = (start_ns, end_ns, buckets)
         if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
             return
@@ -70,7 +69,7 @@ class Densities:
         self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
 
     def take(self) -> bool:
-        """Take over what is ready; whether something is new. `problem` says why reading failed, if it did."""
+        """Take finished results; return whether there are any. `problem` is the reason of a failure."""
         density, losses, spans = (self._take(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
@@ -88,21 +87,21 @@ class Densities:
             return None
 
     def close(self) -> None:
-        """End."""
+        """Stop the thread."""
         self._worker.close()
 
 
 def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -> Density:
-    """Count the messages of each part, of the index alone."""
+    """Count the messages of each part, using only the index."""
     found = recording.densities(start_ns, end_ns, buckets)
     return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
-    """Where the recorder's figures of each topic grew: there something was lost, or was not kept.
+    """Return where the recorder's loss counts of each topic increased.
 
-    What came late was missing until then: it is taken from the newest marks before, so that all marks of a
-    topic are as many as are missing at the end.
+    Messages that arrived late counted as lost until then: they are subtracted from the newest earlier marks,
+    so that the sum of all marks is the number of messages lost in the end.
     """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}
@@ -118,7 +117,7 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
                 marks.append(LossMark(at_ns, grown))
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
-    if recording.is_complete:  # not all figures were read
+    if recording.is_complete:  # not all counts were read
         before = {topic: _missing(each) for topic, each in recording.figures().items()}
     for topic, marks in found.items():
         _take_back(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
@@ -126,7 +125,7 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
 
 
 def _take_back(marks: list[LossMark], count: int) -> None:
-    """So many came after all: take them from the newest marks."""
+    # Late messages are subtracted from the newest marks.
     while marks and count > 0:
         newest = marks.pop()
         if newest.count > count:
@@ -135,12 +134,9 @@ def _take_back(marks: list[LossMark], count: int) -> None:
 
 
 def _figures_that_grow(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicFigures]]]:
-    """The figures at every time when more was missing than before, found by halving.
-
-    What is missing grows, but for what comes late, and how much it is at the end stands in the file: between
-    two times at which it is the same nothing is read. So of a long recording that lost little, little is
-    read; of one that was not ended all of them.
-    """
+    # Found by bisection. The counts only increase, except for late messages, and the final ones are in the
+    # file: nothing is read between two times with equal counts. So a long recording with few losses is read
+    # little; one that was not closed completely.
     if not recording.is_complete:
         yield from recording.figures_over_time()
         return

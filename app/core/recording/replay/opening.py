@@ -1,4 +1,4 @@
-"""Opening a recording to play it: only its index is read, and nothing is written."""
+"""Opening a recording for replay: reads only its index, and writes nothing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from nep.recordings.reader import Recording
 
 MAX_TOPICS = 10_000
 Progress = Callable[[float], object]
-"""Told how much of the file was looked through (0 to 1); what it raises ends the opening."""
+"""Called with the progress of scanning the file (0 to 1); an exception cancels the opening."""
 
 
 @dataclass(frozen=True)
 class OpenedRecording:
-    """A recording that can be played."""
+    """Recording that is open for replay."""
 
     recording: Recording
     bookmarks: Bookmarks
@@ -28,7 +28,7 @@ class OpenedRecording:
 
 
 def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
-    """Open a recording to play it. Raises `RecordingError` when it holds no message that can be read."""
+    """Open a recording for replay. Raises `RecordingError` when it has no readable message."""
 
     def told(done: int, whole: int) -> None:
         progress(done / max(1, whole))

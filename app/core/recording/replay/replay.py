@@ -1,4 +1,4 @@
-"""An open recording as the panels see it: topics, pictures, series, log, and what a person does with it."""
+"""Replay of a recording for the panels: topics, images, series, log, and its controls."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 
 FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
-"""The ids of what it tells in alerts."""
+"""Ids of its alerts."""
 SHOW_FILE = "recording.folder"
-"""The window's command, with the file's path, that shows where it is."""
+"""Window command that shows the file's folder; followed by the path."""
 LOGS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
 
 class Replay:
-    """One recording that is open. One thread uses it (the window's); `close` ends its threads.
+    """Open recording. Not thread-safe: use it from the window's thread. `close` ends its threads.
 
-    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` are what a session
-    has of the live network. A recording knows no nodes, and no other networks. ``chosen`` is the topic whose
-    messages are stepped through.
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` are the same as
+    those of the live network in a session. A recording has no nodes, and no other networks. ``chosen`` is the
+    topic whose messages are stepped through.
     """
 
     def __init__(
@@ -58,10 +58,8 @@ class Replay:
         acting: SessionActing | None = None,
         opener: RecordingOpener | None = None,
     ) -> None:
-        """Nothing is read before `start`. Without ``acting`` nothing of it can be sent.
-
-        ``opener`` opens the file, by default in this process; it is closed with the replay.
-        """
+        # `opener` opens the file, by default in this process; it is closed with the replay. Without `acting`
+        # nothing can be sent.
         self.path = path
         self.opened: OpenedRecording | None = None
         self._watches = Watches(self._begin_watch, self._end_watch)
@@ -84,95 +82,97 @@ class Replay:
             alerts.resolve(id)
 
     def start(self) -> None:
-        """Open the file, in a thread."""
+        """Open the file in a thread."""
         self.source.start()
 
     def watch(self, topic: str) -> Watch:
-        """Look at a topic until the watch is closed: its messages arrive in ``topics``."""
+        """Watch a topic until the watch is closed: its messages arrive in ``topics``."""
         return self._watches.open([topic])
 
     def end(self) -> None:
-        """Send nothing any more, let its threads end, and wait for nothing; `close` waits."""
+        """Stop sending and signal the threads to end without waiting; `close` waits."""
         if self.sending is not None:
             self.sending.end()
         self.source.end()
 
     @property
     def has_ended(self) -> bool:
-        """Whether its thread plays no more; what is left of it then ends at once."""
+        """True if its thread has ended; then the rest is closed too."""
         if self.source.has_ended:
             self.close()
         return self.source.has_ended
 
     def close(self) -> None:
-        """End; returns when its threads have. May be called twice."""
+        """Stop and wait for the threads. Idempotent."""
         self.source.close()
         if self.densities is not None:
             self.densities.close()
         self.images.close()
 
-    # -- how it is -------------------------------------------------------------------------------------------
+    # -- state
+    # --------------------------------------------------------------------------------------------------
 
     @property
     def status(self) -> ReplayStatus:
-        """How far it is, and where."""
+        """Stage of opening, and playback status."""
         return self.source.status
 
     @property
     def player(self) -> PlayerStatus | None:
-        """Where it is; None until it is open, and when it has failed."""
+        """Playback status; None before it is open, and after a failure."""
         return self.source.status.player
 
     @property
     def name(self) -> str:
-        """The file's name."""
+        """File name."""
         return self.path.name
 
     @property
     def start_ns(self) -> int:
-        """When the first message came; 0 until it is known."""
+        """Time of the first message; 0 while unknown."""
         return self.opened.recording.start_ns if self.opened is not None else 0
 
     @property
     def end_ns(self) -> int:
-        """When the last message came; 0 until it is known."""
+        """Time of the last message; 0 while unknown."""
         return self.opened.recording.end_ns if self.opened is not None else 0
 
     @property
     def recorded(self) -> Mapping[str, RecordedTopic]:
-        """The topics that are in the file."""
+        """Topics in the file."""
         return self.opened.recording.topics if self.opened is not None else {}
 
     @property
     def figures(self) -> Mapping[str, TopicFigures]:
-        """What became of each topic's messages while it was recorded, as far as that is known."""
+        """Recording statistics by topic, as far as known."""
         return self.opened.figures if self.opened is not None else {}
 
     @property
     def lost(self) -> int:
-        """How many messages did not get into the recording, of all topics of which that is known."""
+        """Number of messages missing in the recording, of topics with known statistics."""
         return sum((each.lost or 0) + each.unkept for each in self.figures.values())
 
     @property
     def bookmarks(self) -> Sequence[Bookmark]:
-        """Its bookmarks, the earliest first."""
+        """Bookmarks in order of time."""
         return self.opened.bookmarks.all if self.opened is not None else ()
 
     def _position_ns(self) -> int:
         player = self.source.status.player
         return player.position_ns if player is not None else self.start_ns
 
-    # -- what a person does ----------------------------------------------------------------------------------
+    # -- commands of the user
+    # -----------------------------------------------------------------------------------
 
     def play(self) -> None:
-        """Go on; from the beginning, of what is played, when it is at its end."""
+        """Play; at the end, restart from the beginning of the loop or recording."""
         player = self.player
         if player is not None and player.is_at_end:
             self.seek(player.loop[0] if player.loop is not None else self.start_ns)
         self.source.order("play", lambda playback: playback.play())
 
     def pause(self) -> None:
-        """Stay where it is."""
+        """Pause."""
         self.source.order("play", lambda playback: playback.pause())
 
     def toggle(self) -> None:
@@ -183,28 +183,28 @@ class Replay:
             self.play()
 
     def seek(self, at_ns: int) -> None:
-        """Go to a time; beyond its ends to those."""
+        """Seek to a time, limited to the recording."""
         at_ns = max(self.start_ns, min(at_ns, self.end_ns))
         self.source.order("seek", lambda playback: playback.seek(at_ns))
 
     def move(self, by_ns: int) -> None:
-        """Go on or back by some time."""
+        """Seek relative to the playhead."""
         self.source.order("move", lambda playback: playback.seek(playback.status().position_ns + by_ns))
 
     def step(self, *, forward: bool) -> None:
-        """Go to the next or previous message of the chosen topic, and pause."""
+        """Seek to the next or previous message of the chosen topic, and pause."""
         topic = self.chosen
         if topic in self.recorded:
             self.source.order("step", lambda playback: playback.step(topic, forward=forward))
 
     def choose(self, topic: str) -> None:
-        """Step through this topic's messages from now on."""
+        """Choose the topic whose messages are stepped through."""
         if topic in self.recorded:
             self.chosen = topic
 
     def set_speed(self, speed: float) -> None:
-        """How fast it is to be; the nearest that there is."""
-        wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  a NaN is none
+        """Set the speed, limited to the supported range."""
+        wanted = max(SPEED_MIN, min(SPEED_MAX, speed)) if speed == speed else 1.0  # noqa: PLR0124  excludes NaN
 
         def change(playback: Playback) -> None:
             playback.speed = wanted
@@ -212,7 +212,7 @@ class Replay:
         self.source.order("speed", change)
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Play a part again and again, or all of it; one without a length changes nothing."""
+        """Loop a range, or the whole recording; an empty range changes nothing."""
         if start_ns is not None and end_ns is not None:
             start_ns, end_ns = max(start_ns, self.start_ns), min(end_ns, self.end_ns)
             if start_ns >= end_ns:
@@ -220,11 +220,11 @@ class Replay:
         self.source.order("loop", lambda playback: playback.loop(start_ns, end_ns))
 
     def end_loop(self) -> None:
-        """Play on beyond the part's end, and once."""
+        """End the loop and continue beyond it."""
         self.source.order("loop", lambda playback: playback.end_loop())
 
     def toggle_loop(self) -> None:
-        """Loop all of it, or what was chosen; or no more."""
+        """Loop the whole recording or the chosen range; or end the loop."""
         player = self.player
         if player is not None and player.is_looping:
             self.end_loop()
@@ -232,7 +232,7 @@ class Replay:
             self.loop()
 
     def set_loop_edge(self, *, is_start: bool) -> None:
-        """Begin or end the part that is played again and again at the playhead."""
+        """Set the start or end of the loop to the playhead."""
         player = self.player
         if player is None:
             return
@@ -244,7 +244,7 @@ class Replay:
             self.loop(start_ns if start_ns < at_ns else self.start_ns, at_ns)
 
     def skip(self, *, forward: bool) -> None:
-        """Go to the next or previous mark: a bookmark, where an alarm or a run begins, else an end."""
+        """Seek to the next or previous mark: bookmark, start of an alarm or run, else an end."""
         if self.opened is None:
             return
         at_ns, marks = self._position_ns(), [mark.at_ns for mark in self.bookmarks]
@@ -255,33 +255,34 @@ class Replay:
             self.seek(max((mark for mark in marks if mark < at_ns), default=self.start_ns))
 
     def bookmark_here(self) -> Bookmark | None:
-        """The bookmark at the playhead; None where there is none."""
+        """Return the bookmark at the playhead, or None."""
         at_ns = self._position_ns()
         return next((mark for mark in self.bookmarks if mark.at_ns == at_ns), None)
 
     def bookmark(self, name: str = "") -> Bookmark | None:
-        """Make a bookmark at the playhead. Raises `RecordingError` when it can't be kept."""
+        """Add a bookmark at the playhead. Raises `RecordingError` when it can't be saved."""
         return self.opened.bookmarks.add(self._position_ns(), name) if self.opened is not None else None
 
     def rename_bookmark(self, bookmark: Bookmark, name: str) -> None:
-        """Give one another name. Raises `RecordingError`, and `ValueError` for a note of the recording."""
+        """Rename a bookmark. Raises `RecordingError`, and `ValueError` for a note of the recording."""
         if self.opened is not None:
             self.opened.bookmarks.rename(bookmark, name)
 
     def put_back_bookmark(self, bookmark: Bookmark) -> None:
-        """Make one again that was removed. Raises `RecordingError`."""
+        """Restore a removed bookmark. Raises `RecordingError`."""
         if self.opened is not None:
             self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
 
     def remove_bookmark(self, bookmark: Bookmark) -> None:
-        """Take one away. Raises as `rename_bookmark` does."""
+        """Remove a bookmark. Raises as `rename_bookmark` does."""
         if self.opened is not None:
             self.opened.bookmarks.remove(bookmark)
 
-    # -- the tick --------------------------------------------------------------------------------------------
+    # -- tick
+    # ---------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Take over what the thread handed over since the last tick; ``now`` is a monotonic clock in s."""
+        """Apply the messages of the thread since the last tick; ``now`` is monotonic seconds."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._opened(self.source.opened, now)
         self._tell_problems()
@@ -303,7 +304,6 @@ class Replay:
             self.sending.tick()
 
     def _forward(self) -> None:
-        """Other topics are sent than before."""
         if self.sending is not None:
             outbox = self.sending.outbox
             self.source.forward({sent.route.recorded for sent in outbox.going}, outbox.offer)
@@ -343,7 +343,7 @@ class Replay:
             self._alerts.put(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
 
     def _tell_not_closed(self, opened: OpenedRecording) -> None:
-        """Say how much there is of a file that was cut off, or whose program was killed."""
+        # Of a file that was cut off, or whose program was killed.
         recording = opened.recording
         if recording.is_complete:
             return
@@ -386,7 +386,7 @@ class Replay:
 
 
 def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFigures]) -> GraphView:
-    """What a recording knows of who was there: its topics, how many published each, and what was lost."""
+    """Return a recording's graph: topics, the number of publishers of each, and losses."""
     made = {}
     for name, topic in topics.items():
         known = figures.get(name)

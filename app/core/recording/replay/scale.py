@@ -1,4 +1,4 @@
-"""The part of a recording's time that a time line shows, and how its times are written. Pure."""
+"""Visible time range of a timeline, and the format of its times. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEPS_S = (
 
 @dataclass(frozen=True, slots=True)
 class TimeScale:
-    """A time line shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``."""
+    """Timeline that shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``."""
 
     first_ns: int
     last_ns: int
@@ -25,41 +25,41 @@ class TimeScale:
 
     @classmethod
     def whole(cls, first_ns: int, last_ns: int) -> TimeScale:
-        """All of a recording, at least a millisecond."""
+        """Return the scale of a whole recording, at least one millisecond."""
         last_ns = max(last_ns, first_ns + LEAST_SPAN_NS)
         return cls(first_ns, last_ns, first_ns, last_ns)
 
     @property
     def span_ns(self) -> int:
-        """How long the part is."""
+        """Length of the visible range."""
         return self.end_ns - self.begin_ns
 
     @property
     def is_whole(self) -> bool:
-        """Whether all of it is shown."""
+        """True if the whole recording is visible."""
         return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
 
     def share(self, at_ns: int) -> float:
-        """Where a time is: 0 at the left edge, 1 at the right one."""
+        """Return the position of a time: 0 at the left edge, 1 at the right one."""
         return (at_ns - self.begin_ns) / self.span_ns
 
     def time(self, share: float) -> int:
-        """The time there, within the recording."""
+        """Return the time at a position, limited to the recording."""
         at_ns = self.begin_ns + round(share * self.span_ns)
         return max(self.first_ns, min(self.last_ns, at_ns))
 
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
-        """More time (a factor above 1) or less, with that time where it was."""
+        """Return a scale zoomed out (factor above 1) or in, with ``at_ns`` at the same position."""
         whole = self.last_ns - self.first_ns
         span = max(LEAST_SPAN_NS, min(whole, round(self.span_ns * factor)))
         return self._placed(at_ns - round(self.share(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
-        """A later or earlier part of the same length."""
+        """Return a range of the same length, later or earlier."""
         return self._placed(self.begin_ns + by_ns, self.span_ns)
 
     def with_time(self, at_ns: int) -> TimeScale:
-        """A part of the same length in which that time can be seen."""
+        """Return a range of the same length that contains a time."""
         if self.begin_ns <= at_ns <= self.end_ns:
             return self
         return self._placed(at_ns - self.span_ns // 8, self.span_ns)
@@ -69,12 +69,12 @@ class TimeScale:
         return replace(self, begin_ns=begin_ns, end_ns=begin_ns + span)
 
     def step_s(self, most: int) -> float:
-        """How far apart the marks of a ruler are when there may be so many."""
+        """Return the interval of ruler marks for at most this number of marks."""
         least = self.span_ns / 1e9 / max(1, most)
         return next((step for step in STEPS_S if step >= least), 86_400.0 * ceil(least / 86_400.0))
 
     def marks(self, most: int, *, by_clock: bool = False) -> Iterator[int]:
-        """The times of a ruler's marks, counted from the recording's beginning, or by the clock."""
+        """Yield the times of ruler marks, relative to the recording's start or to the time of day."""
         step_ns = round(self.step_s(most) * 1e9)
         origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
         number = -((origin_ns - self.begin_ns) // step_ns)
@@ -84,12 +84,12 @@ class TimeScale:
 
 
 def offset_ns(at_ns: int) -> int:
-    """A time whose distance to full hours of this place's clock is that of full hours from 1970."""
+    """Return the origin for marks at full hours of local time, near ``at_ns``."""
     return -(time.localtime(at_ns // 1_000_000_000).tm_gmtoff or 0) * 1_000_000_000
 
 
 def span_words(ns: int, *, digits: int = 3) -> str:
-    """A length of time: "7:26.412", "0:00", "1:02:03"."""
+    """Format a duration: "7:26.412", "0:00", "1:02:03"."""
     sign, ns = ("-", -ns) if ns < 0 else ("", ns)
     unit = 10 ** (9 - digits)
     whole, rest = divmod(ns // unit, 10**digits)
@@ -100,7 +100,7 @@ def span_words(ns: int, *, digits: int = 3) -> str:
 
 
 def clock_words(at_ns: int, *, digits: int = 3) -> str:
-    """A time of day here: "15:09:37.412"."""
+    """Format a local time of day: "15:09:37.412"."""
     seconds, rest = divmod(at_ns, 1_000_000_000)
     then = time.localtime(seconds)
     words = f"{then.tm_hour}:{then.tm_min:02d}:{then.tm_sec:02d}"
@@ -108,5 +108,5 @@ def clock_words(at_ns: int, *, digits: int = 3) -> str:
 
 
 def date_words(at_ns: int) -> str:
-    """The day here: "2026-11-17"."""
+    """Format a local date: "2026-11-17"."""
     return time.strftime("%Y-%m-%d", time.localtime(at_ns // 1_000_000_000))

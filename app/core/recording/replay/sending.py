@@ -1,7 +1,7 @@
-"""What a recording plays on the live network again: topics that a person has chosen and armed, nothing else.
+"""Publishing topics of a recording on the live network, if the user has chosen and armed them.
 
-Bytes and types are as they were recorded, the name is the topic's own or another one. What is late is left
-out and counted, never sent in a burst; a seek sends nothing of what lies between.
+Bytes and types are as recorded; the topic may have another name. Late messages are dropped and counted, never
+sent in a burst; a seek sends nothing of what lies between.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from nep.recordings.player import latched_topics, moving_topics, published_type
 from nep.recordings.reader import Recording
 
 LATE_S = 0.1
-"""What should have been sent longer ago is left out."""
+"""Delay beyond which a message is dropped."""
 MOST_TYPES = 10
-"""So many types a topic may have in one recording; messages of further ones are left out."""
+"""Maximum number of types of a topic in one recording; messages of further ones are dropped."""
 Submit = Callable[[str, Job], None]
 
 
 class ReplayRoute(NamedTuple):
-    """A topic of the recording, and the name under which it is sent."""
+    """Topic of the recording, and the name under which it is published."""
 
     recorded: str
     name: str
 
     @property
     def target(self) -> Target:
-        """Where it is sent to."""
+        """Topic to publish on."""
         return Target("topic", self.name)
 
 
 @dataclass(slots=True, eq=False)
 class SentTopic:
-    """A topic that is sent. ``count`` messages were, ``skipped`` were left out; ``heard`` programs listen.
+    """Published topic. ``count`` messages were sent, ``skipped`` were dropped.
 
-    Publishers are those that are ready, by their type; ``problem`` is a sentence when it can't be sent.
+    ``publishers`` are ready ones by type; ``problem`` is a sentence when it can't be sent.
     """
 
     route: ReplayRoute
@@ -68,30 +68,28 @@ class SentTopic:
 
     @property
     def heard(self) -> int:
-        """How many programs listen to it now."""
+        """Number of subscribers."""
         return sum(publisher.subscribers for publisher in self.publishers.values())
 
 
 class ReplayOutbox:
-    """Publishes what is offered, while the switch is on. `offer` is the replay's thread, the rest any."""
+    """Publishes offered messages while the switch is on. `offer` is for the replay's thread, the rest any."""
 
     def __init__(self, arming: Arming, submit: Submit, gate: MotionGate | None = None) -> None:
-        """``submit`` gives Studio's node on the live network to a job.
-
-        ``gate`` knows which messages would move a robot that may not; without it all are sent.
-        """
+        # `submit` runs a job with Studio's live node. Without `gate` messages that move robots are not
+        # checked.
         self._arming, self._submit, self._gate = arming, submit, gate
         self._lock = threading.Lock()
         self._going: dict[str, SentTopic] = {}
 
     @property
     def going(self) -> tuple[SentTopic, ...]:
-        """All that are sent now."""
+        """Topics that are published now."""
         with self._lock:
             return tuple(self._going.values())
 
     def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
-        """Send this topic from when its publisher is there, in the switch's ``turn``."""
+        """Publish this topic as soon as its publisher is ready, during the switch's ``turn``."""
         made = SentTopic(route, turn, is_latched)
         with self._lock:
             old = self._going.get(route.recorded)
@@ -101,7 +99,7 @@ class ReplayOutbox:
         self._ask(made, msg_type)
 
     def end(self, recorded: str) -> SentTopic | None:
-        """Send this topic no more; how it was."""
+        """Stop publishing a topic; return its state."""
         with self._lock:
             ended = self._going.pop(recorded, None)
         if ended is not None:
@@ -109,7 +107,7 @@ class ReplayOutbox:
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
-        """These were played just now; by each how many seconds too late."""
+        """Publish messages that were played just now, each with its delay in seconds."""
         with self._lock:
             going = dict(self._going)
         for message, late in zip(messages, late_s, strict=True):
@@ -131,11 +129,11 @@ class ReplayOutbox:
                 sent.turn, sent.route.target, lambda: publisher.publish_bytes(data, extension)
             ):
                 sent.count += 1
-        except Exception as error:  # noqa: BLE001 - the others, and the panels, go on
+        except Exception as error:  # noqa: BLE001 - other topics, and the panels, continue
             sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
 
     def _is_refused(self, sent: SentTopic, publisher: Publisher) -> bool:
-        """Whether it would move a robot that may not: one may have come just now."""
+        # A robot without permission may have connected just now.
         if self._gate is None or sent.node is None:
             return False
         heard, name = publisher.subscribers, sent.route.name
@@ -146,10 +144,9 @@ class ReplayOutbox:
             sent.checked[publisher] = heard
         return is_refused
 
-    # ---- in the thread of the network
+    # ---- in the network thread
 
     def _ask(self, sent: SentTopic, msg_type: str) -> None:
-        """Let a publisher of this type be made."""
         if msg_type in sent.asked or len(sent.asked) >= MOST_TYPES:
             return
         sent.asked.add(msg_type)
@@ -159,11 +156,12 @@ class ReplayOutbox:
                 return
             try:
                 made = node.new_pub(sent.route.name, msg_type, latched=sent.is_latched)
-            except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to this topic
+            except Exception as error:  # noqa: BLE001 - reported as a problem of this topic
                 sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
                 return
             sent.node = node
-            sent.publishers = {**sent.publishers, msg_type: made}  # anew: another thread reads it
+            # a new dict, because another thread reads it
+            sent.publishers = {**sent.publishers, msg_type: made}
             sent.is_ready = True
             if not self._is_going(sent):
                 self._close(sent)
@@ -184,35 +182,35 @@ class ReplayOutbox:
 
 
 class ReplaySending:
-    """What a person chooses to be sent of one recording. One thread uses it (the window's)."""
+    """Topics of one recording that the user chose to publish. Not thread-safe: window's thread only."""
 
     def __init__(self, acting: SessionActing) -> None:
         self._acting = acting
         self.outbox = ReplayOutbox(acting.arming, acting.submit, acting.gate)
         self.routes: dict[str, str] = {}
-        """By topic of the recording the name under which it is to be sent; of those that are chosen."""
+        """Name to publish under, by topic of the recording, for chosen topics."""
         self.revision = 0
         self._opened: OpenedRecording | None = None
         self._moving: MovingTopics | None = None
         self._latched: frozenset[str] = frozenset()
         self._asks: list[ReplayRoute] = []
         self._waits = False
-        """Whether a person is asked about the first of them."""
+        """True if the question about the first of them is open."""
         self._worker: BackgroundWorker[tuple[MovingTopics, frozenset[str]]] | None = None
         self.on_change: Callable[[], object] = _nothing
-        """Called when other topics are sent."""
+        """Called when the published topics change."""
 
     def open(self, opened: OpenedRecording) -> None:
-        """This is what is played."""
+        """Set the opened recording."""
         self._opened = opened
 
     @property
     def is_known(self) -> bool:
-        """Whether it is known which topics move robots: `learn` finds out, and takes a moment."""
+        """True if it is known which topics move robots (see `learn`)."""
         return self._moving is not None
 
     def learn(self) -> None:
-        """Find out, beside, which topics move robots."""
+        """Find out in a thread which topics move robots."""
         if self._opened is None or self._worker is not None:
             return
         recording = self._opened.recording
@@ -220,14 +218,14 @@ class ReplaySending:
         self._worker.ask("topics", lambda: _facts_of(recording))
 
     def moves(self, recorded: str, name: str) -> bool:
-        """Whether a robot is told what to do by it; also under another name, where one may hear it."""
+        """Return whether messages of a topic move a robot, under its own or another name."""
         known = self._moving
         if known is not None and (known.moved_by(recorded) or known.moved_by(name)):
             return True
         return bool(self._acting.gate.moved_by(name))
 
     def choose(self, recorded: str, name: str | None) -> str:
-        """Send this topic under a name ("" for its own) once it is armed, or not (None); why it can't be."""
+        """Publish a topic under a name ("" for its own) once armed, or not (None); return why it can't be."""
         if self._opened is None or recorded not in self._opened.recording.topics:
             return ""
         self.revision += 1
@@ -244,12 +242,12 @@ class ReplaySending:
         self.routes[recorded] = wanted
         return ""
 
-    # ---- the switch
+    # ---- switch
 
     def arm(self) -> str:
-        """Switch it on for the chosen topics alone, and send them as they are played; why it can't be.
+        """Arm the chosen topics and publish them as they are played; return why it can't be, or "".
 
-        Topics that move robots are asked for, one after the other: `SessionActing.question`.
+        Topics that move robots are asked for one after the other: `SessionActing.question`.
         """
         opened = self._opened
         if opened is None or not self.routes:
@@ -273,7 +271,6 @@ class ReplaySending:
         return self._go_on()
 
     def _go_on(self) -> str:
-        """Begin what may be sent; ask for what moves a robot, one after the other."""
         self._waits = False
         while self._asks:
             route, turn = self._asks[0], self._acting.arming.turn
@@ -299,7 +296,7 @@ class ReplaySending:
         self._changed()
 
     def end(self) -> None:
-        """Send nothing any more: the recording closes."""
+        """Stop publishing: the recording closes."""
         if self.outbox.going or self._asks:
             self._acting.disarm()
         self._end_all()
@@ -327,7 +324,7 @@ class ReplaySending:
         self._acting.tell("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
-        """Take over what has happened: what is no longer allowed has ended, a robot may have come."""
+        """Apply changes: end topics that are no longer allowed, or that move a new robot."""
         self._take_facts()
         arming = self._acting.arming
         if not arming.is_on:
@@ -349,7 +346,7 @@ class ReplaySending:
             return
         try:
             taken = self._worker.take("topics")
-        except NepError:  # it can't be read: then every topic may be one that moves a robot
+        except NepError:  # unreadable: every topic may move a robot
             taken = (MovingTopics(unidentified=self._opened.recording.topics), frozenset())
         if taken is not None:
             self._moving, self._latched = taken
@@ -357,21 +354,19 @@ class ReplaySending:
 
 
 def _facts_of(recording: Recording) -> tuple[MovingTopics, frozenset[str]]:
-    """Which topics move robots, and which are kept for who comes later."""
     return moving_topics(recording), latched_topics(recording, recording.topics)
 
 
 def sent_words(sent: SentTopic) -> str:
-    """How many were sent, and how many left out: "412 sent, 3 left out, being late"."""
+    """Format the numbers of messages: "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
     return f"{words}, {late_words(sent.skipped)}" if sent.skipped else words
 
 
 def late_words(count: int) -> str:
-    """How many were left out: "3 left out, being late"."""
-    said = ngettext("{count} late message skipped", "{count} late messages skipped", count)
+    """Format the number of dropped messages: "3 left out, being late"."""
+    said = ngettext("{count} late message skipped", "{count} late message skipped", count)
     return said.format(count=count)
 
 
-def _nothing() -> None:
-    """Nobody wants to know."""
+def _nothing() -> None: ...

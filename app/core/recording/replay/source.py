@@ -1,7 +1,7 @@
-"""The thread that plays a recording: it reads, and hands over what is due of the topics that are looked at.
+"""Replay thread: reads a recording and passes on due messages of watched topics.
 
-The window gives orders and takes what came; neither waits for the disk. Nothing here knows a node: what is
-played goes to the panels and nowhere else.
+The window queues commands and takes results; neither blocks on the disk. Nothing here uses a node: messages
+only go to the panels.
 """
 
 from __future__ import annotations
@@ -29,36 +29,36 @@ RATE_S = 2.0
 FIGURES_EVERY_S = 0.5
 TOPICS_AT_ONCE = 100
 FIGURES_SHARE = 10.0
-"""Figures are read no more often than this many times the time that they take."""
+"""Minimum interval of reading statistics, as a multiple of its duration."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
-"""How far before the playhead what came is read for who needs more than the newest, the near part first."""
+"""Ranges before the playhead that are read for topics with history, nearest first ..."""
 HISTORY_MOST_S = 0.25
-"""... as long as reading it takes no longer."""
+"""... and the time limit."""
 MOST_HISTORY = 8192
 OWN_BYTES = 65_536
-"""A smaller message is copied: else it would keep the whole megabyte of the file that it was read with."""
+"""Maximum size of copied messages: a small one would keep the whole megabyte that it was read with."""
 
 ReplayStage = Literal["reading", "there", "failed"]
 Order = Callable[[Playback], object]
 Forward = Callable[[Sequence[Message], Sequence[float]], object]
-"""Given what is played just now, and by each how many seconds too late; in the replay's thread."""
+"""Called with messages that are played now and their delays in seconds, in the replay's thread."""
 
 
 class PictureSink(Protocol):
-    """What shows pictures: told in the replay's thread, as it decodes in its own."""
+    """Receiver of images, called in the replay's thread; decodes in its own."""
 
     def offer(self, messages: Sequence[Message]) -> None:
-        """These came, oldest first."""
+        """Add images, oldest first."""
 
     def rewind(self, topics: Sequence[str]) -> None:
-        """It is another time: the pictures of all other topics are gone."""
+        """Discard the images of all other topics after a seek."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayStatus:
-    """How far it is. ``progress`` is 0 to 1 while it is opened, ``sentence`` says why it ``failed``.
+    """State of the replay. ``progress`` is 0 to 1 while opening, ``sentence`` the reason of a failure.
 
-    ``player`` is where it is, once it is there.
+    ``player`` is the playback status once open.
     """
 
     stage: ReplayStage
@@ -70,9 +70,9 @@ class ReplayStatus:
 
 @dataclass(frozen=True, slots=True)
 class ReplayFigures:
-    """Of a topic at the playhead: messages a second before it, and when the newest one came (ns).
+    """Statistics of a topic at the playhead: messages per second before it, time of the newest (ns).
 
-    None is not known, and that there was none.
+    None if unknown, or without a message.
     """
 
     rate_hz: float | None
@@ -81,10 +81,10 @@ class ReplayFigures:
 
 @dataclass(slots=True)
 class Handed:
-    """What came since the last time, in this order.
+    """Messages since the last `take`, in this order.
 
-    ``jump``: it went to another time, and these were the newest there (None: it did not). ``history``: by
-    topic what came before that, for those that want more than the newest. ``drained``: what came then.
+    ``jump`` are the newest messages after a seek (None: no seek). ``history`` has earlier messages by topic,
+    for topics with history. ``drained`` are the messages played since.
     """
 
     jump: Sequence[Message] | None = None
@@ -94,7 +94,7 @@ class Handed:
 
 
 class ReplaySource:
-    """One recording. `start` and `close` begin and end its thread; everything else returns at once."""
+    """Source of one recording. `start` and `close` start and stop its thread; other calls don't block."""
 
     def __init__(
         self,
@@ -104,10 +104,7 @@ class ReplaySource:
         clock: Callable[[], float] = time.monotonic,
         opener: RecordingOpener | None = None,
     ) -> None:
-        """Nothing is read before `start`, or `open` and `turn`, which are what the thread does.
-
-        ``opener`` is closed at the end.
-        """
+        # Tests call `open` and `turn` instead of `start`. `opener` is closed at the end.
         self.path = path
         self._opener: RecordingOpener = LocalOpener() if opener is None else opener
         self.opened: OpenedRecording | None = None
@@ -129,21 +126,23 @@ class ReplaySource:
         self._next_figures = self._figures_s = 0.0
         self._thread = threading.Thread(target=self._run, name="studio-replay", daemon=True)
 
-    # -- what the window calls -------------------------------------------------------------------------------
+    # -- called by the window
+    # -----------------------------------------------------------------------------------
 
     @property
     def status(self) -> ReplayStatus:
-        """How it was after its last turn."""
+        """State after the last cycle."""
         return self._status
 
     def start(self) -> None:
-        """Open it, and play as it is ordered."""
+        """Start the thread: open the file and play."""
         self._thread.start()
 
     def order(self, kind: str, change: Order) -> None:
-        """Let something be done to the playback. It takes the place of an order of that kind that waits.
+        """Queue a change of the playback.
 
-        So a playhead that is dragged goes where it is now, not everywhere that it was.
+        It replaces a pending change of the same kind at the end of the queue, so that dragging the playhead
+        seeks only to its newest position.
         """
         with self._changed:
             if self._orders and self._orders[-1][0] == kind:
@@ -153,19 +152,19 @@ class ReplaySource:
             self._changed.notify_all()
 
     def watch(self, topic: str) -> None:
-        """Its messages are wanted."""
+        """Watch a topic."""
         with self._changed:
             self._watched.add(topic)
         self.order("choose", self._choose)
 
     def unwatch(self, topic: str) -> None:
-        """Its messages are not wanted any more."""
+        """End the watch of a topic."""
         with self._changed:
             self._watched.discard(topic)
         self.order("choose", self._choose)
 
     def set_deep(self, topic: str, room: int | None) -> None:
-        """Also what came before a jump is wanted of it, and ``room`` messages at once; None: no more."""
+        """Request history of a topic, and room for ``room`` messages per tick; None ends that."""
         with self._changed:
             if room is None:
                 self._deep.pop(topic, None)
@@ -173,24 +172,24 @@ class ReplaySource:
                 self._deep[topic] = room
             self._mailbox.set_room(topic, room)
             is_watched = topic in self._watched
-        if room is not None and is_watched:  # else it has its history when it is watched
+        if room is not None and is_watched:  # otherwise its history is read when it is watched
             self.order(f"history {topic}", lambda playback: self._look_back(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
-        """Give these topics' messages to ``to`` as they are played; nothing of a jump."""
+        """Also pass messages of these topics to ``to`` as they are played, except those of a seek."""
         with self._changed:
             self._sent, self._forward = frozenset(topics), to
         self.order("choose", self._choose)
 
     def take(self) -> Handed:
-        """What came since the last time."""
+        """Return and clear the results since the last call."""
         with self._changed:
             handed, self._handed = self._handed, Handed()
             handed.drained = self._mailbox.drain()
         return handed
 
     def end(self) -> None:
-        """Let the thread end, and wait for nothing."""
+        """Signal the thread to end without waiting."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -198,18 +197,19 @@ class ReplaySource:
 
     @property
     def has_ended(self) -> bool:
-        """Whether its thread runs no more."""
+        """True if the thread has ended."""
         return not self._thread.is_alive()
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """End the thread and close the file. May be called twice."""
+        """Stop the thread and close the file. Idempotent."""
         self.end()
         if self._thread.is_alive():
             self._thread.join(timeout_s)
         elif self.opened is not None:
             self.opened.recording.close()
 
-    # -- its thread ------------------------------------------------------------------------------------------
+    # -- its thread
+    # ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
         try:
@@ -228,14 +228,14 @@ class ReplaySource:
                 return
             reason = error.reason if isinstance(error, RecordingError) else str(error)
             self._status = ReplayStatus("failed", sentence=reason)
-        except Exception as error:  # noqa: BLE001  a file may do anything; the window says so and lives on
+        except Exception as error:  # noqa: BLE001  a file may cause any error, which the window reports
             self._status = ReplayStatus("failed", sentence=error_words(error))
         finally:
             if self.opened is not None:
                 self.opened.recording.close()
 
     def open(self) -> None:
-        """Read the index; the playhead is at the first message then. Raises `RecordingError`."""
+        """Read the index and seek to the first message. Raises `RecordingError`."""
         self.opened = opened = open_recording(self.path, self._tell_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
@@ -247,7 +247,10 @@ class ReplaySource:
         self._status = ReplayStatus("reading", progress)
 
     def turn(self) -> float | None:
-        """Do what was ordered and what is due; in how many seconds there is more, None when nothing is."""
+        """Apply queued changes and play due messages.
+
+        Return the seconds until the next, None when there is none.
+        """
         playback = self._playback
         if playback is None:
             return None
@@ -287,7 +290,8 @@ class ReplaySource:
         seen = wanted - self._chosen  # by a panel, from now on
         new = seen & deep
         newest = list(playback.choose(wanted | sent))
-        played = (seen & self._played) - new  # for who listens on the network: no panel has its newest
+        # topics played only for the network: no panel has their newest message
+        played = (seen & self._played) - new
         if played and self.opened is not None:
             before = self.opened.recording.newest(playback.status().position_ns, played)
             newest += [each.message for each in before.values()]
@@ -322,10 +326,11 @@ class ReplaySource:
                 self._mailbox.set_room(topic, room)
             self._handed = Handed(jump=own)
 
-    # -- what came before ------------------------------------------------------------------------------------
+    # -- history
+    # ------------------------------------------------------------------------------------------------
 
     def _look_back(self, playback: Playback, topics: Collection[str]) -> None:
-        """Hand over what came before the playhead, of topics of which more than the newest is wanted."""
+        # Reads messages before the playhead, of topics with history.
         if not topics or self.opened is None:
             return
         recording, at_ns = self.opened.recording, playback.status().position_ns
@@ -343,13 +348,13 @@ class ReplaySource:
             found[topic].append(_own(each.message))
         with self._changed:
             self._handed.history.update({topic: list(messages) for topic, messages in found.items()})
-            for topic in topics:  # it has all of what waited, too
+            for topic in topics:  # the history includes all pending messages
                 self._mailbox.forget(topic)
 
     def _read_back(
         self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
     ) -> bool:
-        """Put what came in a span before what was found; False when there is no time, or room, for more."""
+        # Prepends the messages of a range; returns False when the limits are reached.
         topics = [topic for topic, each in found.items() if len(each) < MOST_HISTORY]
         came: dict[str, deque[Message]] = {
             topic: deque(maxlen=MOST_HISTORY - len(found[topic])) for topic in topics
@@ -357,15 +362,16 @@ class ReplaySource:
         for number, each in enumerate(recording.read(span[0], span[1], topics)):
             came[each.message.topic].append(_own(each.message))
             if number % 64 == 0 and (self._orders or self._clock() - began > HISTORY_MOST_S):
-                return False  # a part without its end would be a gap: it is left out
+                return False  # an incomplete range would be a gap, so it is discarded
         for topic, messages in came.items():
             found[topic].extendleft(reversed(messages))
         return bool(topics) and self._clock() - began <= HISTORY_MOST_S
 
-    # -- figures ---------------------------------------------------------------------------------------------
+    # -- statistics
+    # ---------------------------------------------------------------------------------------------
 
     def _begin_figures(self, playback: Playback) -> None:
-        """Tell the figures of the playhead, of some topics with each turn, so that no order waits for all."""
+        # Some topics in each cycle, so that no command waits for all.
         if self.opened is None:
             return
         names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
@@ -394,11 +400,11 @@ class ReplaySource:
 
 
 class _ClosingError(Exception):
-    """It is closed while it is opened."""
+    """The replay was closed while opening."""
 
 
 def late_of(due: Due, status: PlayerStatus) -> list[float]:
-    """By message how many seconds after its time it is played, of the time of who listens."""
+    """Return the delay of each message in seconds of real time."""
     return [(status.position_ns - at_ns) / 1e9 / status.speed for at_ns in due.log_ns]
 
 
@@ -407,7 +413,7 @@ def _topic(message: Message) -> str:
 
 
 def _own(message: Message) -> Message:
-    """The message with its bytes for itself, where they are few."""
+    # Copies small messages, so that they don't keep the chunk of the file.
     if isinstance(message.raw, bytes) or message.size_bytes > OWN_BYTES:
         return message
     made = new_message(Message)

@@ -1,8 +1,8 @@
-"""What went on for some time while it was recorded: behaviours that ran, and alarms. Reads; changes nothing.
+"""Spans in a recording: runs of behaviours, and alarms. Read-only.
 
-They stand in the recorder's own channels, as Studio told it (`app.core.recording.events`), in what was kept
-of a flight recorder again and again; and as the graph's alerts changed. Of a file of others, or a damaged
-one, anything may stand there.
+They are in the recorder's own channels, written by Studio (`app.core.recording.events`; repeatedly in the
+flight recorder), and in the changes of the graph's alerts. Files of other programs, or damaged ones, may
+contain anything there.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from dataclasses import dataclass, replace
 from nep.recordings.reader import Recording
 
 MOST_SPANS = 2_000
-"""Of each lane; those beyond are counted."""
+"""Maximum number of spans in each lane; further ones are only counted."""
 _MOST_LETTERS = 200
 RESULTS = ("ended", "stopped", "failed")
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpan:
-    """From ``start_ns`` to ``end_ns``, within the recording; ``is_over`` when its end is in it, too.
+    """Span from ``start_ns`` to ``end_ns``, within the recording; ``is_over`` if it includes the end.
 
-    ``name`` is the behaviour, or the alarm in words. ``result`` of a run is one of `RESULTS`, "" while it is
-    not known; ``words`` say more of it. ``topic`` is what an alarm is about, "" when it is none.
+    ``name`` is the behaviour, or the alarm's sentence. ``result`` of a run is one of `RESULTS`, "" while
+    unknown; ``words`` gives details. ``topic`` is the alarm's subject, or "".
     """
 
     start_ns: int
@@ -38,19 +38,19 @@ class RecordedSpan:
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpans:
-    """Those of a recording, the earliest first, and how many more there are."""
+    """Spans of a recording in order of time, and the number of further ones."""
 
     runs: Sequence[RecordedSpan] = ()
     alarms: Sequence[RecordedSpan] = ()
     left_out: int = 0
 
     def starts(self) -> list[int]:
-        """When each of them begins."""
+        """Return the start times of all spans."""
         return sorted(each.start_ns for each in (*self.runs, *self.alarms))
 
 
 class _Lane:
-    """Spans by their ids: what is said of one last counts."""
+    """Spans by id; the last record of an id counts."""
 
     def __init__(self, first_ns: int, last_ns: int) -> None:
         self._first_ns, self._last_ns = first_ns, last_ns
@@ -65,7 +65,7 @@ class _Lane:
         return tuple(sorted(self._by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
 
     def put(self, id: str, span: RecordedSpan) -> None:
-        """Say this of it; its beginning is the earliest that was said."""
+        # The start is the earliest of all records.
         known = self._by_id.get(id)
         if known is None and len(self._by_id) >= MOST_SPANS:
             if len(self._left_out) < MOST_SPANS:
@@ -76,7 +76,6 @@ class _Lane:
         self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
 
     def end(self, id: str, at_ns: int) -> None:
-        """It is over since then."""
         known = self._by_id.get(id)
         if known is not None:
             self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._within(at_ns)), is_over=True)
@@ -86,7 +85,7 @@ class _Lane:
 
 
 def spans_of(recording: Recording) -> RecordedSpans:
-    """The runs and alarms of a recording. What does not fit is passed over."""
+    """Return the runs and alarms of a recording; malformed records are skipped."""
     first_ns, last_ns = recording.start_ns, recording.end_ns
     runs, alarms = _Lane(first_ns, last_ns), _Lane(first_ns, last_ns)
     for lane, role in ((runs, "runs"), (alarms, "alarms")):
@@ -114,7 +113,7 @@ def _span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
 
 
 def _read_alerts(recording: Recording, lane: _Lane) -> None:
-    """The graph's alerts: each time they change all that there are are said."""
+    # Each change of the graph's alerts lists all of them.
     present: dict[str, str] = {}
     for at_ns, told in recording.said("alerts"):
         listed = told.get("alerts") if isinstance(told, Mapping) else None
