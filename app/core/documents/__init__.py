@@ -1,4 +1,4 @@
-"""Behaviours as documents: open ones and their tabs, their files, journals, earlier versions and problems.
+"""Behaviours as documents: tabs, files, journals, versions and problems.
 
-`open_documents` has the tabs, `document` is one of them; `journal` is what a crash leaves.
+`open_documents` has the tabs, `document` is one of them; `journal` is the backup against a crash.
 """

@@ -1,4 +1,4 @@
-"""Work beside the window: a thread in which, for each owner, only the newest work counts."""
+"""Background worker: a thread that runs only the newest job of each owner."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
 END_S = 2.0
-"""How long at most a window waits for work that does not end, say on a disk that hangs."""
+"""Maximum time that the window waits for a job, for example on a disk that hangs."""
 
 
 class BackgroundWorker(Generic[T]):
-    """One thread, made when there is something to do; `close` ends it. Only `finish` and `close` wait."""
+    """Worker with one thread, started at the first job; `close` ends it. Only `finish` and `close` block."""
 
     def __init__(self, name: str) -> None:
-        """``name`` is the thread's."""
         self._name = name
         self._changed = threading.Condition()
         self._asked: dict[str, Callable[[], T]] = {}
@@ -28,7 +27,7 @@ class BackgroundWorker(Generic[T]):
         self._closed = False
 
     def ask(self, owner: str, work: Callable[[], T]) -> None:
-        """Do this next for the owner, in place of what waits for it."""
+        """Queue a job for the owner, replacing its pending one."""
         with self._changed:
             self._asked[owner] = work
             if self._thread is None and not self._closed:
@@ -37,9 +36,9 @@ class BackgroundWorker(Generic[T]):
             self._changed.notify_all()
 
     def take(self, owner: str) -> T | None:
-        """What was made for the owner since the last time, None while nothing is ready.
+        """Return the result of the owner's last job once; None while there is none.
 
-        Raises what the work raised.
+        Raises the job's exception.
         """
         with self._changed:
             failed = self._failed.pop(owner, None)
@@ -48,21 +47,21 @@ class BackgroundWorker(Generic[T]):
             return self._done.pop(owner, None)
 
     def finish(self, owner: str) -> bool:
-        """Wait until nothing is asked for the owner any more, 2 s at most; whether that is so."""
+        """Wait until the owner has no pending job, at most 2 s; return whether that is so."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: self._closed or (owner not in self._asked and self._doing != owner), END_S
             )
 
     def forget(self, owner: str) -> None:
-        """The owner is gone, or wants nothing any more of what waits."""
+        """Discard the owner's pending job and result."""
         with self._changed:
             self._asked.pop(owner, None)
             self._done.pop(owner, None)
             self._failed.pop(owner, None)
 
     def close(self) -> None:
-        """End the thread; what it does just now is waited for, 2 s at most."""
+        """Stop the thread; waits for the current job, at most 2 s."""
         with self._changed:
             self._closed = True
             self._asked.clear()
@@ -82,7 +81,7 @@ class BackgroundWorker(Generic[T]):
                 work = self._asked.pop(owner)
             try:
                 made = work()
-            except Exception as error:  # noqa: BLE001  it belongs to who asked, and is raised there
+            except Exception as error:  # noqa: BLE001  raised in the thread that takes the result
                 with self._changed:
                     self._done.pop(owner, None)
                     self._failed[owner] = error

@@ -1,7 +1,7 @@
-"""The backpack: blocks that a person keeps for other files, other Studios and the next start.
+"""Backpack: blocks kept for other files, other instances of Studio and the next start.
 
-One JSON file beside the settings. Several Studios share it: each change is made to what the file says at that
-moment, under its lock, so that none undoes another's. What is in it and not understood is never thrown away.
+One JSON file beside the settings, shared by all instances: each change is applied to the current content
+under a lock, so that none reverts another. Content that isn't understood is preserved.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from nep.system.replace_file import replace_file
 
 VERSION = 1
 MOST = 100
-"""So many stacks of blocks."""
+"""Maximum number of stacks."""
 MOST_BYTES = 4_000_000
-"""So large is the file at most, in bytes of JSON."""
+"""Maximum file size in bytes."""
 FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
 _APART_S = 0.001
-_SPARE = 1_000_000  # what another Studio's file may have more and is read all the same
+_SPARE = 1_000_000  # tolerance for files of other instances when reading
 
 Json = Mapping[str, object]
 Stamp = tuple[int, int, int]
@@ -37,32 +37,32 @@ Stamp = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """A stack of blocks as Blockly saves it, with its variables' names; ``at`` is when it was put in."""
+    """Stack of blocks as saved by Blockly, with its variables' names; ``at`` is when it was added."""
 
     id: str
     at: float
     block: Json
 
     def to_json(self) -> dict[str, object]:
-        """As the file and the page have it."""
+        """Return the form used in the file and the page."""
         return {"id": self.id, "at": self.at, "block": self.block}
 
 
 class _Found(NamedTuple):
-    """What the file says; ``unknown`` is what in it nobody here understands, kept as it is."""
+    """Content of the file; ``unknown`` are entries that are not understood, preserved unchanged."""
 
     items: tuple[Packed, ...] = ()
     unknown: tuple[object, ...] = ()
 
 
 class Backpack:
-    """What is in the backpack, the newest first. Every change is written at once, or is a BackpackError."""
+    """Content of the backpack, newest first. Every change is written at once, or raises BackpackError."""
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
-        """It is ``backpack.json`` in ``folder`` (default: Studio's own); none yet is an empty one."""
+        # `backpack.json` in `folder` (default: Studio's own); a missing file is an empty backpack.
         self.path = (folder if folder is not None else home()) / "backpack.json"
         self.revision = 0
-        """Another number whenever there are other things in it."""
+        """Number that changes with the content."""
         self._clock = clock
         self._known = _Found()
         self._stamp: Stamp | None = None
@@ -72,16 +72,16 @@ class Backpack:
 
     @property
     def items(self) -> tuple[Packed, ...]:
-        """What is in it as far as is known, the newest first."""
+        """Known content, newest first."""
         return self._known.items
 
     def take_trouble(self) -> str:
-        """What was wrong with its file, as a sentence, once; "" for nothing."""
+        """Return and clear the sentence about a problem of the file, or ""."""
         trouble, self._trouble = self._trouble, ""
         return trouble
 
     def look(self) -> None:
-        """Read the file if it is another one by now: another Studio has written it."""
+        """Read the file if another instance has changed it."""
         if _stamp(self.path) == self._stamp:
             return
         try:
@@ -90,20 +90,20 @@ class Backpack:
             self._tell(str(error))
 
     def put(self, blocks: Sequence[Json]) -> list[Packed]:
-        """Put in stacks of blocks, the first of them on top. Raises BackpackError when there is no room."""
-        # Newer than all that is there, whatever the clock says.
+        """Add stacks of blocks, the first on top. Raises BackpackError when it is full."""
+        # Newer than all existing stacks, even if the clock was set back.
         newest = max([self._clock(), *(item.at + len(blocks) * _APART_S for item in self.items[:1])])
         made = [Packed(uuid4().hex, newest - place * _APART_S, each) for place, each in enumerate(blocks)]
         self.restore(made)
         return made
 
     def restore(self, items: Sequence[Packed]) -> None:
-        """Put in again what was taken out, where it was. Raises BackpackError when there is no room."""
+        """Restore removed stacks at their positions. Raises BackpackError when it is full."""
         ids = {item.id for item in items}
         self._change(lambda found: (*(item for item in found if item.id not in ids), *items))
 
     def remove(self, ids: Sequence[str]) -> list[Packed]:
-        """Take these out; what was there of them. Raises BackpackError."""
+        """Remove stacks; return those that existed. Raises BackpackError."""
         gone: list[Packed] = []
 
         def without(found: tuple[Packed, ...]) -> tuple[Packed, ...]:
@@ -114,10 +114,10 @@ class Backpack:
         return gone
 
     def empty(self) -> list[Packed]:
-        """Take out everything that is known to be in it; what it was. Raises BackpackError."""
+        """Remove all known stacks and return them. Raises BackpackError."""
         return self.remove([item.id for item in self.items])
 
-    # -- the file -----------------------------------------------------------------------------------------
+    # -- file ------------------------------------------------------------------------------------------------
 
     def _change(self, change: Callable[[tuple[Packed, ...]], tuple[Packed, ...]]) -> None:
         with locked(self.path):
@@ -159,7 +159,7 @@ class Backpack:
             ) from error
 
     def _read(self) -> _Found:
-        """What the file says. BackpackError when it can't be read now; one that is damaged is set aside."""
+        # Raises BackpackError when it can't be read now; a damaged file is renamed.
         try:
             data = read_whole(self.path, MOST_BYTES + _SPARE)
         except (FileNotFoundError, NotADirectoryError):
@@ -194,7 +194,7 @@ class Backpack:
         return _Found(_sorted(item for _entry, item in made if item is not None), unknown)
 
     def _beside(self) -> _Found:
-        """Leave the file of a newer Studio alone; from now on there is one of our own beside it."""
+        # The file of a newer Studio stays unchanged; a file of this version is used beside it.
         newer = self.path
         self.path = newer.with_name(f"backpack.format-{VERSION}.json")
         if self.path == newer:
@@ -209,7 +209,7 @@ class Backpack:
         return self._read()
 
     def _set_aside(self) -> _Found:
-        """Begin with an empty one: the file that is no backpack is kept under another name."""
+        # The damaged file is kept under another name.
         place = self.path.with_name(f"{self.path.stem}.damaged.json")
         again = 2
         while place.exists():
@@ -231,7 +231,7 @@ class Backpack:
         return _Found()
 
     def _tell(self, sentence: str) -> None:
-        """Once: what stays wrong is not said with every look."""
+        # Once: a persistent problem is not repeated at each read.
         if sentence != self._told:
             self._trouble = self._told = sentence
 
@@ -245,12 +245,11 @@ def _sorted(items: Iterable[Packed]) -> tuple[Packed, ...]:
 
 
 def _ids(found: _Found) -> list[str]:
-    """What tells one content from another: a stack that is in the backpack is never changed."""
+    # Identifies the content: a stack in the backpack never changes.
     return [item.id for item in found.items]
 
 
 def _packed(entry: object) -> Packed | None:
-    """An entry of the file; None for what is no stack of blocks."""
     if not isinstance(entry, Mapping):
         return None
     id, at, block = entry.get("id"), entry.get("at"), entry.get("block")
@@ -262,7 +261,6 @@ def _packed(entry: object) -> Packed | None:
 
 
 def _stamp(path: Path) -> Stamp | None:
-    """What tells one state of a file from another; None when there is none."""
     try:
         about = path.stat()
     except OSError:

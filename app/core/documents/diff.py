@@ -1,4 +1,4 @@
-"""What is different between two states of a behaviour, roughly: how many blocks came, went and changed."""
+"""Summary of the difference between two states of a behaviour: added, removed and changed blocks."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ Workspace = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Difference:
-    """Of ``blocks`` blocks then: how many were ``added``, ``removed`` and ``changed`` since."""
+    """Difference to a state of ``blocks`` blocks.
+
+    Numbers of ``added``, ``removed`` and ``changed`` blocks.
+    """
 
     blocks: int
     added: int = 0
     removed: int = 0
     changed: int = 0
     moved: bool = False
-    """Whether they are the same blocks, put together in another way."""
+    """True if the same blocks are arranged differently."""
 
 
 def difference(then: Workspace, now: Workspace) -> Difference:
-    """Blocks are the same when their ids are; numbers and words inside a block are part of it."""
+    """Compare two states by block ids; numbers and texts inside a block are part of it."""
     old, new = (dict(_blocks(workspace)) for workspace in (then, now))
     stayed = old.keys() & new.keys()
     made = Difference(
@@ -46,7 +49,7 @@ def _same(then: Workspace, now: Workspace) -> bool:
 
 
 def _blocks(workspace: Workspace) -> Iterator[tuple[str, object]]:
-    """The id of each block that a person placed, and what it says."""
+    # Blocks that the user placed, with their content.
     for block in parse_workspace(workspace).all_blocks():
         if not block.shadow:
             yield block.id, _said(block)

@@ -1,4 +1,4 @@
-"""The behaviour that is open: its blocks, its file, its journal, and what the compiler says of it."""
+"""Open behaviour: its blocks, file, journal and compiled program."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from nep.i18n import _, lazy
 UNNAMED = lazy("New behaviour")
 
 QUICK_S = 0.02
-"""A behaviour that compiles faster than this is compiled at once, in the window's thread."""
+"""Compile time below which a behaviour is compiled immediately, in the window's thread."""
 Key = tuple[int, int, int]
 
 _keys = itertools.count(1)
@@ -46,7 +46,7 @@ _keys = itertools.count(1)
 
 @dataclass(frozen=True)
 class Compiled:
-    """A program, what it was made of, and how long that took."""
+    """Compiled program, the key of its source, and the compile time."""
 
     key: Key
     program: Program
@@ -56,14 +56,13 @@ class Compiled:
 class Document:
     """One behaviour.
 
-    ``key`` names it among those that are open. ``revision`` grows when it is replaced from outside the
+    ``key`` identifies it among the open ones. ``revision`` increases when it is replaced from outside the
     editor, ``mends`` when Studio changed its blocks in a way that can be undone, ``edits`` with every edit.
     """
 
     def __init__(
         self, journal: Callable[[], Journal] = Journal, clock: Callable[[], float] = time.time
     ) -> None:
-        """Start with an empty new behaviour; ``journal`` makes the journal of each."""
         self._make_journal = journal
         self._clock = clock
         self._timer = time.perf_counter
@@ -75,10 +74,10 @@ class Document:
         self._json = WorkspaceJson.of({})
         self.robots: dict[str, Mapping[str, object]] = {}
         self._read: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
-        """Their descriptions as they were read last: reading one takes 15 ms, and each edit asks for all."""
+        """Parsed descriptions: parsing one takes 15 ms, and each edit needs all."""
         self.dirty = False
         self.saved_at: float | None = None
-        self._stamp: Stamp | None = None  # of the file, as it was read or written last
+        self._stamp: Stamp | None = None  # of the file, as last read or written
         self.revision = 0
         self.mends = 0
         self.edits = 0
@@ -97,7 +96,7 @@ class Document:
 
     @property
     def workspace(self) -> Workspace:
-        """Its blocks; parsed when they are asked for, if the editor told them as text."""
+        """Its blocks; text from the editor is parsed at the first access."""
         return self._json.blocks
 
     @workspace.setter
@@ -106,11 +105,11 @@ class Document:
 
     @property
     def has_blocks(self) -> bool:
-        """Whether there is any block in it."""
+        """True if it has any block."""
         return self._json.has_blocks
 
     def edited(self, workspace: Workspace | WorkspaceJson) -> None:
-        """The editor changed the blocks. They are journalled as they came; nobody waits for the disk."""
+        """Apply an edit of the blocks. The journal gets the editor's text; nothing blocks on the disk."""
         told = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
         if told.same_as(self._json):
             return
@@ -121,21 +120,21 @@ class Document:
         self._write_journal()
 
     def new(self, name: str = "") -> None:
-        """Begin an empty behaviour."""
+        """Start an empty behaviour."""
         self._replace(BehaviourFile(name or _(UNNAMED), {}, {}), None)
 
     def open(self, path: Path) -> None:
-        """Open a file. Raises DocumentError; then what was open stays."""
+        """Open a file. On DocumentError the open behaviour stays."""
         self._replace(read_file(path), path)
         self.saved_at = path.stat().st_mtime
         self._stamp = stamp_of(path)
 
     def example(self, path: Path) -> None:
-        """Open an example as a new, unsaved behaviour in the language of now. Raises DocumentError."""
+        """Open an example as a new, unsaved behaviour in the current language. Raises DocumentError."""
         self._replace(translated(read_file(path)), None)
 
     def copy(self, path: Path, name: str) -> None:
-        """Open a file as a new, unsaved behaviour of another name. Raises DocumentError."""
+        """Open a file as a new, unsaved behaviour with another name. Raises DocumentError."""
         self._replace(replace(read_file(path), name=name), None)
 
     def duplicate(self, other: Document, name: str) -> None:
@@ -144,24 +143,24 @@ class Document:
         self.edited(other.workspace)
 
     def recover(self, unsaved: Unsaved) -> None:
-        """Put back what a crash left behind.
+        """Restore the work of a crashed session.
 
-        It is unsaved, and journalled anew before the old journal goes.
+        It is unsaved, and written to a new journal before the old one is deleted.
         """
         found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
         self._replace(found, unsaved.path)
         now = stamp_of(unsaved.path) if unsaved.path is not None else None
         if now is not None and now[0] <= unsaved.edited_s * 1e9:
-            self._stamp = now  # nobody wrote the file after that work was done
+            self._stamp = now  # the file was not changed after that work
         self.dirty = True
         self._write_journal()
         if self.is_kept:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
-        """Write the file, atomically; with ``path`` it becomes the behaviour's file. Raises DocumentError.
+        """Write the file atomically; ``path`` becomes its file. Raises DocumentError.
 
-        The file holds its name too: programs that read files go by that one.
+        The file contains the name too, for programs that read it.
         """
         target = path if path is not None else self.path
         if target is None:
@@ -175,7 +174,7 @@ class Document:
         self._discard_journal()
 
     def rename_to(self, name: str) -> None:
-        """Give it another name, and its file, if it has one. Raises DocumentError; then nothing changed."""
+        """Rename the behaviour and its file, if any. On DocumentError nothing changes."""
         wanted = name.strip()
         problem = why_not(wanted, self.path)
         if problem:
@@ -188,14 +187,17 @@ class Document:
             self.path = new
             self._stamp = self._stamp if changed else stamp_of(new)
         elif self.path is not None and wanted != self.name:
-            self.dirty = True  # in Studio's own folder the name is what the file says
+            self.dirty = True  # in Studio's own folder the name is in the file
         self.name = wanted
-        self._compiled = self._asked = None  # a program says whose it is
+        self._compiled = self._asked = None  # a program contains the name
         if self.dirty:
             self._write_journal()
 
     def mend(self, action: str) -> bool:
-        """Do what a problem's button says to the blocks; False when the action is no matter of blocks."""
+        """Apply the action of a problem's button to the blocks.
+
+        Return False when it doesn't concern blocks.
+        """
         mended = deep_json.deeply(lambda: mend(self.workspace, action))
         if mended is None:
             return False
@@ -204,7 +206,7 @@ class Document:
         return True
 
     def use_robot(self, missing: str, robot: Robot) -> bool:
-        """Let a robot do what the blocks ask of one that is missing; False when nothing asks it."""
+        """Replace a missing robot in the blocks by another one; return False when no block uses it."""
         known = next((each for each in self._known() if each.name == missing), None)
         if known is None or not blocks_of(self.workspace, missing):
             return False
@@ -214,52 +216,58 @@ class Document:
         return True
 
     def lose_file(self) -> None:
-        """Another behaviour was saved as its file: its blocks are unsaved work now."""
+        """Detach its file, which another behaviour was saved to: its blocks are unsaved now."""
         self.path, self.dirty = None, True
         self._write_journal()
 
     def file_went_back(self) -> None:
-        """Its file says again what it said before the last saving: the blocks here are unsaved work."""
+        """Mark it as unsaved: the last save of its file was undone."""
         self.dirty, self._stamp = True, stamp_of(self.path) if self.path is not None else None
         self._write_journal()
 
     @property
     def changed_outside(self) -> bool:
-        """Whether somebody else has written its file since it was opened or saved here."""
+        """True if its file was changed outside since it was opened or saved."""
         now = stamp_of(self.path) if self.path is not None else None
         return now is not None and now != self._stamp
 
     @property
     def blank(self) -> bool:
-        """Whether it is a new behaviour that nobody has touched: another may take its place."""
+        """True if it is new and unchanged, so that another behaviour may replace it."""
         return self.path is None and not self.dirty and not self.workspace
 
     @property
     def journal(self) -> str:
-        """The name of the file that keeps its unsaved work."""
+        """File name of its journal."""
         return self._journal.name
 
     @property
     def journal_error(self) -> str | None:
-        """Why unsaved work is not kept, in a sentence; None while it is, or is just being written."""
+        """Sentence why unsaved work can't be written to the journal.
+
+        None while it is, or is being written.
+        """
         if self.journal_writer is not None:
             self._written(partial(self.journal_writer.take, self._journal.name))
         return self._journal_error
 
     @property
     def is_kept(self) -> bool:
-        """Whether its newest state is on the disk; waits for what is being written, 2 s at most."""
+        """True if its newest state is on disk. Waits for a write in progress, at most 2 s."""
         finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
         return finished and self.journal_error is None
 
     def keep_again(self) -> bool:
-        """Try once more to journal unsaved work that the disk did not take; whether all of it is kept."""
+        """Retry a failed write of the journal; return whether all unsaved work is on disk."""
         if self.dirty and not self.is_kept:
             self._write_journal()
         return not self.dirty or self.is_kept
 
     def close(self) -> None:
-        """The window closes: unsaved work stays in the journal and is offered at the next start."""
+        """Close at the end of the window.
+
+        Unsaved work stays in the journal and is offered at the next start.
+        """
         if not self.dirty:
             self._discard_journal()
         elif self.journal_writer is not None:
@@ -268,26 +276,26 @@ class Document:
     # -- robots and the compiler -----------------------------------------------------------------------------
 
     def set_connected(self, robots: Sequence[Robot]) -> None:
-        """The robots that are connected now."""
+        """Set the connected robots."""
         if tuple(robots) != self._connected:
             self._connected = tuple(robots)
             self.definitions_revision += 1
             self._keep_used_robots()
 
     def set_topics(self, topics: Sequence[str]) -> None:
-        """The topics that the editor offers to choose from."""
+        """Set the topics that the editor offers."""
         if tuple(topics) != self._topics:
             self._topics = tuple(topics)
             self.definitions_revision += 1
 
     @property
     def absent(self) -> tuple[Robot, ...]:
-        """Robots that the behaviour knows and that are not connected."""
+        """Robots in the behaviour that are not connected."""
         there = {robot.name for robot in self._connected}
         return tuple(robot for robot in self._known() if robot.name not in there)
 
     def program(self) -> Program:
-        """The blocks as a program, for the robots known now; compiled once for each edit."""
+        """Return the compiled program for the known robots; compiled once for each edit."""
         key = self._key()
         if self._compiled is None or self._compiled[0] != key:
             began = self._timer()
@@ -296,7 +304,7 @@ class Document:
         return self._compiled[1]
 
     def try_program(self, stack: Stack) -> Program | None:
-        """One stack of the blocks as a program of its own; None when it is not there any more."""
+        """Return one stack of blocks as a program; None when it no longer exists."""
         made = deep_json.deeply(lambda: stack.workspace(self.workspace))
         if made is None:
             return None
@@ -304,9 +312,9 @@ class Document:
         return replace(program, shows_value=stack.is_value)
 
     def newest(self) -> Program | None:
-        """The program of the newest edit that is compiled; a long one is compiled beside the window.
+        """Return the newest compiled program; long ones are compiled in the background.
 
-        So it may be that of an edit before, and None when a long behaviour has just been opened.
+        It may be that of an earlier edit, and None when a long behaviour has just been opened.
         """
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:
@@ -324,7 +332,6 @@ class Document:
         return self._compiled[1] if self._compiled is not None else None
 
     def _is_quick(self) -> bool:
-        """Whether compiling holds the window up so little that it may be done at once."""
         if self._compile_s is not None:
             return self._compile_s < QUICK_S
         return self._asked is None and not self._json.is_longer_than(LONG_CHARACTERS)
@@ -333,21 +340,21 @@ class Document:
         return self.revision, self.edits, self.definitions_revision
 
     def _compiling(self) -> Callable[[], Program]:
-        """The compilation of what is here now; it may run in any thread, and parses there."""
+        # Compiles the current state; it may run in any thread, and parses there.
         return partial(_compile, self._json, self._connected, self.absent, self.name)
 
     def problems(self) -> tuple[Problem, ...]:
-        """What the compiler says of the blocks."""
+        """Return the compiler's problems."""
         return self.program().problems
 
     def definitions(self) -> Mapping[str, object]:
-        """Blocks and toolbox for the editor, from the categories and the robots connected now."""
+        """Return blocks and toolbox for the editor, from the categories and the connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
             made = editor_definitions(self._connected, self.absent, self._topics)
             self._definitions = (self.definitions_revision, made)
         return self._definitions[1]
 
-    # -- inside ----------------------------------------------------------------------------------------------
+    # -- private ---------------------------------------------------------------------------------------------
 
     def _replace(self, found: BehaviourFile, path: Path | None) -> None:
         self._discard_journal()
@@ -370,7 +377,7 @@ class Document:
             self._written(work)
 
     def _written(self, written: Callable[[], bool | None]) -> None:
-        """Take over how writing the journal ended; nothing has when that is None."""
+        # Applies the result of writing the journal; None means not finished.
         try:
             ended = written()
         except OSError as error:
@@ -387,17 +394,17 @@ class Document:
     def _discard_journal(self) -> None:
         if self.journal_writer is not None:
             self.journal_writer.forget(self._journal.name)
-            self.journal_writer.finish(self._journal.name)  # or it would write what was discarded
+            self.journal_writer.finish(self._journal.name)  # otherwise it would write the discarded state
             self.journal_writer.forget(self._journal.name)
         self._journal.discard()
         self._journal_error = None
 
     def _keep_used_robots(self) -> None:
-        """Keep the descriptions of the robots that the blocks name: they are known without them later."""
+        # Stores the descriptions of the used robots, so that the behaviour is complete without them later.
         try:
             text = self._json.text
         except RecursionError:
-            return  # the journal, which comes next, says so
+            return  # writing the journal reports it
         for robot in self._connected:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
@@ -436,17 +443,17 @@ def _are_same(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
     try:
         return one == other
     except RecursionError:
-        return False  # a file may say anything, as deep as it likes
+        return False  # a file may be nested arbitrarily deep
 
 
 def _parsed(description: Mapping[str, object]) -> Robot | None:
     try:
         return parse(description)
     except DescriptionError:
-        return None  # its blocks are kept as unknown ones, and the problems list names them
+        return None  # its blocks stay as unknown ones, and are listed as problems
 
 
 def read(path: Path) -> tuple[str, Workspace, Descriptions]:
-    """Name, workspace and robots of a behaviour file. Raises DocumentError with what to do next."""
+    """Return name, workspace and robots of a behaviour file. Raises DocumentError with the next step."""
     found = read_file(path)
     return found.name, found.workspace, found.robots

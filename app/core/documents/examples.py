@@ -1,7 +1,7 @@
-"""The words of an example, in the language of now: an example is read, and heard, by who begins.
+"""Translation of examples into the current language.
 
-Its file stays as it is, in English; it is translated when it is opened, and belongs to a person from then on.
-What programs say to each other stays: topics, names of a message's fields, types, choices, robots.
+The file stays English; it is translated when opened, and belongs to the user from then on. Texts between
+programs stay: topics, field names of messages, types, choices, robots.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ NAME, ABOUT, TEXT, LABEL, NOTE = (
     "name in an example",
     "note of an example",
 )
-"""Contexts of the catalogue: the example's name, what it does in a line, a block of text, a variable or
-function, and the note beside its blocks: what it does, and what to try."""
+"""Contexts of the catalogue: the example's name, its one-line description, a text block, a variable or
+function, and the note beside the blocks."""
 
 Say = Callable[[str, str], str]
-"""What a (context, English) is in another language."""
+"""Translates an English text in a context."""
 
 
 def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
-    """An example that Studio ships as a person sees it; never for a person's own file.
+    """Return an example of Studio translated; never use it for the user's own file.
 
-    The same English becomes the same words everywhere in it, so that what is compared stays equal.
+    Equal English texts get equal translations, so that comparisons still work.
     """
     names: dict[str, str] = {}
 
     def label(english: str) -> str:
-        """A variable's or function's name; English where two would get the same."""
+        # English where two names would be equal.
         if english not in names:
             told = say(LABEL, english)
             is_taken = told.casefold() in map(str.casefold, names.values())
@@ -58,7 +58,7 @@ def translated(example: BehaviourFile, say: Say = translate) -> BehaviourFile:
 
 @lru_cache(maxsize=1)
 def example_block_ids() -> frozenset[str]:
-    """Return the ids of all blocks of the examples that Studio ships; a person's own blocks have others."""
+    """Return the ids of all blocks of Studio's examples; the user's own blocks have others."""
     return frozenset(
         str(block.get("id"))
         for path in sorted(resources.path("examples").glob(f"*{SUFFIX}"))
@@ -67,7 +67,7 @@ def example_block_ids() -> frozenset[str]:
 
 
 def _translated(value: object, say: Say, label: Callable[[str], str]) -> object:
-    """A part of the blocks as Blockly saves them."""
+    # A part of the blocks in Blockly's format.
     if isinstance(value, list):
         return [_translated(each, say, label) for each in value]
     if not isinstance(value, Mapping):
@@ -95,5 +95,4 @@ def _dicts(value: object) -> list[dict[str, object]]:
 
 
 def _has_letters(text: object) -> bool:
-    """Whether there is anything to translate in a text."""
     return isinstance(text, str) and any(map(str.isalpha, text))

@@ -1,6 +1,6 @@
-"""A behaviour's file: JSON with its name, its blocks and the robots that they name.
+"""Behaviour file: JSON with name, blocks and robots.
 
-What this version does not know (a description, a field of a later program) is kept and written again.
+Fields that this version doesn't know (a description, a field of a later version) are preserved.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOO_DEEP = lazy("one stack has more than 4000 blocks")
 FROM_BEFORE = lazy("open an earlier copy")
 DIVIDE = lazy("split it into several scripts")
 FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
-"""What systems say of a disk, a file or a share of a disk that takes nothing more."""
+"""Error numbers of a full disk, file or quota."""
 OURS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
@@ -31,7 +31,7 @@ Descriptions = Mapping[str, Mapping[str, object]]
 
 @dataclass(frozen=True)
 class BehaviourFile:
-    """What a behaviour's file says; ``others`` are its fields that this version does not know."""
+    """Content of a behaviour file; ``others`` are fields that this version doesn't know."""
 
     name: str
     workspace: Workspace
@@ -40,9 +40,9 @@ class BehaviourFile:
 
 
 def read_file(path: Path, name: str = "") -> BehaviourFile:
-    """Read a behaviour's file. Raises DocumentError with what to do next.
+    """Read a behaviour file. Raises DocumentError with the next step.
 
-    ``name`` is how the sentence calls it, if a person knows it by another name than the file's own.
+    ``name`` is used in the sentence if the user knows the file by another name.
     """
     name = name or path.name
     try:
@@ -50,14 +50,17 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
     except OSError as error:
         words = _("can't read {file} ({reason})")
         raise DocumentError(path, words.format(file=name, reason=error.strerror or error)) from error
-    except ValueError as error:  # letters that no file's name has here
+    except ValueError as error:  # characters that no file name can have here
         words = _("can't read {file} (file names like this aren't allowed here)")
         raise DocumentError(path, words.format(file=name)) from error
     return parse_file(data, path, name)
 
 
 def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
-    """The behaviour in a file's bytes; ``path`` and ``name`` are for the sentence. Raises DocumentError."""
+    """Parse the bytes of a behaviour file; ``path`` and ``name`` are for the sentence.
+
+    Raises DocumentError.
+    """
     name = name or path.name
     try:
         content = deep_json.loads(data)  # UTF-8, or UTF-16 or UTF-32 as some editors on Windows save it
@@ -84,7 +87,10 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
 
 
 def file_bytes(behaviour: BehaviourFile) -> bytes:
-    """What its file has in it. Raises RecursionError for more than 4000 blocks in one stack."""
+    """Return the content of a behaviour file.
+
+    Raises RecursionError for more than 4000 blocks in one stack.
+    """
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -97,9 +103,9 @@ def file_bytes(behaviour: BehaviourFile) -> bytes:
 
 
 def write_file(path: Path, behaviour: BehaviourFile) -> None:
-    """Write a behaviour's file, atomically: the old one or the new one is there, never a part.
+    """Write a behaviour file atomically.
 
-    Raises DocumentError with what to do next; then the old file is whole.
+    On DocumentError, which contains the next step, the old file is intact.
     """
     try:
         data = file_bytes(behaviour)
@@ -124,5 +130,5 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
 
 
 def what_behaviours_are() -> str:
-    """What to look for instead of a file that is no behaviour."""
+    """Return a hint for a file that isn't a behaviour."""
     return _("behaviours are files ending in {suffix}").format(suffix=SUFFIX)

@@ -1,4 +1,4 @@
-"""What is in a folder, and which names files and folders can have on every system."""
+"""Content of a folder, and file names that are valid on every system."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from nep.i18n import _
 MOST_ENTRIES = 5000
 REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-"""What one of the systems takes in no name: a file is to open on all of them."""
+"""Names that one of the systems rejects: a file should be usable on all of them."""
 LONGEST_NAME = 120
 
 
 @dataclass(frozen=True)
 class FolderEntry:
-    """One file or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
+    """File or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
 
     path: Path
     is_folder: bool
@@ -29,7 +29,7 @@ class FolderEntry:
 
 
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
-    """The folders and the files with one of these endings, without hidden ones. Raises OSError."""
+    """Return the folders and the files with one of these endings, without hidden ones. Raises OSError."""
     made = []
     with os.scandir(folder) as found:
         for each in found:
@@ -38,7 +38,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
             try:
                 facts = each.stat()
             except OSError:
-                continue  # a link to nothing, or gone since
+                continue  # a broken link, or deleted meanwhile
             is_folder = stat.S_ISDIR(facts.st_mode)
             if is_folder or each.name.lower().endswith(endings):
                 made.append(FolderEntry(Path(each.path), is_folder, facts.st_mtime, facts.st_size))
@@ -48,7 +48,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
 
 
 def name_refusal(name: str) -> str:
-    """Why a file or folder can't be called so, in a sentence; "" when it can."""
+    """Return why a name is invalid for a file or folder, or ""."""
     bad = REFUSED.search(name)
     if bad:
         return _("A name can't have “{sign}” in it.").format(sign=bad[0])
@@ -62,13 +62,13 @@ def name_refusal(name: str) -> str:
 
 
 def whole_path(typed: str) -> Path | None:
-    """The path that somebody typed instead of a name; None for a name."""
+    """Return the path if an absolute path was typed; None for a name."""
     path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
     return path if path.is_absolute() and path.name else None
 
 
 def free_name(folder: Path, name: str, ending: str = SUFFIX) -> str:
-    """The name, or the first of its numbers that no file there has: "Greeting 2"."""
+    """Return the name, numbered if a file has it: "Greeting 2"."""
     number, made = 2, name
     while (folder / f"{made}{ending}").exists():
         made, number = f"{name} {number}", number + 1

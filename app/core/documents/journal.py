@@ -1,7 +1,7 @@
-"""Unsaved work survives a crash: every edit is written to a journal at once, beside the window.
+"""Journal of unsaved work against a crash: every edit is written in the background.
 
-One journal per open behaviour, in ``journal/`` of Studio's folder. It names the process that writes it, so
-that a second Studio does not offer what the first one still holds.
+One file per open behaviour, in ``journal/`` of Studio's folder. It contains the process that writes it, so
+that a second instance doesn't offer the work of the first.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ else:
     psutil = lazy_module("psutil")
 
 FORMAT = 1
-"""Goes up when this version can't understand the journals of the next one."""
+"""Format version; increased when older versions can't read newer journals."""
 LARGEST_JOURNAL_BYTES = 64_000_000
-"""Unsaved work comes back also when it is larger than a file may be: it can be made smaller then."""
+"""Maximum journal size; larger than that of a behaviour file, so that oversized work can be restored and
+reduced."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unsaved:
-    """Work that a Studio left behind: what it was, which file it belongs to, and when it was last edited."""
+    """Work of a crashed session: its name, its file, and the time of the last edit."""
 
     journal: Path
     name: str
@@ -47,17 +48,16 @@ class Unsaved:
 
 
 class Journal:
-    """The journal of one open behaviour."""
+    """Journal of one open behaviour."""
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
-        """Journals live in ``folder`` (default: ``journal`` in Studio's folder)."""
         self._folder = folder if folder is not None else home() / "journal"
         self._clock = clock
         self._file = self._folder / f"{uuid.uuid4().hex}.json"
 
     @property
     def name(self) -> str:
-        """The name of its file."""
+        """Name of the journal file."""
         return self._file.name
 
     def write(
@@ -68,9 +68,9 @@ class Journal:
         robots: Mapping[str, Mapping[str, object]],
         others: Mapping[str, object] | None = None,
     ) -> None:
-        """Keep the newest state; ``text`` is the JSON of the workspace, taken as it is.
+        """Write the newest state, which survives a crash of this process. Raises OSError.
 
-        ``others`` is what else its file says. It survives the death of this process. Raises OSError.
+        ``text`` is the JSON of the workspace, written unchanged; ``others`` are further fields of the file.
         """
         entry = {
             "format": FORMAT,
@@ -87,16 +87,16 @@ class Journal:
         write_atomically(self._file, data, durable=False, private=True)
 
     def discard(self) -> None:
-        """The work is saved or given up: nothing is offered at the next start.
+        """Delete the journal: the work is saved or discarded.
 
-        A folder that takes no files has kept none, or keeps one that the next start offers once more.
+        Errors are ignored: at worst the work is offered once more at the next start.
         """
         with contextlib.suppress(OSError):
             self._file.unlink(missing_ok=True)
 
 
 def left_behind(folder: Path | None = None) -> list[Unsaved]:
-    """Work whose Studio is gone, the newest first. Journals that can't be read are left where they are."""
+    """Return the work of crashed sessions, newest first. Unreadable journals are left in place."""
     folder = folder if folder is not None else home() / "journal"
     make_private(folder, "*.json")
     found = [_read(file) for file in folder.glob("*.json")] if folder.is_dir() else []
@@ -104,7 +104,7 @@ def left_behind(folder: Path | None = None) -> list[Unsaved]:
 
 
 def of_newer(folder: Path | None = None) -> list[str]:
-    """The names of the unsaved work that a newer Studio left behind: it is not touched."""
+    """Return the names of unsaved work of a newer Studio, which is left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     found = []
     for file in folder.glob("*.json") if folder.is_dir() else ():
@@ -115,7 +115,7 @@ def of_newer(folder: Path | None = None) -> list[str]:
 
 
 def _entry(file: Path) -> dict[str, object] | None:
-    """What a journal says whose Studio is gone; None for what is none, or still written."""
+    # None for a malformed journal, or one that is still in use.
     try:
         entry = deep_json.loads(read_whole(file, LARGEST_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
         if not isinstance(entry, dict) or _alive(int(entry["pid"]), float(entry["born_s"])):
@@ -126,7 +126,7 @@ def _entry(file: Path) -> dict[str, object] | None:
 
 
 def _format_of(entry: Mapping[str, object]) -> int:
-    """The number of its format; 1 for journals from before there were numbers."""
+    # 1 for journals from before there were versions.
     found = entry.get("format", 1)
     return found if isinstance(found, int) else 1
 
@@ -152,12 +152,12 @@ def _read(file: Path) -> Unsaved | None:
 
 @lru_cache(maxsize=1)
 def _own_birth(pid: int) -> float:
-    """When this process began; the id is given because a fork is another one."""
+    # Cached by process id, because a fork has another one.
     return psutil.Process(pid).create_time()
 
 
 def _alive(pid: int, born_s: float) -> bool:
-    # a pid alone may belong to another program by now
+    # the process id alone may have been reused
     try:
         process = psutil.Process(pid)
         return abs(process.create_time() - born_s) < 1.0 and process.status() != psutil.STATUS_ZOMBIE

@@ -1,6 +1,6 @@
-"""The behaviours that are open, as tabs: one of them is current, each has its own file, journal and mark.
+"""Open behaviours as tabs: one is current, each has its own file, journal and mark.
 
-The tabs come back at the next start (`kept`, `put_back`); those that were closed can be opened again.
+The tabs are restored at the next start (`kept`, `put_back`); closed ones can be reopened.
 """
 
 from __future__ import annotations
@@ -21,23 +21,22 @@ CLOSED_KEPT = 20
 
 
 class Documents:
-    """All open behaviours; there is always at least one. ``revision`` grows when the tabs change."""
+    """All open behaviours, at least one. ``revision`` increases when the tabs change."""
 
     def __init__(self, make: Callable[[], Document] = Document) -> None:
-        """``make`` gives each new document."""
         self._make = make
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._closed: list[Path] = []
         self._compiler: BackgroundWorker[Compiled] = BackgroundWorker("studio-compiler")
-        # of its own: unsaved work never waits for a long compilation
+        # a separate worker, so that unsaved work never waits for a long compilation
         self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
         self.revision = 0
         self.current = self._made()
         self._open = [self.current]
 
     def __iter__(self) -> Iterator[Document]:
-        """In the order of their tabs."""
+        # In the order of the tabs.
         return iter(tuple(self._open))
 
     def __len__(self) -> int:
@@ -45,13 +44,13 @@ class Documents:
 
     @property
     def can_reopen(self) -> bool:
-        """Whether a tab was closed whose file can be opened again."""
+        """True if a closed tab can be reopened."""
         return bool(self._closed)
 
     # -- opening -----------------------------------------------------------------------------------------
 
     def new(self) -> Document:
-        """Begin an empty behaviour in a tab of its own; an untouched one is taken as it is."""
+        """Start an empty behaviour in a new tab, or in an unchanged one."""
         if self.current.blank:
             return self.current
         made = self._made()
@@ -59,7 +58,7 @@ class Documents:
         return self._put(made)
 
     def open(self, path: Path) -> Document:
-        """Open a file in a tab, or show the tab that has it. Raises DocumentError; then nothing changed."""
+        """Open a file in a tab, or show its tab. On DocumentError nothing changes."""
         there = self.with_path(path)
         if there is not None:
             return self._shown(there)
@@ -70,25 +69,25 @@ class Documents:
         return self._named_apart(self._filled(lambda document: document.example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
-        """Open a file as a new behaviour of another name in a tab. Raises DocumentError."""
+        """Open a file as a new behaviour with another name in a tab. Raises DocumentError."""
         return self._named_apart(self._filled(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
-        """Open a new behaviour with the same blocks, in the tab beside it."""
+        """Open a copy of a behaviour in the next tab."""
         self.show(document)
         made = self._made()
         made.duplicate(document, self._free_name(_("{name} copy").format(name=document.name)))
         return self._put(made)
 
     def rename(self, document: Document, name: str) -> None:
-        """Give a behaviour another name, and its file. Raises DocumentError; then nothing changed."""
+        """Rename a behaviour and its file. On DocumentError nothing changes."""
         before = document.path
         document.rename_to(name)
         self._closed = [document.path if each == before and document.path else each for each in self._closed]
         self.revision += 1
 
     def recover(self, unsaved: Unsaved) -> Document:
-        """Put back unsaved work: into the tab that has its file, else into a tab of its own."""
+        """Restore unsaved work: into the tab of its file, else into a new tab."""
         there = self.with_path(unsaved.path) if unsaved.path is not None else None
         if there is None or there.dirty:
             return self._filled(lambda document: document.recover(unsaved))
@@ -96,16 +95,16 @@ class Documents:
         return self._shown(there)
 
     def with_path(self, path: Path) -> Document | None:
-        """The open behaviour of that file."""
+        """Return the open behaviour of a file, or None."""
         wanted = path.resolve()
         return next((each for each in self._open if each.path and each.path.resolve() == wanted), None)
 
     def with_key(self, key: str) -> Document | None:
-        """The open behaviour of that key."""
+        """Return the open behaviour with this key, or None."""
         return next((each for each in self._open if each.key == key), None)
 
     def title(self, document: Document) -> str:
-        """What an open behaviour is called: no two of them are called the same."""
+        """Return the title of an open behaviour, which is unique."""
         opened = [*self._open, *([document] if document not in self._open else [])]
         return told_apart([(each.name, each.path) for each in opened])[opened.index(document)]
 
@@ -117,18 +116,21 @@ class Documents:
             self._shown(document)
 
     def neighbour(self, step: int) -> Document:
-        """The behaviour that many tabs further, round the ends."""
+        """Return the behaviour ``step`` tabs further, cyclically."""
         return self._open[(self._open.index(self.current) + step) % len(self._open)]
 
     def move(self, document: Document, place: int) -> None:
-        """Put a tab to that place, from 0."""
+        """Move a tab to a position, from 0."""
         if document in self._open and self._open.index(document) != place:
             self._open.remove(document)
             self._open.insert(max(0, place), document)
             self.revision += 1
 
     def close(self, document: Document) -> None:
-        """Close a tab; who calls has put its unsaved work somewhere. An empty behaviour follows the last."""
+        """Close a tab, whose unsaved work the caller has saved.
+
+        The last tab is replaced by an empty behaviour.
+        """
         if document not in self._open:
             return
         place = self._open.index(document)
@@ -145,7 +147,7 @@ class Documents:
         self.revision += 1
 
     def reopen(self) -> Document | None:
-        """Open the tab that was closed last; None when there is none. Raises DocumentError."""
+        """Reopen the last closed tab; None when there is none. Raises DocumentError."""
         while self._closed:
             path = self._closed.pop()
             if self.with_path(path) is None:
@@ -153,59 +155,64 @@ class Documents:
         return None
 
     def saved(self, document: Document) -> None:
-        """A behaviour was saved: another tab of the same file has lost it, and keeps its blocks unsaved."""
+        """Apply a save: other tabs of the same file are detached, and their blocks are unsaved."""
         for other in self._open:
             if other is not document and other.path == document.path:
                 other.lose_file()
         self.revision += 1
 
-    # -- what all of them are told -----------------------------------------------------------------------
+    # -- common input --------------------------------------------------------------------------------------
 
     def set_connected(self, robots: Sequence[Robot]) -> None:
-        """The robots that are connected now."""
+        """Set the connected robots."""
         self._robots = tuple(robots)
         for document in self._open:
             document.set_connected(robots)
 
     def set_topics(self, topics: Sequence[str]) -> None:
-        """The topics that the editor offers to choose from."""
+        """Set the topics that the editor offers."""
         self._topics = tuple(topics)
         for document in self._open:
             document.set_topics(topics)
 
     @property
     def definitions_revision(self) -> object:
-        """Differs when `definitions` may differ."""
+        """Value that changes when `definitions` may change."""
         return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._open)
 
     def definitions(self) -> Mapping[str, object]:
-        """Blocks and toolbox for the editor: the robots that are connected, and those of any open behaviour.
+        """Return blocks and toolbox for the editor.
 
-        They are the same for all tabs, so that a tab that does not show keeps its blocks.
+        Of the connected robots, and of those in any open behaviour.
+
+        They are the same for all tabs, so that hidden tabs keep their blocks.
         """
         absent = {robot.name: robot for document in self._open for robot in document.absent}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:
-        """Why unsaved work of one of them can't be kept; None when all of it is."""
+        """Sentence why unsaved work of one behaviour can't be written; None when all of it is."""
         return next((each.journal_error for each in self._open if each.journal_error), None)
 
     def unkept(self) -> list[Document]:
-        """Those whose unsaved work can't be kept, also when it is tried once more: the window ends it."""
+        """Return the behaviours whose unsaved work can't be written, after a retry.
+
+        Called at the end of the window.
+        """
         return [each for each in self._open if not each.keep_again()]
 
     def end(self) -> None:
-        """The window closes; unsaved work stays in the journals."""
+        """Close at the end of the window; unsaved work stays in the journals."""
         for document in self._open:
             document.close()
         self._compiler.close()
         self._journal_writer.close()
 
-    # -- from one start to the next ----------------------------------------------------------------------
+    # -- between sessions --------------------------------------------------------------------------------
 
     def kept(self) -> dict[str, object]:
-        """The tabs, as the settings keep them."""
+        """Return the tabs in the form of the settings."""
         tabs = [
             {"path": str(each.path) if each.path is not None else None, "journal": each.journal}
             for each in self._open
@@ -215,9 +222,9 @@ class Documents:
         return {"tabs": tabs, "current": shown.index(self.current) if self.current in shown else 0}
 
     def put_back(self, kept: Mapping[str, object], left: Iterable[Unsaved], *, ended_well: bool) -> set[Path]:
-        """Open the tabs of the last start; the journals that were taken over are returned.
+        """Restore the tabs of the last session; return the journals that were restored.
 
-        Unsaved work is taken over when Studio ended well; after a crash a person is asked.
+        Unsaved work is restored after a normal end; after a crash the user is asked.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         unsaved = {each.journal.name: each for each in left} if ended_well else {}
@@ -237,9 +244,9 @@ class Documents:
         return taken
 
     def arrange(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
-        """Put unsaved work that was recovered where its tabs were, and show the tab that a person worked on.
+        """Arrange recovered work at the positions of its tabs, and show the last current tab.
 
-        ``recovered`` goes by the names of the journals of then. What was opened since stands behind.
+        ``recovered`` is by journal name of the last session. Tabs opened since come last.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         found: dict[int, Document] = {}
@@ -265,9 +272,9 @@ class Documents:
         try:
             return self.open(Path(path))
         except DocumentError:
-            return None  # the file is kept in Recent; opening it there says what is wrong
+            return None  # the file stays in Recent; opening it there reports the problem
 
-    # -- inside ------------------------------------------------------------------------------------------
+    # -- private -----------------------------------------------------------------------------------------
 
     def _made(self) -> Document:
         made = self._make()
@@ -294,7 +301,7 @@ class Documents:
         return document
 
     def _named_apart(self, document: Document) -> Document:
-        """One without a file gets a name that no other has."""
+        # A behaviour without a file gets a unique name.
         document.name = self._free_name(document.name, besides=document)
         return document
 

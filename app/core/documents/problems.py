@@ -1,4 +1,4 @@
-"""The problems of a behaviour as people see them: a missing robot is one line, with what can be done."""
+"""Problems of a behaviour for display: one line for each missing robot, with its fixes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
 CONNECT = "connect:"
-MOST_MENDS = 2  # a line has no room for more
+MOST_MENDS = 2  # a line has no space for more
 
 
 @dataclass(frozen=True)
 class Mend:
-    """A button: its words, and the command that it runs."""
+    """Button of a problem: its label, and the command that it runs."""
 
     words: str
     action: str
@@ -24,7 +24,7 @@ class Mend:
 
 @dataclass(frozen=True)
 class Listed:
-    """One line: the problem, what mends it (the best first), and how many blocks it is about."""
+    """One line: the problem, its fixes (best first), and the number of blocks concerned."""
 
     problem: Problem
     mends: tuple[Mend, ...]
@@ -32,7 +32,7 @@ class Listed:
 
     @property
     def severity(self) -> str:
-        """``error``, ``warning`` or ``info``."""
+        """Severity: ``error``, ``warning`` or ``info``."""
         return self.problem.severity
 
 
@@ -44,10 +44,10 @@ def listed(
     virtual_models: Collection[str],
     absent: Collection[str] = (),
 ) -> tuple[Listed, ...]:
-    """The lines for these problems.
+    """Return the lines for these problems.
 
-    All blocks of one missing robot are one line: as many as are grey, which are those in `absent`
-    (`Program.absent`). It offers each connected robot that can do the same, and a virtual robot of its model.
+    All blocks of a missing robot are one line, with the number of grey ones, which are in `absent`
+    (`Program.absent`). Its fixes are connected robots that can do the same, and a virtual robot of its model.
     """
     found: list[Listed] = []
     place: dict[str, int] = {}
@@ -78,7 +78,7 @@ def robot_mends(
     able: Sequence[Robot],
     virtual_models: Collection[str],
 ) -> tuple[Mend, ...]:
-    """What can be done about a missing robot, the best first; `able` can do what is asked of it."""
+    """Return the fixes for a missing robot, best first; `able` robots can do the same."""
     if robot is None:
         return (_show_robots(name),)
     alike = [other for other in able if other.model == robot.model] or able
@@ -92,7 +92,7 @@ def robot_mends(
 
 
 def _show_robots(name: str) -> Mend:
-    """Studio can't switch a real robot on: it shows which are there, and why others are not."""
+    # Studio can't switch a real robot on: it shows the present ones, and why others are missing.
     return Mend(_("Show the robots"), f"{CONNECT}{name}")
 
 
@@ -102,7 +102,7 @@ def _missing(problem: Problem) -> str | None:
 
 
 def _counted(line: Listed) -> Listed:
-    """One block is named, several are counted."""
+    # A single block is named, several are counted.
     if line.blocks == 1:
         return line
     name = _missing(line.problem) or ""

@@ -1,4 +1,4 @@
-"""Another name for a behaviour's file: one that every system takes, and never over another file."""
+"""Renaming a behaviour's file: with a name that every system accepts, and never over another file."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ LONGEST_BYTES = 200
 DEVICES = frozenset(
     {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
 )
-"""Names that Windows keeps for itself: a file must still open when it is carried there."""
+"""Reserved names of Windows: a file must stay usable when it is copied there."""
 
 
 def path_named(path: Path, name: str) -> Path:
-    """The file of that name in the same folder; one of Studio's own folder keeps its place."""
+    """Return the path with this name in the same folder; unchanged in Studio's own folder."""
     if name_of(path, "") != path.stem:
         return path
     return path.with_name(f"{name}{path.suffix or SUFFIX}")
 
 
 def why_not(name: str, path: Path | None) -> str:
-    """Why a behaviour can't have this name, in a sentence; "" when it can. ``path`` is its file, if any."""
+    """Return why a behaviour can't have this name, or "". ``path`` is its file, if any."""
     wanted = name.strip()
     if not wanted:
         return _("A behaviour needs a name.")
@@ -52,10 +52,10 @@ def why_not(name: str, path: Path | None) -> str:
 
 
 def rename_file(old: Path, new: Path) -> None:
-    """Give a file another name. Raises DocumentError, and then it has its old one.
+    """Rename a file. On DocumentError it keeps its old name.
 
-    A file that came there meanwhile is not written over: the new name is taken first, by an empty file, which
-    only one program can make. (A hard link would do too, but memory sticks have none.)
+    An existing file is never overwritten: the new name is reserved first by an empty file, which only one
+    program can create. (A hard link would do too, but file systems of memory sticks have none.)
     """
     try:
         if not old.is_file():
@@ -78,7 +78,7 @@ def rename_file(old: Path, new: Path) -> None:
 
 
 def _same(new: Path, old: Path) -> bool:
-    """Whether both are one file, called with other capitals where these do not count."""
+    # The same file with other capitals, on case-insensitive file systems.
     try:
         return new.name.casefold() == old.name.casefold() and new.samefile(old)
     except OSError:

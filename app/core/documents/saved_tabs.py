@@ -1,4 +1,4 @@
-"""The tabs from one start to the next: which behaviours were open, and what of them was not saved."""
+"""Tabs between sessions: open behaviours and their unsaved work."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ KEY = "tabs"
 
 
 class KeptTabs:
-    """Keeps in the settings which tabs are open, and opens them again at the next start."""
+    """Saves the open tabs in the settings, and restores them at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
-        """``complain`` is told, in a sentence, that they can't be kept."""
+        # `complain` is called with a sentence when they can't be saved.
         self._settings, self._documents, self._complain = settings, documents, complain
         self.active = False
-        """Whether this window is the one whose tabs come back; a second window's do not."""
+        """True if this window's tabs are saved; those of a second window are not."""
         self._last: dict[str, object] = {}
         self._kept_revision = -1
 
     def come_back(self, left: Sequence[Unsaved]) -> list[Unsaved]:
-        """Open the tabs of the last start, and keep them from now on.
+        """Restore the tabs of the last session, and save them from now on.
 
-        Of ``left``, the unsaved work that dead Studios left, those are returned for which a person is to be
-        asked.
+        Return the entries of ``left`` (work of crashed sessions) that the user must be asked about.
         """
         self.active = True
         kept: dict[str, object] = self._settings.get(KEY, {})
@@ -38,24 +37,27 @@ class KeptTabs:
         return [each for each in left if each.journal not in taken]
 
     def recover(self, left: Sequence[Unsaved]) -> None:
-        """Put unsaved work back into the tabs where it was; the one that was worked on shows."""
+        """Restore unsaved work into its tabs, and show the last current one."""
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
         self._documents.arrange(self._last, recovered)
         self.keep()
 
     def edited(self, document: Document, *, was_blank: bool) -> None:
-        """A person edited a behaviour: from its first block on its tab comes back, too."""
+        """Save the tabs at the first edit of a new behaviour."""
         if was_blank and not document.blank:
             self.keep()
 
     def follow(self) -> None:
-        """Keep which tab shows, if that changed. Once a second: nobody waits for the disk to see a tab."""
+        """Save the tabs if they changed.
+
+        Called once a second, so that showing a tab doesn't wait for the disk.
+        """
         if self._documents.revision != self._kept_revision:
             self.keep()
 
     def keep(self, *, ended_well: bool = False) -> None:
-        """Keep which tabs are open now; ``ended_well`` when the window closes in order."""
+        """Save the open tabs; ``ended_well`` when the window closes normally."""
         if not self.active:
             return
         self._kept_revision = self._documents.revision

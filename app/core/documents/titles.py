@@ -1,4 +1,4 @@
-"""What people call behaviours: by their files' names, and two of the same name with their folders."""
+"""Titles of behaviours: file names, with folders where two are equal."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from nep.i18n import _
 
 
 def name_of(path: Path, inside: str) -> str:
-    """What a file is called: its own name; ``inside`` is the name written in it.
+    """Return the name of a behaviour file: its file name; ``inside`` is the name in the file.
 
-    That counts only in Studio's own folder of work that was closed unsaved: nobody chose a file's name there.
+    The latter is used only in Studio's folder of work that was closed unsaved, where file names are
+    generated.
     """
     return inside if path.parent == kept_folder() else path.stem
 
 
 def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
-    """A title for each of these names and files: the name, with as many folders as it takes."""
+    """Return a unique title for each name and file: the name, with as many folders as necessary."""
     alike: dict[str, set[Path]] = {}
     for name, path in named:
         if path is not None:
@@ -38,13 +39,13 @@ def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
 
 
 def recent_titles(files: Sequence[RecentFile]) -> list[RecentFile]:
-    """The same files, called so that no two of them have the same name."""
+    """Return the files with unique names."""
     titles = told_apart([(file.name, file.path) for file in files])
     return [replace(file, name=title) for file, title in zip(files, titles, strict=True)]
 
 
 def _folder(path: Path, others: set[Path]) -> str:
-    """The folders that hold the file, as few as tell it from the others."""
+    # As few folders as distinguish the file from the others.
     folders = path.parent.parts[1:] or path.parent.parts
     for count in range(1, len(folders)):
         if all(other.parent.parts[-count:] != folders[-count:] for other in others):

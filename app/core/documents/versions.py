@@ -1,7 +1,7 @@
-"""What a behaviour's file said before Studio wrote over it: kept aside, to be put back or looked at.
+"""Earlier versions of behaviour files, kept when Studio overwrites them.
 
-A copy's name says of which file it is, when that was written over, and (a mark made of its path) where it is;
-its time is that of the file then.
+The name of a copy contains the file's name, the time of overwriting, and a hash of the file's path; its
+modification time is that of the file then.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ COPIES_KEPT = 300
 BYTES_KEPT = 500_000_000
 OF_ONE_FILE = 30
 NEWEST = 10
-"""So many of the newest of a file stay; of the others those go first that lie close together."""
+"""Number of newest versions of a file that always stay; of the others close ones are removed first."""
 
 _STAMP = "%Y-%m-%d %H.%M.%S"
 _NAME = re.compile(
@@ -41,13 +41,13 @@ Stamp = tuple[int, int]
 
 @dataclass(frozen=True)
 class Earlier:
-    """A file as it was; ``copy`` holds those bytes."""
+    """File with a copy of its earlier content."""
 
     path: Path
     copy: Path
 
     def put_back(self) -> None:
-        """Write them into the file again. Raises DocumentError; then the file is untouched."""
+        """Restore the content. On DocumentError the file is unchanged."""
         try:
             write_atomically(self.path, read_whole(self.copy))
         except (OSError, ValueError) as error:
@@ -62,10 +62,10 @@ class Earlier:
 def keep_earlier(
     path: Path, folder: Path | None = None, clock: Callable[[], float] = time.time
 ) -> Earlier | None:
-    """Keep what the file says now; None when there is no file, or nothing in it.
+    """Copy the current content of a file; None when it is missing or empty.
 
-    The copies are in ``folder`` (default: ``earlier`` in Studio's folder for data), the newest 300 of them,
-    at most 30 of one file. What is kept already is not kept twice. DocumentError when it can't be kept.
+    The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in all and 30 of
+    one file. Content that is kept already isn't copied again. Raises DocumentError when it can't be copied.
     """
     where = _folder(folder)
     if not path.is_file() or not path.stat().st_size:
@@ -82,7 +82,7 @@ def keep_earlier(
         reason = error.strerror or error
         words = _("{file} was not saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
-    with contextlib.suppress(OSError):  # another Studio was quicker
+    with contextlib.suppress(OSError):  # another instance was faster
         _thin_out(where, _mark(path))
         _drop_oldest(where)
     return Earlier(path, copy)
@@ -90,7 +90,7 @@ def keep_earlier(
 
 @dataclass(frozen=True)
 class Version:
-    """One copy: of which file (its name), when that was written, and when it was written over."""
+    """Version of a file: its name, time of writing, and time of overwriting."""
 
     copy: Path
     name: str
@@ -100,19 +100,19 @@ class Version:
 
 
 def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
-    """The versions of a file that are kept, the newest first."""
+    """Return the versions of a file, newest first."""
     mark = _mark(path)
     return [each for each in _newest_first(_folder(folder)) if each.mark == mark]
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
-    """Versions of other files of that name, the newest first: of a file that was moved here, for example."""
+    """Return versions of other files with the same name, newest first, such as of a moved file."""
     mark, stem = _mark(path), _plain(path.stem)
     return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
 
 
 def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
-    """The versions of a file stay its versions when it has another name; those that can't be moved stay."""
+    """Reassign the versions of a renamed file; those that can't be renamed stay."""
     for each in reversed(versions_of(old, folder)):
         copy = free_path(_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_mark(new)}")
         with contextlib.suppress(OSError):
@@ -120,7 +120,7 @@ def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
 
 
 def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
-    """A behaviour's file in ``folder`` that is not there yet: its name, when, and a mark."""
+    """Return an unused path in ``folder`` from a name, a time and a mark."""
     stamp = time.strftime(_STAMP, time.localtime(now_s))
     stem = f"{_plain(name)} {stamp}{mark}"
     path = folder / f"{stem}{SUFFIX}"
@@ -132,7 +132,7 @@ def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
 
 
 def stamp_of(path: Path) -> Stamp | None:
-    """What changes when somebody writes the file; None when there is none."""
+    """Return a value that changes when the file is written; None when it is missing."""
     try:
         found = path.stat()
     except OSError:
@@ -145,9 +145,9 @@ def _folder(chosen: Path | None) -> Path:
 
 
 def bring_here(old: Path | None = None, new: Path | None = None) -> None:
-    """Move the versions that a former Studio kept in the folder for configuration where they belong.
+    """Move versions that an earlier Studio kept in the configuration folder to the data folder.
 
-    What can't be moved stays, and is tried again at the next start. Only their owner may read them.
+    Those that can't be moved are retried at the next start. Only their owner can read them.
     """
     old = old if old is not None else home() / NAME
     new = new if new is not None else data_home() / NAME
@@ -166,7 +166,7 @@ def _plain(name: str) -> str:
 
 
 def _mark(path: Path) -> str:
-    """Differs for files in different places."""
+    # Differs between files in different folders.
     where = os.path.normcase(path.resolve())
     return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
 
@@ -190,7 +190,7 @@ def _version(copy: Path) -> Version | None:
 
 
 def _thin_out(folder: Path, mark: str) -> None:
-    """Of a file that has too many copies, the one goes that leaves the smallest gap."""
+    # Removes the version that leaves the smallest gap.
     found = [each for each in _newest_first(folder) if each.mark == mark]
     while len(found) > OF_ONE_FILE:
         gaps = {

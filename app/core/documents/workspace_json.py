@@ -1,6 +1,6 @@
-"""A workspace between the page of the block editor, a document and its journal: the text as it came.
+"""Workspace JSON between the editor's page, a document and its journal: text, parsed on demand.
 
-Whoever needs the blocks themselves (the compiler, a file) gets them parsed, once and in its own thread.
+Code that needs the blocks (compiler, file) gets them parsed, once and in its own thread.
 """
 
 from __future__ import annotations
@@ -10,42 +10,40 @@ from collections.abc import Mapping
 from app.core.storage import deep_json
 
 LONG_CHARACTERS = 20_000
-"""To parse or compile a text of this length takes longer than the window should wait for."""
+"""Text length above which parsing or compiling takes too long for the window's thread."""
 EMPTY: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
 
 
 class WorkspaceJson:
-    """The JSON of one workspace, as text, as blocks, or both: each is made of the other when it is asked for.
+    """JSON of one workspace as text, blocks, or both; each is created from the other on demand.
 
-    It never changes, and works in any thread.
+    Immutable and thread-safe.
     """
 
     __slots__ = ("_blocks", "_text", "_was_told")
 
     def __init__(self, text: str | None, blocks: Mapping[str, object] | None = None) -> None:
-        """``text`` as the page wrote it. ValueError or RecursionError when it can't ever be parsed.
-
-        Text is parsed at once only where it could be nested too deep, which a few brackets can't.
-        """
+        # Raises ValueError or RecursionError if `text` can't be parsed. It is parsed immediately only where
+        # it could be nested too deep, which needs many brackets.
         self._text, self._blocks, self._was_told = text, blocks, text is not None
         if text is not None and blocks is None and text.count("{") + text.count("[") > deep_json.SHALLOW:
             _ = self.blocks
 
     @classmethod
     def of(cls, blocks: Mapping[str, object]) -> WorkspaceJson:
-        """Of blocks that are parsed already, and that nobody changes any more."""
+        """Return the JSON of parsed blocks, which must not be changed any more."""
         return cls(None, blocks)
 
     @property
     def text(self) -> str:
-        """Its JSON text. RecursionError beyond 9000 levels."""
+        """JSON text. Raises RecursionError beyond 9000 levels."""
         if self._text is None:
             self._text = deep_json.dumps(self._blocks)
         return self._text
 
     @property
     def blocks(self) -> Mapping[str, object]:
-        """Blockly's JSON; empty when the text holds no object."""
+        """Blocks in Blockly's JSON; empty when the text is not an object."""
         if self._blocks is None:
             made = deep_json.loads(self._text or "{}")
             self._blocks = made if isinstance(made, dict) else {}
@@ -53,14 +51,14 @@ class WorkspaceJson:
 
     @property
     def has_blocks(self) -> bool:
-        """Whether there is any block; a long text has some."""
+        """True if there is any block; assumed for a long text."""
         if self._blocks is None and self.is_longer_than(LONG_CHARACTERS):
             return True
         inner = self.blocks.get("blocks")
         return isinstance(inner, Mapping) and bool(inner.get("blocks"))
 
     def same_as(self, other: WorkspaceJson) -> bool:
-        """Whether both say the same; two texts of the page are compared as they are, too deep ones differ."""
+        """Return whether both are equal; two texts of the page are compared as text, too deep ones differ."""
         if self._was_told and other._was_told:
             return self._text == other._text
         try:
@@ -69,7 +67,7 @@ class WorkspaceJson:
             return False
 
     def is_longer_than(self, characters: int) -> bool:
-        """Whether its text is longer than this, or too deep to be one."""
+        """Return whether the text is longer than this, or too deep."""
         try:
             return len(self.text) > characters
         except RecursionError:
