@@ -1,4 +1,4 @@
-"""What is in messages: pictures and large JSON, decoded beside the window, only as far as somebody looks.
+"""Content of messages: images and large JSON, decoded in the background as far as they are shown.
 
-The codecs are in `nep.messages`; here is what a window needs that must not wait for them.
+The codecs are in `nep.messages`.
 """

@@ -1,6 +1,6 @@
-"""What JSON messages draw on pictures: `foxglove.ImageAnnotations`, and the face of RIZE's `face_positions`.
+"""Annotations of images in JSON messages: `foxglove.ImageAnnotations`, and RIZE's `face_positions`.
 
-Places are shares of the picture's width and height, so that they fit however large it is shown.
+Positions are fractions of the image's width and height, independent of its size on the screen.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ MOST_SHAPES = 2000
 MOST_POINTS = 20_000
 LONGEST_TEXT = 200
 MOST_PIXELS = 1e6
-"""Further away, wider or larger nothing is drawn: no screen and no painter has room for it."""
+"""Limit of coordinates and sizes: larger ones are not drawn, as no painter supports them."""
 FACE_FRAME = (640, 480)
-"""RIZE's face detection makes every picture so large before it looks for faces."""
+"""Image size that RIZE's face detection uses."""
 POINTS, LINE_LOOP, LINE_STRIP, LINE_LIST = 1, 2, 3, 4
 
 Colour = tuple[float, float, float, float]
-"""Red, green, blue and how much it covers, each 0 to 1."""
+"""Red, green, blue and opacity, each 0 to 1."""
 Point = tuple[float, float]
 YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """One thing that is drawn: its points as shares of the picture.
+    """One drawn shape; its points are fractions of the image.
 
-    ``kind`` is "points", "line", "area" (closed), "circle" (centre; ``size`` is its radius as shares of width
-    and height), or "text" (its lower left corner; ``size`` is the letters' height as a share). ``thickness``
-    is in the picture's pixels. Without an ``outline`` or a ``fill`` there is none.
+    ``kind`` is "points", "line", "area" (closed), "circle" (centre; ``size`` is its radius as fractions of
+    width and height), or "text" (lower left corner; ``size`` is the letter height as a fraction).
+    ``thickness`` is in pixels of the image. Without ``outline`` or ``fill`` there is none.
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Drawn:
 
 
 def is_annotation(payload: object) -> bool:
-    """Whether a decoded message may draw something."""
+    """Return whether a decoded message may have annotations."""
     if not isinstance(payload, Mapping):
         return False
     lists = (payload.get(name) for name in ("circles", "points", "texts"))
@@ -54,7 +54,7 @@ def is_annotation(payload: object) -> bool:
 
 
 def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
-    """What a decoded message draws on a picture of so many pixels; whatever can't be drawn is left out."""
+    """Return the shapes of a decoded message for an image of this size; invalid ones are skipped."""
     if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
         return ()
     frame = _Frame(width, height)
@@ -62,7 +62,7 @@ def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
 
 
 class _Frame:
-    """Turns pixels into shares, and counts the points that are left."""
+    """Converts pixels to fractions, and counts the remaining points."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height
@@ -129,7 +129,7 @@ def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
 
 
 def _face_of(payload: Mapping[str, object]) -> tuple[Drawn, ...] | None:
-    """The face of `face_positions`: what it calls its centre is the upper left corner."""
+    # The field `center` of `face_positions` is in fact the upper left corner.
     face = payload.get("face")
     if not isinstance(face, Mapping):
         return None
@@ -152,7 +152,7 @@ def _thickness(item: Mapping[str, object]) -> float:
 
 
 def _colour(value: object) -> Colour | None:
-    """A colour that can be seen."""
+    # None for invisible colours.
     if not isinstance(value, Mapping):
         return None
     red, green, blue, covers = (_number(value.get(name)) for name in "rgba")
@@ -174,7 +174,7 @@ def _is_list(value: object) -> bool:
 
 
 def _number(value: object) -> float | None:
-    """A number that a painter can be given."""
+    # None for numbers that a painter doesn't support.
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
-    return float(value) if abs(value) <= MOST_PIXELS else None  # NaN is not, either
+    return float(value) if abs(value) <= MOST_PIXELS else None  # also excludes NaN

@@ -1,4 +1,4 @@
-"""The messages of one topic that came lately, bounded in number and bytes; what left is counted."""
+"""Recent messages of one topic, limited in number and bytes; evicted ones are counted."""
 
 from __future__ import annotations
 
@@ -14,48 +14,46 @@ MOST_MESSAGES = 2000
 
 
 class MessageHistory:
-    """Messages by their numbers from 0, the oldest first; a number stays a message's as long as it is kept.
+    """Messages numbered from 0, oldest first; a message keeps its number.
 
-    The newest one is kept however large it is. What is kept is not decoded, and its bytes are its own: none
-    that a publisher wants back.
+    The newest one is kept whatever its size. Messages are kept encoded, with copied bytes that no publisher
+    reuses.
     """
 
     def __init__(self, most_bytes: int = MOST_BYTES, most_messages: int = MOST_MESSAGES) -> None:
-        """Keep so much at most."""
         self._most_bytes, self._most_messages = most_bytes, max(1, most_messages)
         self._kept: deque[Message] = deque()
         self.size_bytes = 0
         self.first = 0
-        """The number of the oldest one that is kept: so many have left."""
+        """Number of the oldest message, which is the number of evicted ones."""
         self.missed = 0
-        """Messages that came too fast to be kept, or to be seen at all."""
+        """Messages that arrived too fast to be kept or seen."""
 
     def __len__(self) -> int:
-        """How many are kept."""
         return len(self._kept)
 
     def __iter__(self) -> Iterator[Message]:
-        """Those that are kept, the oldest first; not to be decoded."""
+        # Oldest first; not to be decoded.
         return iter(self._kept)
 
     @property
     def end(self) -> int:
-        """The number that the next message will have."""
+        """Number of the next message."""
         return self.first + len(self._kept)
 
     def at(self, number: int) -> Message | None:
-        """A message to look at, made anew with each question; None when it is not kept (any more)."""
+        """Return a copy of a message for display; None when it is not kept."""
         if not self.first <= number < self.end:
             return None
         return copy(self._kept[number - self.first])
 
     def nearest(self, number: int) -> int:
-        """The number of a message that is kept, this one if it is. Undefined while nothing is."""
+        """Return the number of the nearest kept message. Undefined while there is none."""
         return min(max(number, self.first), self.end - 1)
 
     def add(self, message: Message) -> None:
-        """Keep it as the newest; older ones may leave."""
-        message.latency_s  # noqa: B018  asked now, it stays what it was when the message came
+        """Append a message; evict the oldest ones beyond the limits."""
+        message.latency_s  # noqa: B018  caches the latency at arrival
         kept = copy(message)
         kept.decoded = UNDECODED
         if not isinstance(kept.raw, bytes):
@@ -69,12 +67,12 @@ class MessageHistory:
             self.first += 1
 
     def take(self, batch: Batch, _now_ns: int) -> None:
-        """Keep what arrived since the last tick; see `SeriesTaker`."""
+        """Append the messages of a tick (see `SeriesTaker`)."""
         self.missed += batch.dropped
         for message in batch.messages:
             self.add(message)
 
     def rewind(self) -> None:
-        """What comes next is of another time: nothing that was there counts any more."""
+        """Clear: the source moved to another time."""
         self._kept.clear()
         self.size_bytes = self.first = self.missed = 0

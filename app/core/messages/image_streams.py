@@ -1,7 +1,7 @@
-"""Picture streams: one thread decodes the newest picture of each topic that somebody looks at.
+"""Image streams: one thread decodes the newest image of each visible topic.
 
-Older pictures that wait are never decoded: at overload a picture is shown late by one decoding, not by a
-queue. A picture is decoded no larger than it is shown (`ImageStream.want`).
+Older pending images are never decoded: at overload an image is late by one decoding, not by a queue. An image
+is decoded no larger than it is shown (`ImageStream.want`).
 """
 
 from __future__ import annotations
@@ -23,22 +23,21 @@ RATE_DELAY_S = 0.25
 
 
 class Rate:
-    """Pictures a second by the time of their arrival, over two seconds; None until two were seen.
+    """Image rate by arrival time, over two seconds; None until two arrived.
 
-    The window ends a little before now: pictures that arrived and may still be painted are not judged yet, so
-    that "shown 30 of 30/s" compares the same pictures.
+    The window ends slightly before now: images that arrived but may still be painted are not counted yet, so
+    that "shown 30 of 30/s" compares the same images.
     """
 
     def __init__(self) -> None:
-        """Have seen nothing."""
         self._times: deque[float] = deque(maxlen=4096)
 
     def add(self, arrived_s: float) -> None:
-        """A picture that arrived at this time (monotonic seconds)."""
+        """Count an image that arrived at this time (monotonic seconds)."""
         self._times.append(arrived_s)
 
     def per_second(self, now: float) -> float | None:
-        """How many a second; None when fewer than two are in the window."""
+        """Return the rate in images per second; None with fewer than two images in the window."""
         end = now - RATE_DELAY_S
         while self._times and self._times[0] <= end - RATE_WINDOW_S:
             self._times.popleft()
@@ -50,10 +49,10 @@ class Rate:
 
 @dataclass(eq=False)
 class ImageStream:
-    """The pictures of one topic, for one panel. Figures that are not known are None.
+    """Images of one topic, for one panel. Unknown values are None.
 
-    While it is `held` the picture stays; what arrives is counted and not decoded. `awaits_picture` until one
-    came since somebody looks, or looks again after a `rest`.
+    While `held` the image stays; arriving ones are counted but not decoded. `awaits_picture` until one
+    arrives after opening or after a `rest`.
     """
 
     topic: str
@@ -64,38 +63,38 @@ class ImageStream:
     held: bool = False
     awaits_picture: bool = True
     wish: Size | None = None
-    """What `Images` keeps here and reads under its lock: the size that is wanted, ..."""
+    """Requested size. Used by `Images` under its lock, as are the next three."""
     look: PictureLook = PLAIN
-    """... how its pictures are shown, ..."""
+    """Requested style."""
     waiting: tuple[Message, float] | None = None
-    """... the newest message that is not decoded yet, and when it arrived, ..."""
+    """Newest message that is not decoded yet, and its arrival time."""
     arriving: Rate = field(default_factory=Rate)
-    """... and how many come."""
+    """Rate of arriving images."""
     _shown: Rate = field(default_factory=Rate)
     looked_s: float = 0.0
-    """Since when a picture could have come: its silence is counted from there (for `Images`)."""
+    """Time since which an image could have arrived; its silence counts from then. Used by `Images`."""
     _resting: bool = False
     closed: bool = False
 
     @property
     def resting(self) -> bool:
-        """Whether nobody can see it now."""
+        """True if the stream is suspended because it can't be seen."""
         return self._resting
 
     @property
     def arriving_hz(self) -> float | None:
-        """Pictures a second that arrive here."""
+        """Rate of arriving images per second."""
         with self._images.lock:
             return self.arriving.per_second(self._images.clock())
 
     @property
     def shown_hz(self) -> float | None:
-        """Pictures a second that were painted."""
+        """Rate of painted images per second."""
         return self._shown.per_second(self._images.clock())
 
     @property
     def silent_s(self) -> float | None:
-        """Seconds in which somebody looked and no picture came; None before the first."""
+        """Seconds without an image while visible; None before the first."""
         picture = self.picture
         if picture is None:
             return None
@@ -103,44 +102,44 @@ class ImageStream:
 
     @property
     def age_s(self) -> float | None:
-        """How old the picture is: seconds since it arrived; None before the first."""
+        """Seconds since the image arrived; None before the first."""
         return self._images.clock() - self.picture.received_s if self.picture is not None else None
 
     @property
     def stamped_s(self) -> float | None:
-        """How long ago its publisher says that the picture was taken; None where it does not say."""
+        """Seconds since the image's own time stamp; None without one."""
         stamp_ns = self.picture.stamp_ns if self.picture is not None else None
         return None if stamp_ns is None else (self._images.now_ns() - stamp_ns) / 1e9
 
     def want(self, size: Size | None) -> None:
-        """The picture is shown so large (pixels of the screen); None: every pixel is wanted.
+        """Set the displayed size in screen pixels; None for full resolution.
 
-        The picture that is there is decoded again when it was decoded smaller.
+        The current image is decoded again if it was decoded smaller.
         """
         self._images.want(self, size)
 
     def show_as(self, look: PictureLook) -> None:
-        """Show its pictures so from now on; the one that is there is decoded again, also a held one."""
+        """Set the style; the current image is decoded again, also while held."""
         self._images.show_as(self, look)
 
     def hold(self, held: bool) -> None:
-        """Keep the picture as it is, or let the newest one come again."""
+        """Hold the current image, or show the newest again."""
         self._images.hold(self, held)
 
     def shown(self) -> None:
-        """The panel painted `picture` (said once for each)."""
+        """Count that the panel painted `picture`; called once for each."""
         if self.picture is not None:
             self._shown.add(self.picture.received_s)
 
     def rest(self) -> None:
-        """Nobody can see it: nothing is received or decoded until `wake`; the picture stays."""
+        """Suspend: nothing is received or decoded until `wake`; the image stays."""
         if not self._resting:
             self._resting = self.awaits_picture = True
             self._images.forget(self)
             self._watch.rest()
 
     def wake(self) -> None:
-        """Somebody looks again after a `rest`."""
+        """Resume after a `rest`."""
         if self._resting and not self.closed:
             self._resting = False
             self.looked_s = self._images.clock()
@@ -148,7 +147,7 @@ class ImageStream:
             self._images.add(self)
 
     def close(self) -> None:
-        """Nobody looks any more; said twice it does nothing."""
+        """Close the stream. Idempotent."""
         self._resting = self.closed = True
         self._images.forget(self)
         self._watch.close()
@@ -158,11 +157,10 @@ class Images:
     """All open streams and the thread that decodes for them."""
 
     def __init__(self, watch: Callable[[str], Watching], clock: Callable[[], float] = time.monotonic) -> None:
-        """``watch(topic)`` subscribes until it is closed; ``clock`` gives monotonic seconds."""
         self._watch = watch
         self.clock = clock
         self.now_ns: Callable[[], int] = time.time_ns
-        """What time it is for who looks (epoch nanoseconds): of a recording the playhead's."""
+        """Current time (epoch nanoseconds); in a recording that of the playhead."""
         self.lock = threading.Lock()
         self._arrived = threading.Condition(self.lock)
         self._streams: dict[str, list[ImageStream]] = {}
@@ -171,22 +169,22 @@ class Images:
         self._thread: threading.Thread | None = None
 
     def stream(self, topic: str) -> ImageStream:
-        """Look at a topic's pictures until the stream is closed."""
+        """Open a stream of a topic's images."""
         stream = ImageStream(topic, self, self._watch(topic))
         self.add(stream)
         return stream
 
     def add(self, stream: ImageStream) -> None:
-        """A stream wants pictures, for the first time or again."""
+        """Register an opened or resumed stream."""
         with self.lock:
             self._streams.setdefault(stream.topic, []).append(stream)
             stream.arriving = Rate()
-            self._arrived.notify()  # one that is held may be wanted larger
+            self._arrived.notify()  # a held one may be requested larger
             if self._thread is None and not self._closing:
                 self._thread = self._begin_decoding()
 
     def stand_still(self) -> None:
-        """Nothing can come now, as of a recording that is paused: no stream is silent because of that."""
+        """Reset the silence of all streams: nothing can arrive, such as from a paused recording."""
         now = self.clock()
         with self.lock:
             for streams in self._streams.values():
@@ -194,9 +192,9 @@ class Images:
                     stream.looked_s = now
 
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
-        """A sink: keep the newest message of each topic that somebody looks at. Called in nep's thread.
+        """Store the newest message of each visible topic. Called in nep's thread.
 
-        ``key`` is the topic's name among those of all networks, where that is not its own.
+        ``key`` is the topic's key among those of all networks, if it isn't its name.
         """
         if not self._streams:
             return
@@ -210,7 +208,7 @@ class Images:
             self._arrived.notify()
 
     def rewind(self, topics: Collection[str] = ()) -> None:
-        """The source is at another time, and shows others of these topics; of the rest there are none."""
+        """Discard all images except of these topics: the source moved to another time."""
         with self.lock:
             self._times += 1
             for topic, streams in self._streams.items():
@@ -224,7 +222,7 @@ class Images:
                         stream.awaits_picture = True
 
     def forget(self, stream: ImageStream) -> None:
-        """A stream was closed, or rests."""
+        """Unregister a closed or suspended stream."""
         with self.lock:
             if not stream.held:
                 stream.waiting = None
@@ -235,7 +233,7 @@ class Images:
                 self._streams.pop(stream.topic, None)
 
     def want(self, stream: ImageStream, size: Size | None) -> None:
-        """See `ImageStream.want`."""
+        """Set a stream's displayed size; see `ImageStream.want`."""
         with self.lock:
             if stream.wish == size:
                 return
@@ -248,7 +246,7 @@ class Images:
                 self._arrived.notify()
 
     def show_as(self, stream: ImageStream, look: PictureLook) -> None:
-        """See `ImageStream.show_as`."""
+        """Set a stream's style; see `ImageStream.show_as`."""
         with self.lock:
             if stream.look == look:
                 return
@@ -259,14 +257,14 @@ class Images:
                 self._arrived.notify()
 
     def hold(self, stream: ImageStream, held: bool) -> None:
-        """See `ImageStream.hold`."""
+        """Hold or release a stream; see `ImageStream.hold`."""
         with self.lock:
             stream.held = held
             if held:
                 stream.waiting = None
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         with self.lock:
             self._closing = True
             self._arrived.notify()
@@ -274,7 +272,7 @@ class Images:
             self._thread.join(timeout=2)
 
     def _begin_decoding(self) -> threading.Thread | None:
-        """The thread that decodes; None: whoever offers pictures says `decode_waiting`."""
+        # Overridden in tests to return None: they call `decode_waiting`.
         thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
         thread.start()
         return thread
@@ -289,7 +287,7 @@ class Images:
             self.decode_waiting()
 
     def decode_waiting(self) -> None:
-        """Decode the newest picture of each stream that waits for one; its own thread does it."""
+        """Decode the newest pending image of each stream. Called by its own thread."""
         with self.lock:
             work, times = self._take_waiting(), self._times
         for streams, message, arrived_s, size, look in work:
@@ -297,7 +295,7 @@ class Images:
                 picture, error = once_more(streams[0].picture, message, arrived_s, size, look), None
                 if picture is None:
                     picture, error = decode(message, arrived_s, size, look)
-            except Exception as problem:  # noqa: BLE001  one message must not end the pictures of all
+            except Exception as problem:  # noqa: BLE001  one message must not end the decoding thread
                 picture, error = (
                     None,
                     _("“{topic}” sends a picture that can't be shown: {problem}").format(
@@ -319,7 +317,7 @@ class Images:
             if not waiting:
                 continue
             of_message: dict[tuple[int, PictureLook], list[ImageStream]] = {}
-            for stream in waiting:  # one held back decodes its own picture again
+            for stream in waiting:  # a held stream decodes its own image again
                 asked = (id(stream.waiting[0]), stream.look)  # type: ignore[index]
                 of_message.setdefault(asked, []).append(stream)
             for together in of_message.values():
@@ -333,9 +331,9 @@ class Images:
 def _give(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
     before = stream.picture
     if stream.resting:
-        return  # nobody can see it; the next one after `wake` is shown
+        return  # it can't be seen; the next one after `wake` is shown
     if stream.held and before is not None and before.message is not message:
-        return  # decoded while a person froze the picture before
+        return  # decoded while the user held the previous image
     stream.error = error
     if picture is not None:
         if picture.look != stream.look and stream.waiting is None:  # changed while it was decoded
@@ -345,7 +343,7 @@ def _give(stream: ImageStream, message: Message, picture: Picture | None, error:
 
 
 def _largest(streams: Sequence[ImageStream]) -> Size | None:
-    """How large a picture has to be for all of them; None: every pixel."""
+    # None means full resolution.
     wishes = [stream.wish for stream in streams]
     known = [wish for wish in wishes if wish is not None]
     if len(known) < len(wishes):

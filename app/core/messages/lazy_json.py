@@ -1,8 +1,8 @@
-"""JSON that is looked into without decoding all of it: only what somebody opens is decoded.
+"""Large JSON decoded on demand: only the parts that are opened.
 
-A text of 10 MB is scanned once for its brackets, commas and colons (with numpy, which lets other threads run
-meanwhile); objects and lists are then `LazyObject` and `LazyList`, whose values are decoded when asked for.
-Decoding all at once would hold every thread of the program for a tenth of a second.
+A text of 10 MB is scanned once for its brackets, commas and colons (with numpy, which releases the GIL);
+objects and arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding
+everything at once would block all threads of the program for a tenth of a second.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SPACE = b" \t\r\n"
 
 
 class Unreadable:
-    """A value whose text is no JSON."""
+    """Value whose text is not valid JSON."""
 
     def __init__(self, text: bytes) -> None:
         self.text = text
@@ -48,11 +48,11 @@ class Unreadable:
 
 
 class JsonIndex:
-    """Where everything is in one JSON text. Raises ValueError when its brackets do not match."""
+    """Index of one JSON text. Raises ValueError when its brackets do not match."""
 
     def __init__(self, data: memoryview) -> None:
-        """Scan it; safe in any thread."""
-        import numpy as np  # noqa: PLC0415  heavy, and only large messages need it
+        # Scans the text; safe in any thread.
+        import numpy as np  # noqa: PLC0415  slow import, needed only by large messages
 
         self.data = data
         self._places, kinds = _structure(data)
@@ -65,7 +65,7 @@ class JsonIndex:
             raise ValueError(_("it is nested deeper than {most} levels").format(most=DEEPEST))
         order = np.argsort(level.astype(np.int16), kind="stable")
         bounds = np.searchsorted(np.take(level, order), np.arange(1, int(level.max()) + 2))
-        self._levels = [  # `take` lets other threads run, an index in brackets does not
+        self._levels = [  # `take` releases the GIL, unlike indexing with brackets
             (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
         ]
         self._kept: dict[int, _Lazy] = {}
@@ -74,11 +74,11 @@ class JsonIndex:
 
     @cached_property
     def root(self) -> object:
-        """The whole text as a value."""
+        """Value of the whole text."""
         return self.value(0, len(self.data), 0)
 
     def value(self, start: int, end: int, level: int) -> object:
-        """What stands between two places: decoded, or lazy when it is an object or a list."""
+        """Return the value between two positions: decoded, or lazy for an object or array."""
         while start < end and self.data[start] in SPACE:
             start += 1
         first = self.data[start] if start < end else 0
@@ -92,7 +92,7 @@ class JsonIndex:
         return found
 
     def _container(self, start: int, level: int, first: int) -> _Lazy:
-        """The container that opens here, the same one each time as long as there are few."""
+        # Cached, so that it is the same object each time, up to `KEPT` containers.
         found = self._kept.get(start)
         if found is None:
             found = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
@@ -101,7 +101,7 @@ class JsonIndex:
         return found
 
     def inside(self, start: int, level: int) -> tuple[int, Places, Places]:
-        """Of the container that opens at ``start``: where it closes, its commas and its colons."""
+        """Return the end, commas and colons of the container that starts at ``start``."""
         import numpy as np  # noqa: PLC0415
 
         if start in self._many:
@@ -112,12 +112,12 @@ class JsonIndex:
         first, last = np.searchsorted(places, start) + 1, np.searchsorted(places, end)
         own, kind = places[first:last], kinds[first:last]
         found = end, own[kind == COMMA], own[kind == COLON]
-        if len(own) > MANY:  # asked for again and again, and not at once to be had
+        if len(own) > MANY:  # requested repeatedly, and slow to find
             self._many[start] = found
         return found
 
     def path_to(self, place: int) -> tuple[str | int, ...]:
-        """The keys that lead to what stands at this place of the text."""
+        """Return the keys that lead to the value at a position of the text."""
         path: list[str | int] = []
         here = self.root
         while isinstance(here, _Lazy):
@@ -130,7 +130,7 @@ class JsonIndex:
 
 
 class _Lazy:
-    """What objects and lists share: where their parts begin and end."""
+    """Common part of objects and arrays: the bounds of their elements."""
 
     def __init__(self, index: JsonIndex, start: int, level: int) -> None:
         self._index, self._start, self._level = index, start, level
@@ -152,29 +152,26 @@ class _Lazy:
         return start, int(commas[row]) if row < len(commas) else end
 
     def row_at(self, place: int) -> int | None:
-        """Which child stands at this place of the text; None when none does."""
+        # Index of the child at a position of the text.
         end, commas, _colons = self._parts
         if not self._start < place < end or not self._count:
             return None
         return int(commas.searchsorted(place))
 
     def key_at(self, row: int) -> str | int:
-        """The key of a child."""
         return row
 
     def value_at(self, row: int) -> object:
-        """A child."""
         start, end = self._bounds(row)
         return self._index.value(start, end, self._level + 1)
 
     @property
     def raw(self) -> memoryview:
-        """Its JSON text as it lies in the message."""
+        # JSON text as a view of the message.
         return self._index.data[self._start : self._parts[0] + 1]
 
     @property
     def text(self) -> bytes:
-        """Its JSON text."""
         return bytes(self.raw)
 
     def __eq__(self, other: object) -> bool:
@@ -189,7 +186,7 @@ class _Lazy:
 
 
 class LazyList(_Lazy, Sequence[object]):
-    """A list whose values are decoded when they are asked for."""
+    """Array whose elements are decoded at each access."""
 
     def __len__(self) -> int:
         return self._count
@@ -210,7 +207,7 @@ class LazyList(_Lazy, Sequence[object]):
 
 
 class LazyObject(_Lazy, Mapping[str, object]):
-    """An object whose values are decoded when they are asked for; of equal keys the last one counts."""
+    """Object whose values are decoded at each access; of duplicate keys the last one counts."""
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -222,7 +219,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return self.value_at(self._rows[key])
 
     def key_at(self, row: int) -> str:
-        """See `_Lazy`."""
+        """Return the key of a child."""
         start, _end = self._bounds(row)
         text = bytes(self._index.data[start : self._colon(row)])
         try:
@@ -231,7 +228,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
             return text.decode("utf-8", "replace").strip()
 
     def value_at(self, row: int) -> object:
-        """See `_Lazy`."""
+        """Return a child."""
         _start, end = self._bounds(row)
         colon = self._colon(row)
         if colon == end:
@@ -239,7 +236,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return self._index.value(colon + 1, end, self._level + 1)
 
     def _colon(self, row: int) -> int:
-        """Where a child's colon is; its end when it has none."""
+        # Position of a child's colon; its end if there is none.
         start, end = self._bounds(row)
         colons = self._parts[2]
         at = int(colons.searchsorted(start))
@@ -257,7 +254,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
 
 
 def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
-    """The places of all brackets, commas and colons outside of texts, and which they are."""
+    # Positions and kinds of all brackets, commas and colons outside of strings.
     import numpy as np  # noqa: PLC0415
 
     wanted = np.zeros(256, bool)
@@ -282,7 +279,7 @@ def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
 
 
 def _escaped(slashes: Places, length: int, first: bool) -> tuple[list[int] | Places, bool]:
-    """The places after a backslash that counts, and whether the next part begins with such a place."""
+    # Positions after an effective backslash, and whether the next chunk starts with such a position.
     import numpy as np  # noqa: PLC0415
 
     if first and len(slashes) and slashes[0] == 0:

@@ -1,4 +1,4 @@
-"""NewestOnly: one thread that works on what was asked last; what waited before it is forgotten."""
+"""Thread that processes only the newest job."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ Done = TypeVar("Done")
 
 
 class NewestOnly(Generic[Asked, Done]):
-    """The thread is started by the first job and waits for more; `take` gives what was done last, once."""
+    """Thread that is started by the first job; a pending job is replaced by a newer one. Thread-safe."""
 
     def __init__(self, work: Callable[[Asked], Done], name: str) -> None:
-        """``work`` is called in the thread, which is called ``name``; it must not raise."""
+        # `work` is called in the thread and must not raise.
         self._work, self._name = work, name
         self._wake = threading.Condition()
-        self._waiting: list[Asked] = []  # one at most
+        self._waiting: list[Asked] = []  # at most one
         self._working: list[Asked] = []
         self._done: list[Done] = []
         self._closing = False
@@ -25,12 +25,12 @@ class NewestOnly(Generic[Asked, Done]):
 
     @property
     def busy(self) -> bool:
-        """Whether something is being worked on, or waits for it."""
+        """True if a job is running or pending."""
         with self._wake:
             return bool(self._waiting or self._working)
 
     def ask(self, job: Asked) -> None:
-        """Do this one next; one that still waits is forgotten."""
+        """Set the next job, replacing a pending one."""
         with self._wake:
             self._waiting = [job]
             if self._thread is None and not self._closing:
@@ -39,18 +39,18 @@ class NewestOnly(Generic[Asked, Done]):
             self._wake.notify()
 
     def take(self) -> Done | None:
-        """What was done last, once."""
+        """Return the last result once."""
         with self._wake:
             done, self._done = self._done, []
         return done[0] if done else None
 
     def forget(self) -> None:
-        """Nobody wants what waits, is being worked on, or was done."""
+        """Discard pending, running and finished jobs."""
         with self._wake:
             self._waiting, self._working, self._done = [], [], []
 
     def close(self) -> None:
-        """End the thread; what is being worked on is waited for a second at most."""
+        """Stop the thread; waits for a running job, at most one second."""
         with self._wake:
             self._closing = True
             self._waiting, self._working, self._done = [], [], []
@@ -69,5 +69,5 @@ class NewestOnly(Generic[Asked, Done]):
                 self._waiting = []
             done = self._work(mine[0])
             with self._wake:
-                if self._working is mine:  # else nobody wants it any more
+                if self._working is mine:  # otherwise it was discarded
                     self._done, self._working = [done], []

@@ -1,6 +1,6 @@
-"""Lists of objects as tables: which lists of a message are such, their columns, how they sort, and CSV.
+"""Arrays of objects as tables: finding them in a message, their columns, sorting, and CSV.
 
-Nothing is looked at that is not asked for: a row of a large message is decoded when somebody sees it.
+Lazy: a row of a large message is decoded when it is shown.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ Steps: TypeAlias = tuple[str | int, ...]
 MOST_ROWS = 2000
 MOST_COLUMNS = 40
 LOOKED_AT = 50
-"""Rows from which the columns are taken: they come with the first rows or not at all."""
+"""Number of rows from which the columns are taken."""
 MOST_LISTS = 20
 _SEARCHED = 2000
-"""Values of a message in which lists of objects are looked for."""
+"""Maximum number of values of a message that are searched for arrays of objects."""
 _FEW = 8
-"""An object of so many keys has a column for each of them in the table that it is in."""
+"""Maximum number of keys of an object that gets a column for each of its keys."""
 MISSING = object()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectRow:
-    """One object: where it stands among the others, its ``name`` there ("0", or a path), its value."""
+    """Row of a table: its index, its ``name`` (index as text, or a path), and its value."""
 
     place: int
     name: str
     value: Mapping[object, object]
 
     def at(self, column: Steps) -> object:
-        """What it has in a column; `MISSING` when it has nothing there."""
+        """Return the value in a column; `MISSING` if there is none."""
         here: object = self.value
         for step in column:
             if not isinstance(here, Mapping):
@@ -48,12 +48,12 @@ class ObjectRow:
 
 
 def is_list(value: object) -> bool:
-    """Whether it is a list; texts and bytes are none."""
+    """Return whether a value is an array; strings and bytes are not."""
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
 
 
 def is_list_of_objects(value: object) -> bool:
-    """Whether it is a list whose first values are objects with something in them."""
+    """Return whether a value is an array whose first elements are non-empty objects."""
     if not is_list(value) or not len(value):  # type: ignore[arg-type]
         return False
     first = list(islice(value, 5))  # type: ignore[call-overload]
@@ -61,7 +61,7 @@ def is_list_of_objects(value: object) -> bool:
 
 
 def lists_of_objects(value: object, most: int = MOST_LISTS) -> list[Steps]:
-    """The ways to the lists of objects in a message, upper ones first; ``()`` is the message itself."""
+    """Return the paths to arrays of objects in a message, upper levels first; ``()`` is the message."""
     found: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])
     for _each in range(_SEARCHED):
@@ -77,7 +77,7 @@ def lists_of_objects(value: object, most: int = MOST_LISTS) -> list[Steps]:
 
 
 def value_at(value: object, steps: Steps) -> object:
-    """What stands there in a message; `MISSING` when nothing does."""
+    """Return the value at a path of a message; `MISSING` if there is none."""
     for step in steps:
         if isinstance(step, int):
             if not is_list(value) or not 0 <= step < len(value):  # type: ignore[arg-type]
@@ -91,7 +91,7 @@ def value_at(value: object, steps: Steps) -> object:
 
 
 def rows_of(value: object, most: int = MOST_ROWS) -> list[ObjectRow]:
-    """The first objects of a list of objects; what is no object in it is left out."""
+    """Return the first objects of an array; other elements are skipped."""
     if not is_list(value):
         return []
     return [
@@ -102,7 +102,7 @@ def rows_of(value: object, most: int = MOST_ROWS) -> list[ObjectRow]:
 
 
 def rows_found(found: Iterable[tuple[str, object]], most: int = MOST_ROWS) -> list[ObjectRow]:
-    """The objects among what a query found, by their paths; of a list of objects alone its objects."""
+    """Return the objects in a query result, by path; of a single array of objects its elements."""
     pairs = list(found)
     if len(pairs) == 1 and is_list_of_objects(pairs[0][1]):
         return rows_of(pairs[0][1], most)
@@ -115,7 +115,7 @@ def rows_found(found: Iterable[tuple[str, object]], most: int = MOST_ROWS) -> li
 
 
 def columns_of(rows: Sequence[ObjectRow], most: int = MOST_COLUMNS) -> tuple[Steps, ...]:
-    """The keys of the first rows in the order in which they come; each key of a small object has its own."""
+    """Return the keys of the first rows in order; keys of small nested objects get their own columns."""
     columns: dict[Steps, None] = {}
     for row in rows[:LOOKED_AT]:
         for key, value in row.value.items():
@@ -130,14 +130,14 @@ def columns_of(rows: Sequence[ObjectRow], most: int = MOST_COLUMNS) -> tuple[Ste
 
 
 def column_name(column: Steps) -> str:
-    """The head of a column: ``at.x``."""
+    """Return the title of a column: ``at.x``."""
     return path_text(tuple(str(step) for step in column))
 
 
 def sort_key(value: object) -> tuple[int, float, str] | None:
-    """By what values of a column are sorted, of whatever kinds they are; None for what has no place.
+    """Return the sort key of a value of any type; None for values without an order.
 
-    Numbers and yes or no first, then texts, then objects and lists by their length. NaN has no place.
+    Numbers and booleans first, then strings, then objects and arrays by length. NaN has no order.
     """
     if value is MISSING or value is None or value != value:  # noqa: PLR0124
         return None
@@ -153,7 +153,7 @@ def sort_key(value: object) -> tuple[int, float, str] | None:
 
 
 def cell_text(value: object) -> str:
-    """A value in a cell of a CSV file: text as it is, what is missing blank, everything else as JSON."""
+    """Format a value for CSV: strings unchanged, missing values empty, everything else as JSON."""
     if value is MISSING or value is None:
         return ""
     if isinstance(value, str):
@@ -166,7 +166,7 @@ def cell_text(value: object) -> str:
 
 
 def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
-    """The table as CSV; ``first`` is the head of the rows' names."""
+    """Return the table as CSV; ``first`` is the title of the rows' names."""
     head = [first, *(harmless(column_name(column)) for column in columns)]
     lines = ([harmless(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
     return csv_text([head, *lines])

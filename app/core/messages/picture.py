@@ -1,4 +1,4 @@
-"""One decoded picture, and how messages become pictures: as large as they are shown, no larger."""
+"""Decoded images, and decoding messages to images no larger than they are shown."""
 
 from __future__ import annotations
 
@@ -22,17 +22,16 @@ REDUCED = (8, 4, 2)
 PNG_NUMBERS = ("uint8", "uint16")
 COMPARED_FIRST = 4096
 AVERAGED = ("uint8", "uint16")
-"""Numbers whose mean says the same as they do; of others, which may be none at all (NaN), some are taken."""
+"""Types whose mean is meaningful; of others, which may contain NaN, every n-th pixel is taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """One decoded picture of ``width`` x ``height`` pixels.
+    """Decoded image of ``width`` x ``height`` pixels.
 
-    ``bgra`` is a contiguous uint8 array (rows, columns, 4), as QImage.Format_RGB32 reads it; it has fewer
-    rows and columns than the picture when it was decoded for a small view (`whole` is False then).
-    ``numbers`` are the values of a picture with one channel (grey, depth), else None. ``message`` is what it
-    was decoded from.
+    ``bgra`` is a contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32; it is
+    smaller than the image when decoded for a small view (then `whole` is False). ``numbers`` are the values
+    of an image with one channel (grey, depth), else None. ``message`` is its source.
     """
 
     bgra: NDArray[np.uint8]
@@ -44,19 +43,19 @@ class Picture:
     message: Message | None = None
     numbers: NDArray[Any] | None = None
     look: PictureLook = PLAIN
-    """How it was asked to be shown, ..."""
+    """Style that it was decoded with."""
     scale: ColourScale | None = None
-    """... and what its colours mean, where they stand for numbers."""
+    """Meaning of its colours, if they represent numbers."""
     one_channel: bool = False
-    """Whether each pixel is one number, also where `numbers` were not kept."""
+    """True if it has one channel, also where `numbers` were not kept."""
 
     @property
     def whole(self) -> bool:
-        """Whether every pixel was decoded."""
+        """True if it has full resolution."""
         return self.bgra.shape[:2] == (self.height, self.width)
 
     def pixel(self, x: int, y: int) -> Pixel | None:
-        """Red, green and blue, or the number of a picture with one channel; None where it is not known."""
+        """Return red, green and blue, or the number of an image with one channel; None where unknown."""
         if not (self.whole and 0 <= x < self.width and 0 <= y < self.height):
             return None
         if self.numbers is not None:
@@ -69,12 +68,12 @@ class Picture:
 def decode(
     message: Message, received_s: float, fit: Size | None = None, look: PictureLook = PLAIN
 ) -> tuple[Picture | None, str | None]:
-    """A message as a picture, or the sentence that says why it is none.
+    """Decode a message to an image, or return the error sentence.
 
-    ``fit`` is how large it is shown (width, height in pixels of the screen): a picture of twice that and more
-    is decoded smaller. None decodes all of it. ``look`` is how it is to be shown.
+    ``fit`` is the displayed size (width, height in screen pixels): an image at least twice as large is
+    decoded smaller. None means full resolution. ``look`` is the style.
     """
-    import cv2  # noqa: PLC0415  150 MB: loaded when the first picture arrives, not at start
+    import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start
 
     try:
         frame, size = _frame(message, fit)
@@ -100,14 +99,14 @@ def decode(
 def once_more(
     shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
 ) -> Picture | None:
-    """The picture that is shown as that of a message with the same bytes: its very pixels, nothing decoded.
+    """Return the shown image for a message with equal bytes, without decoding.
 
-    None when the message says something else, or is wanted in another size or look (see `decode`).
+    None when the message differs, or another size or style is requested (see `decode`).
     """
     if shown is None or shown.message is None or shown.message is message or shown.look != look:
         return None
     of, factor = shown.message, _factor((shown.width, shown.height), fit)
-    if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # it is rounded up or down
+    if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # rounded up or down
         return None
     if of.extension != message.extension or not _same_bytes(of.data, message.data):
         return None
@@ -115,7 +114,7 @@ def once_more(
 
 
 def _same_bytes(one: memoryview, other: memoryview) -> bool:
-    """Whether both are the same; a camera whose pictures change is found out by a few of them."""
+    # Changing camera images are detected by a sample of bytes.
     if one.nbytes != other.nbytes:
         return False
     step = max(1, one.nbytes // COMPARED_FIRST)
@@ -123,7 +122,7 @@ def _same_bytes(one: memoryview, other: memoryview) -> bool:
 
 
 def _short(error: BaseException) -> str:
-    """The last part of OpenCV's long message."""
+    # Last part of OpenCV's long message.
     return (
         str(error).strip().splitlines()[-1].rpartition("error: ")[2][:200]
         if str(error)
@@ -132,11 +131,11 @@ def _short(error: BaseException) -> str:
 
 
 def png_of(message: Message) -> bytes:
-    """The whole picture as a PNG file, as it was received. Raises NepError, or OSError when it can't be made.
+    """Return the image in full resolution as a PNG file. Raises NepError, or OSError when encoding fails.
 
-    A message that is a PNG already is taken as it is, but for what is beside its picture.
+    A message that is a PNG already is returned unchanged, without trailing data.
     """
-    import cv2  # noqa: PLC0415  heavy
+    import cv2  # noqa: PLC0415  slow import
 
     if image_codec.raw_layout(message.extension.get("encoding")) is None:
         file = examine(message.data)
@@ -156,7 +155,7 @@ def png_of(message: Message) -> bytes:
 
 
 def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
-    """The picture as OpenCV has it (grey, BGR or BGRA; any numbers), perhaps smaller, and its whole size."""
+    # In OpenCV's layout (grey, BGR or BGRA; any type), perhaps reduced, and its full size.
     layout = image_codec.raw_layout(message.extension.get("encoding"))
     if layout is not None:
         frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
@@ -174,7 +173,6 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
 
 
 def _smaller(frame: NDArray[Any], factor: int) -> NDArray[Any]:
-    """The picture so many times smaller."""
     import cv2  # noqa: PLC0415
 
     if factor == 1:
@@ -187,7 +185,7 @@ def _smaller(frame: NDArray[Any], factor: int) -> NDArray[Any]:
 
 
 def _factor(size: Size, fit: Size | None) -> int:
-    """By how much a picture of this size may be decoded smaller to be shown as large as ``fit``."""
+    # Factor by which the image can be reduced for `fit`.
     if fit is None:
         return 1
     shrink = min(size[0] / max(1, fit[0]), size[1] / max(1, fit[1]))
@@ -197,7 +195,7 @@ def _factor(size: Size, fit: Size | None) -> int:
 def _bgra(
     frame: NDArray[Any], look: PictureLook
 ) -> tuple[Any, NDArray[Any] | None, ColourScale | None] | None:
-    """As QImage reads it, the numbers of one channel, what their colours mean; None for what is none."""
+    # In QImage's layout, the numbers of one channel, and the meaning of their colours; None if unsupported.
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 
@@ -212,7 +210,7 @@ def _bgra(
         return bgra, grey, scale
     if frame.dtype != np.uint8:
         frame = _eight_bits(frame)
-    if channels == 2:  # such as a field of vectors: as blue and green
+    if channels == 2:  # such as a vector field: shown as blue and green
         frame = np.dstack([frame, np.zeros(frame.shape[:2], np.uint8)])
     frame = toned(look, frame)
     if channels == 4:
@@ -221,7 +219,7 @@ def _bgra(
 
 
 def _eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours of more than 8 bits: 16 bits by their range, floats of 0 to 1, others by what they hold."""
+    # 16 bits by their range, floats from 0 to 1, others by their minimum and maximum.
     import numpy as np  # noqa: PLC0415
 
     if frame.dtype == np.uint16:

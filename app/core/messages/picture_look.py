@@ -1,4 +1,4 @@
-"""How a person wants pictures shown: brighter, with more contrast, numbers in which colours."""
+"""Display style of images: brightness, contrast, colour map of numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLOUR_MAPS = ("grey", "viridis", "turbo", "inferno", "jet")
-"""By their usual names; "" is whatever fits: grey for bytes, viridis for numbers of more."""
+"""Usual names; "" is the default: grey for bytes, viridis for other types."""
 LEAST_CONTRAST, MOST_CONTRAST = 0.1, 10.0
 STRIP_ROWS = 64
 SPREAD = "viridis"
@@ -21,11 +21,11 @@ SPREAD = "viridis"
 
 @dataclass(frozen=True, slots=True)
 class PictureLook:
-    """How pictures are shown; equal looks make the same of a picture.
+    """Display style; equal styles give equal images.
 
-    ``brightness`` -1 to 1, 0 as it is; ``contrast`` 0.1 to 10, 1 as it is. Of pictures with one channel:
-    ``colours`` is one of `COLOUR_MAPS` or "", and the numbers from ``low`` to ``high`` have all of them; None
-    is the picture's own smallest and largest (of bytes 0 and 255).
+    ``brightness`` is -1 to 1, 0 is unchanged; ``contrast`` 0.1 to 10, 1 is unchanged. For images with one
+    channel ``colours`` is one of `COLOUR_MAPS` or "", which covers the range from ``low`` to ``high``; None
+    is the image's own minimum or maximum (of bytes 0 and 255).
     """
 
     brightness: float = 0.0
@@ -35,7 +35,7 @@ class PictureLook:
     high: float | None = None
 
     def saved(self) -> dict[str, object]:
-        """For a layout; `restored` reads it."""
+        """Return the form stored in a layout; `restored` parses it."""
         return {
             "brightness": self.brightness,
             "contrast": self.contrast,
@@ -49,7 +49,7 @@ PLAIN = PictureLook()
 
 
 def restored(saved: object) -> PictureLook:
-    """What `PictureLook.saved` gave; whatever does not fit is as at first."""
+    """Parse the result of `PictureLook.saved`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
     found = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
@@ -75,7 +75,7 @@ def _number(value: object) -> float | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourScale:
-    """What the colours of a picture with one channel mean: ``low`` has the first, ``high`` the last.
+    """Colour scale of an image with one channel: from ``low`` (first colour) to ``high`` (last colour).
 
     ``colours`` is a uint8 array (256, 3) of red, green and blue.
     """
@@ -86,19 +86,19 @@ class ColourScale:
 
 
 def toned(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Numbers of 8 bits, brighter and with more contrast as the look wants it."""
+    """Apply brightness and contrast to 8-bit values."""
     if (look.brightness, look.contrast) == (0.0, 1.0):
         return picture
-    import cv2  # noqa: PLC0415  heavy
+    import cv2  # noqa: PLC0415  slow import
     import numpy as np  # noqa: PLC0415
 
     return np.asarray(cv2.LUT(picture, _tones(look)), np.uint8)
 
 
 def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
-    """A picture of one channel (rows, columns) in blue, green, red and 255, black where no number is known.
+    """Apply the colour map to an image with one channel (rows, columns).
 
-    And what its colours mean.
+    Return blue, green, red and 255, black for NaN; and the colour scale.
     """
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
@@ -114,7 +114,7 @@ def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uin
 
 
 def _ends(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
-    """The numbers that have the first and the last colour; never in the wrong order."""
+    # In ascending order.
     own = (
         (0.0, 255.0)
         if is_bytes
@@ -128,14 +128,15 @@ def _ends(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[f
 
 
 def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
-    """Its values from 0, ``low`` and below, to 255, ``high`` and above; 0 where a value is not known."""
+    """Scale values linearly from 0 (``low`` and below) to 255 (``high`` and above); 0 where unknown."""
     import numpy as np  # noqa: PLC0415
 
     shown = np.zeros(frame.shape, np.uint8)
-    span = high / 2 - low / 2  # halves: the distance of two floats may be no float any more
+    span = high / 2 - low / 2  # halves, because the difference of two floats may overflow
     if span <= 0:
         return shown
-    for start in range(0, len(frame), STRIP_ROWS):  # double precision takes eight bytes for each
+    # in strips, because double precision takes eight bytes per value
+    for start in range(0, len(frame), STRIP_ROWS):
         rows = slice(start, start + STRIP_ROWS)
         strip = np.where(known[rows], frame[rows], low).astype(np.float64)
         shown[rows] = np.clip((strip / 2 - low / 2) * (255 / span), 0, 255).astype(np.uint8)
@@ -143,7 +144,7 @@ def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: floa
 
 
 def _tones(look: PictureLook) -> NDArray[np.uint8]:
-    """What brightness and contrast make of each of the 256 steps."""
+    # Lookup table of the 256 values.
     import numpy as np  # noqa: PLC0415
 
     steps = (np.arange(256.0) - 127.5) * look.contrast + 127.5 + look.brightness * 255
@@ -152,7 +153,7 @@ def _tones(look: PictureLook) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=len(COLOUR_MAPS))
 def _colours(name: str) -> NDArray[np.uint8]:
-    """The 256 colours of a map, as red, green and blue."""
+    # As red, green and blue.
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
-"""A JSONPath query (RFC 9535) over a decoded message, bounded: no query makes anybody wait for long.
+"""JSONPath queries (RFC 9535) on decoded messages, with bounded run time.
 
-What is looked through counts each step into it, so a query that multiplies itself (``$..*..*..*``) ends, with
-what was found until then. Regular expressions are left out: nothing bounds how long one takes.
+Each visited value is counted, so that an explosive query (``$..*..*..*``) ends with what it found until then.
+Regular expressions are disabled: their run time can't be bounded.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from nep.text import escaped, shortened
 if TYPE_CHECKING:
     import jsonpath
 else:
-    jsonpath = lazy_module("jsonpath")  # 30 ms that only who asks a query waits for
+    jsonpath = lazy_module("jsonpath")  # takes 30 ms to import, needed only for queries
 
 LONGEST = 500
-"""Letters of a query."""
+"""Maximum length of a query."""
 MOST_STEPS = 50_000
-"""Values that are looked at for one answer."""
+"""Maximum number of visited values."""
 MOST_FOUND = 2_000
 Steps = tuple[str | int, ...]
 
 
 class FoundPath(str):
-    """The path of a value that was found, as it is written; ``steps`` lead to it from the message."""
+    """Path of a found value as text; ``steps`` lead to it from the message."""
 
     __slots__ = ("steps",)
     steps: Steps
 
     @classmethod
     def of(cls, steps: Steps) -> FoundPath:
-        """The path that these steps make; of the whole message it is ``$``."""
+        """Return the path of these steps; ``$`` for the whole message."""
         made = cls(path_text(steps) if steps else "$")
         made.steps = steps
         return made
@@ -46,17 +46,17 @@ class FoundPath(str):
 
 @dataclass(frozen=True, slots=True)
 class QueryAnswer:
-    """What a query found: the values by their paths, and the sentence why these are not all, or ""."""
+    """Result of a query: values by path, and a sentence why it is incomplete, or ""."""
 
     found: Mapping[FoundPath, object]
     cut: str = ""
 
 
 class JsonQuery:
-    """A query that was understood; `answer` may be asked in any thread, of one message after the other."""
+    """Parsed query. Thread-safe for one message at a time."""
 
     def __init__(self, text: str) -> None:
-        """Understand it. Raises `QueryError` with the sentence that says what is wrong and where."""
+        # Raises `QueryError` with the reason and its position.
         self.text = text.strip()
         if len(self.text) > LONGEST:
             raise QueryError(_("a query can have at most {most} characters").format(most=LONGEST))
@@ -66,13 +66,13 @@ class JsonQuery:
             raise QueryError(_sentence(error, self.text)) from error
         except OverflowError as error:
             raise QueryError(_("a number in the query is too large")) from error
-        except (RecursionError, ValueError) as error:  # brackets a thousand deep; numbers no computer has
+        except (RecursionError, ValueError) as error:  # brackets nested a thousand deep; numbers out of range
             raise QueryError(_("the query is not valid")) from error
 
     def answer(
         self, value: object, most_steps: int = MOST_STEPS, most_found: int = MOST_FOUND
     ) -> QueryAnswer:
-        """What it finds in a decoded message; ``most_steps`` values are looked at, ``most_found`` kept."""
+        """Return the values found in a decoded message, with limits of visited and returned values."""
         count = _Steps(most_steps)
         looked_through = _counted(value, count)
         found: dict[FoundPath, object] = {}
@@ -103,7 +103,6 @@ def _environment() -> jsonpath.JSONPathEnvironment:
 
 
 def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
-    """What is wrong, and from where on."""
     reason, token = escaped(str(error.message or "")), error.token
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
@@ -112,12 +111,12 @@ def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
     return said.format(rest=escaped(shortened(rest, 20)), reason=reason)
 
 
-class _TooMany(Exception):  # noqa: N818  it is no fault: it ends the search
-    """As many values were looked at as may be."""
+class _TooMany(Exception):  # noqa: N818  not an error: it ends the search
+    """The limit of visited values is reached."""
 
 
 class _Steps:
-    """Counts what is looked at."""
+    """Counter of visited values."""
 
     def __init__(self, most: int) -> None:
         self._left = most
@@ -139,18 +138,18 @@ def _counted(value: object, count: _Steps) -> object:
 
 
 def _plain(value: object) -> object:
-    """What was counted, as it is in the message."""
+    # Unwraps a counted value.
     return value.raw if isinstance(value, (_CountedObject, _CountedList, _Bytes)) else value
 
 
 def _same(one: object, other: object) -> bool:
-    """Whether two values are equal in JSON, where true is not 1."""
+    # JSON equality: true is not 1.
     return isinstance(one, bool) is isinstance(other, bool) and one == other
 
 
 @dataclass(frozen=True, slots=True)
 class _Bytes:
-    """Bytes of msgpack are one value, no list of numbers."""
+    """Bytes of msgpack: one value, not an array."""
 
     raw: object
 
@@ -171,7 +170,7 @@ class _CountedObject(Mapping[str, object]):
             yield str(key)
 
     def items(self) -> Iterator[tuple[str, object]]:  # type: ignore[override]
-        """Without looking each key up again, and with those of msgpack that are numbers."""
+        # Avoids looking up each key again, and supports numeric keys of msgpack.
         for key, value in self.raw.items():
             self._count.take()
             yield str(key), _counted(value, self._count)

@@ -1,4 +1,4 @@
-"""Reads a message for people: a small one at once, large ones in a thread, one at a time, the newest only."""
+"""Reading messages for display: small ones at once, large ones in a thread, only the newest."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 LARGE_BYTES = 1_000_000
-"""JSON above this is looked into, not decoded; what is larger is never read in the window's thread."""
+"""Size above which JSON is indexed instead of decoded; larger messages are never read in the window's thread.
+"""
 EVERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """A message that was read: its ``value``, or the sentence why it can't be (``error``).
+    """Result of reading a message: its ``value``, or the error sentence.
 
-    ``index`` tells where things are in a large JSON text; None for other messages.
+    ``index`` is that of a large JSON text; None for other messages.
     """
 
     message: Message
@@ -29,7 +30,7 @@ class Reading:
 
 
 def read(message: Message) -> Reading:
-    """Read a message, in any thread; large JSON is looked into (`app.core.messages.lazy_json`)."""
+    """Read a message in any thread; large JSON is indexed (`app.core.messages.lazy_json`)."""
     try:
         if message.codec == "json" and message.size_bytes > LARGE_BYTES:
             index = JsonIndex(message.data)
@@ -42,10 +43,9 @@ def read(message: Message) -> Reading:
 
 
 class Reader(NewestOnly[Message, Reading]):
-    """One thread that reads for one panel; it is started by the first message and waits for more."""
+    """Reading thread of one panel, started by the first message."""
 
     def __init__(self) -> None:
-        """Nothing to read yet."""
         super().__init__(self._read, "studio-reader")
         self._asked_at: float | None = None
 
@@ -54,9 +54,10 @@ class Reader(NewestOnly[Message, Reading]):
         return read(message)
 
     def ask_at_leisure(self, message: Message, now: float) -> bool:
-        """Read this one unless something is being read, or was begun less than a second ago.
+        """Read a message unless one is being read, or was begun less than a second ago.
 
-        A large message takes a while, and nobody reads faster. ``now`` is monotonic; whether it will be read.
+        Large messages take a while, and people don't read faster. ``now`` is monotonic seconds. Return
+        whether it will be read.
         """
         if self.busy or (self._asked_at is not None and now - self._asked_at < EVERY_S):
             return False
@@ -65,6 +66,6 @@ class Reader(NewestOnly[Message, Reading]):
         return True
 
     def forget(self) -> None:
-        """Nobody wants what waits or is being read; the next one may be read at once."""
+        """Discard pending and running reads; the next one may start at once."""
         self._asked_at = None
         super().forget()

@@ -1,4 +1,4 @@
-"""Pictures of a stream that a person keeps: PNG files, as large as they were received."""
+"""Snapshots of images: PNG files in full resolution."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CHOSEN = "pictures_folder"
 
 
 def folder(settings: Settings | None = None) -> Path:
-    """Where snapshots go: where a person chose, else ``NEP Studio`` in the system's folder for pictures.
+    """Return the folder of snapshots: the chosen one, else ``NEP Studio`` in the system's picture folder.
 
     With ``$NEP_STUDIO_HOME`` it is ``Pictures`` in there.
     """
@@ -34,9 +34,9 @@ def folder(settings: Settings | None = None) -> Path:
 
 
 def save(message: Message, into: Path | None = None) -> Path:
-    """Write the message's picture as a new file, named by its topic and its time; the path of the file.
+    """Write the image of a message to a new file, named by topic and time; return its path.
 
-    Raises NepError when it is no picture, OSError when it can't be written. No file is ever overwritten.
+    Raises NepError when it is not an image, OSError when it can't be written. Never overwrites a file.
     """
     data = png_of(message)
     place = into if into is not None else folder()
@@ -50,14 +50,14 @@ def save(message: Message, into: Path | None = None) -> Path:
         except FileExistsError:
             continue
         except OSError:
-            path.unlink(missing_ok=True)  # half a picture is none
+            path.unlink(missing_ok=True)  # delete an incomplete file
             raise
         return path
     raise FileExistsError(_("there are already a thousand images named “{stem}”").format(stem=stem))
 
 
 def file_stem(message: Message) -> str:
-    """``Pepper camera 2026-11-20 12.48.20.123``: what every system takes as a file's name."""
+    """Return ``Pepper camera 2026-11-20 12.48.20.123``: a file name that is valid on every system."""
     stamp_ns = message.stamp_ns if message.stamp_ns is not None else time.time_ns()
     when = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(stamp_ns // 1_000_000_000))
     topic = re.sub(r"[^\w\-]+", " ", message.topic).strip()[:80] or "picture"
