@@ -1,4 +1,4 @@
-"""Series: numbers and states picked from topics by field paths, kept, and reduced for drawing.
+"""Series: numbers and states selected from topics by field paths, stored, and reduced for drawing.
 
-`feed` is what the session has; all else needs numpy and is loaded by whoever opens the first plot.
+`feed` belongs to the session; everything else needs numpy and is loaded with the first plot.
 """

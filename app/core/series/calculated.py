@@ -1,4 +1,4 @@
-"""Curves that are calculated from others: each is appended to as its inputs grow, and never anew."""
+"""Calculated curves, extended incrementally as their inputs grow."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from app.core.series.formula import Calculation, Windowed
 from app.core.series.samples import Floats, Samples
 
 WAITS_S = 0.5
-"""So long, by the messages' times, the newest number of one input waits for those of the others."""
+"""Time (by the messages' time stamps) that the newest sample of one input waits for the others."""
 HOLDS_S, HOLDS = 1.0, 8.0
-"""A number of another input counts until its next one, but not longer than this, or eight usual pauses."""
+"""Validity of another input's sample: until its next one, at most this long, or eight usual intervals."""
 AT_ONCE = 200_000
-"""Numbers that one tick calculates at most."""
+"""Maximum number of samples calculated per tick."""
 
 
 class Calculated:
-    """Samples made from others; `advance` takes over what is new in them."""
+    """Samples calculated from others; `advance` processes new input."""
 
     def __init__(self, inputs: Sequence[Samples]) -> None:
-        """At the times of the first input."""
+        # Sampled at the times of the first input.
         self.samples = Samples()
         self._inputs = tuple(inputs)
         self._seen = [each.rewritten for each in inputs]
-        self._next = self._inputs[0].begun  # absolute, in the first input
+        self._next = self._inputs[0].begun  # absolute index in the first input
 
     def advance(self) -> None:
-        """Calculate what can be calculated now."""
+        """Calculate the available samples."""
         base = self._inputs[0]
         changed = [each.rewritten_from(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
         self._seen = [each.rewritten for each in self._inputs]
@@ -42,12 +42,12 @@ class Calculated:
         first = max(self._next, base.begun) - base.begun
         end = min(self._ready(base), first + AT_ONCE)
         if end > first:
-            with np.errstate(all="ignore"):  # what is no number then is a gap
+            with np.errstate(all="ignore"):  # undefined results become gaps
                 self.samples.extend(*self._calculated(base, first, end))
             self._next = base.begun + end
 
     def _ready(self, base: Samples) -> int:
-        """How many of the first input's numbers need not wait any longer."""
+        # Number of the first input's samples that need not wait for other inputs.
         return len(base)
 
     def _calculated(self, base: Samples, first: int, end: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -55,10 +55,10 @@ class Calculated:
 
 
 class WindowCurve(Calculated):
-    """How another curve changes from number to number or by time, its integral, its mean of the last time."""
+    """Difference, derivative, integral or moving average of another curve."""
 
     def __init__(self, kind: Windowed, of: Samples, window_s: float) -> None:
-        """``window_s`` is only of "mean"."""
+        # `window_s` applies only to "mean".
         super().__init__([of])
         self._kind, self._window_s = kind, window_s
 
@@ -73,7 +73,7 @@ class WindowCurve(Calculated):
         if self._kind == "integral":
             means = 0.5 * (values[1:] + values[:-1])
             parts = np.concatenate([[0.0], means * np.diff(base.times[before:end])])[-(end - first) :]
-            parts[~joined] = 0.0  # what was between is not known
+            parts[~joined] = 0.0  # unknown across a gap
             begin = float(self.samples.values[-1]) if len(self.samples) else 0.0
             return times, begin + np.cumsum(parts), gaps
         changes = np.diff(values, prepend=np.nan if before == first else [])
@@ -86,7 +86,7 @@ class WindowCurve(Calculated):
         times, values = base.times, base.values
         begins = np.searchsorted(times, times[first:end] - self._window_s, side="right")
         low = int(begins[0])
-        scale = max(1.0, float(np.abs(values[low:end]).max()) / 1e290)  # or the sum would overflow
+        scale = max(1.0, float(np.abs(values[low:end]).max()) / 1e290)  # avoids an overflow of the sum
         sums = np.concatenate([[0.0], np.cumsum(values[low:end] / scale)])
         counts = np.arange(first, end) + 1 - begins
         means: Floats = (sums[first + 1 - low : end + 1 - low] - sums[begins - low]) / counts * scale
@@ -94,7 +94,7 @@ class WindowCurve(Calculated):
 
 
 class ExpressionCurve(Calculated):
-    """An expression of several curves, at the times of the first, with the newest number of each other."""
+    """Expression of several curves, at the times of the first, with the newest sample of each other."""
 
     def __init__(self, calculate: Calculation, inputs: Sequence[Samples]) -> None:
         super().__init__(inputs)
@@ -116,7 +116,7 @@ class ExpressionCurve(Calculated):
 
 
 def held_values(samples: Samples, times: Floats) -> Floats:
-    """The newest number up to each time; NaN before the first, in a gap, and long after the last."""
+    """Return the newest sample at each time; NaN before the first, in a gap, and long after the last."""
     if not len(samples):
         return np.full(len(times), np.nan)
     places = np.searchsorted(samples.times, times, side="right") - 1

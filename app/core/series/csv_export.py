@@ -1,4 +1,4 @@
-"""Curves as CSV: one row for each time at which any of them has something, blank where one has nothing."""
+"""Curves as CSV: one row for each time with any value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS_AT_ONCE = 5000
 
 @dataclass(frozen=True, slots=True)
 class CsvColumn:
-    """One curve as it was: its name, its numbers by their times (s), and where its states began."""
+    """Snapshot of one curve: name, numbers with their times (s), and starts of its states."""
 
     name: str
     times: Floats
@@ -27,7 +27,7 @@ class CsvColumn:
 
 
 def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
-    """What curves have in a range, for a thread that writes it."""
+    """Return the values of curves in a range, for a thread that writes them."""
     made = []
     for curve in curves:
         first, end = curve.samples.places(begin_s, end_s)
@@ -43,9 +43,9 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
 
 
 def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
-    """The lines of a CSV file (RFC 4180), some thousands at a time: the head, then rows by their time.
+    """Yield the lines of a CSV file (RFC 4180) in chunks: the header, then rows by time.
 
-    Times are nanoseconds since 1970 and ISO 8601 in UTC; a state stands where it begins.
+    Times are nanoseconds since 1970 and ISO 8601 in UTC; a state is in the row of its start.
     """
     yield csv_text([["stamp_ns", "time_utc", *(harmless(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
@@ -64,7 +64,7 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
 
 
 def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
-    """What stands where in some rows; of several at the same time the newest."""
+    # Of several values at the same time the newest counts.
     first, last = _places(column.times, begin_s, end_s)
     numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}

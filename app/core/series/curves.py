@@ -1,4 +1,4 @@
-"""The curves of one plot: what they are picked or calculated from, shared where several need the same."""
+"""Curves of one plot: their sources and calculations, shared between curves."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from nep.i18n import _
 
 MOST_CURVES = 64
 MOST_SAMPLES_TOGETHER = 8 * MOST_SAMPLES
-"""What all curves of a plot keep together (some 150 MB); more curves keep less each."""
+"""Maximum number of samples of all curves of a plot (about 150 MB); more curves keep fewer samples each."""
 LEAST_SAMPLES = 8192
 
 
 @dataclass(eq=False, slots=True)
 class Curve:
-    """One curve of a plot: ``text`` as it is typed, its ``source``, its numbers, and a field's states."""
+    """Curve of a plot: ``text`` as typed, its ``source``, samples, and the states of a field."""
 
     text: str
     source: Source
@@ -45,26 +45,26 @@ class Curve:
 
     @property
     def states(self) -> States | None:
-        """The states of a field that had texts, or yes or no."""
+        """States of a field with text or boolean values."""
         return self.of.states if self.of is not None and len(self.of.states) else None
 
     @property
     def is_state(self) -> bool:
-        """Whether it is shown as a lane of states."""
+        """True if it is shown as a lane of states."""
         return self.of is not None and (
             self.of.is_state or (not len(self.samples) and len(self.of.states) > 0)
         )
 
     @property
     def last(self) -> object:
-        """The newest value as it came; `MISSING` before the first."""
+        """Newest value as received; `MISSING` before the first."""
         if self.of is not None:
             return self.of.last
         return float(self.samples.values[-1]) if len(self.samples) else MISSING
 
 
 def topics_of(source: Source) -> set[str]:
-    """The topics that a curve is made from."""
+    """Return the topics that a source needs."""
     if isinstance(source, FieldSource):
         return {source.topic}
     if isinstance(source, WindowSource):
@@ -74,7 +74,7 @@ def topics_of(source: Source) -> set[str]:
 
 @dataclass(slots=True, eq=False)
 class _Shared:
-    """What several curves may be made from, and how many are."""
+    """Samples that several curves may use, with their number of users."""
 
     samples: Samples
     users: int = 0
@@ -84,24 +84,25 @@ class _Shared:
 
 
 class Curves:
-    """All curves of one plot. One thread uses it (the window's)."""
+    """All curves of one plot. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, feed: SeriesFeed, topics: Callable[[], Iterable[str]]) -> None:
-        """``topics`` tells the names of those that there are."""
+        # `topics` returns the names of existing topics.
         self._feed, self._names = feed, topics
         self._topics: dict[str, TopicSeries] = {}
-        self._shared: dict[str, _Shared] = {}  # each after what it needs
+        self._shared: dict[str, _Shared] = {}  # in order of dependency
         self.all: list[Curve] = []
 
-    # -- what a person does ----------------------------------------------------------------------------------
+    # -- commands of the user
+    # -----------------------------------------------------------------------------------
 
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
-        """The curves of what was typed; ``[*]`` brings one for each element that the newest message has.
+        """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
 
-        ``also`` are topics that it may name although they are not there now.
+        ``also`` are valid topics that don't exist now.
 
-        Raises `CurveError`: its sentence says what to change. Nothing is added then. Whether a field is there
-        is only known when its topic was heard.
+        Raises `CurveError` with the correction; then nothing is added. Whether a field exists is known only
+        after a message of its topic.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
@@ -111,12 +112,12 @@ class Curves:
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
-        """The curves of a field, whether its topic is there or not: it may still come."""
+        """Add the curves of a field, whether its topic exists or not."""
         paths = path.expanded(self.payload_of(topic)) if path.has_every else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
     def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
-        """Curves of these; what is plotted already is not added again."""
+        """Add curves of these sources, except those that are plotted already."""
         there = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in there]
         if not sources:
@@ -132,60 +133,61 @@ class Curves:
         return made
 
     def remove(self, curve: Curve) -> None:
-        """Forget a curve; its topic is not looked at any more when no other needs it."""
+        """Remove a curve; its topic's watch ends when no other curve needs it."""
         if curve in self.all:
             self.all.remove(curve)
             self._leave(curve.text)
             self._share_room()
 
     def close(self) -> None:
-        """Forget all."""
+        """Remove all curves."""
         for curve in list(self.all):
             self.remove(curve)
 
     def advance(self) -> None:
-        """Calculate what is new; call it once a tick, after the messages came."""
+        """Calculate new samples. Call it once per tick, after the messages were added."""
         for shared in self._shared.values():
             if shared.calculated is not None:
                 shared.calculated.advance()
 
-    # -- what is asked ---------------------------------------------------------------------------------------
+    # -- queries
+    # ------------------------------------------------------------------------------------------------
 
     def payload_of(self, topic: str) -> object:
-        """The newest message of a topic that is plotted; `MISSING` otherwise."""
+        """Return the newest message of a plotted topic; `MISSING` otherwise."""
         known = self._topics.get(topic)
         return known.payload if known is not None else MISSING
 
     def fields(self, topic: str) -> list[FieldFound]:
-        """What can be plotted of a topic that is plotted."""
+        """Return the fields of a plotted topic that can be plotted."""
         payload = self.payload_of(topic)
         return [] if payload is MISSING else list(fields_of(payload))
 
     @property
     def lost(self) -> int:
-        """Messages of the plotted topics that did not get here."""
+        """Number of lost messages of the plotted topics."""
         return sum(each.lost for each in self._topics.values())
 
     @property
     def unread(self) -> int:
-        """Messages that can't be read, are too large, or have a stamp that is no time."""
+        """Number of messages that can't be decoded, are too large, or have an invalid time stamp."""
         return sum(each.unread + each.unplaced for each in self._topics.values())
 
     @property
     def undone(self) -> int:
-        """Numbers and states that went because a clock was set back."""
+        """Number of samples and states removed because a clock was set back."""
         fields = [field for topic in self._topics.values() for field in topic.fields]
         return sum(field.numbers.undone + field.states.undone for field in fields)
 
     @property
     def forgotten(self) -> int:
-        """The oldest numbers and states, for which there was no room."""
+        """Number of old samples and states evicted."""
         states = [each.states for each in self.all if each.states is not None]
         return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
 
     @property
     def newest_s(self) -> float | None:
-        """When the newest number or state of any curve was."""
+        """Time of the newest sample or state of any curve."""
         found = [
             last
             for curve in self.all
@@ -195,7 +197,7 @@ class Curves:
         return max(found, default=None)
 
     def advice(self, curve: Curve) -> str:
-        """Why nothing of a curve can be plotted, in a sentence; empty where something can or may still."""
+        """Return a sentence why a curve has no values, or "" where it has or may get some."""
         if curve.of is None or len(curve.samples) or len(curve.of.states):
             return ""
         payload = self.payload_of(curve.of.topic)
@@ -214,13 +216,14 @@ class Curves:
             field=curve.text
         )
 
-    # -- inside ----------------------------------------------------------------------------------------------
+    # -- private
+    # ------------------------------------------------------------------------------------------------
 
     def _known_topics(self) -> list[str]:
         return list(dict.fromkeys([*self._topics, *self._names()]))
 
     def _enter(self, source: Source) -> _Shared:
-        """What a source gives, made when it is the first time; one more uses it."""
+        # Creates it at the first use; counts the users.
         name = str(source)
         shared = self._shared.get(name)
         if shared is None:
@@ -236,7 +239,7 @@ class Curves:
             of = self._enter(source.of)
             calculated: Calculated = WindowCurve(source.kind, of.samples, source.window_s)
             return _Shared(calculated.samples, needs=[str(source.of)], calculated=calculated)
-        assert isinstance(source, ExpressionSource)  # noqa: S101  there is no other
+        assert isinstance(source, ExpressionSource)  # noqa: S101  the only other type
         inputs = [self._enter(each).samples for each in source.inputs]
         calculated = ExpressionCurve(source.calculate, inputs)
         return _Shared(calculated.samples, needs=[str(each) for each in source.inputs], calculated=calculated)

@@ -1,4 +1,4 @@
-"""Hands every message of a plotted topic on to the series that are picked from it, once a tick."""
+"""Feed of the series: passes every message of plotted topics on, once per tick."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watching
 
 BETWEEN_TICKS = 8192
-"""Messages of a plotted topic that wait for the next tick: 1 kHz for 8 s, should the window be that late."""
+"""Maximum number of messages of a plotted topic between ticks: 1 kHz for 8 s, if the window is that late."""
 
 
 class SeriesTaker(Protocol):
-    """Takes what arrived on one topic since the last tick."""
+    """Receiver of a topic's messages."""
 
     def take(self, batch: Batch, now_ns: int) -> None:
-        """Take over a batch; ``now_ns`` is this computer's time, for messages that carry none."""
+        """Process a batch; ``now_ns`` is this computer's time, for messages without a time stamp."""
 
     def rewind(self) -> None:
-        """What comes next is of another time: nothing that was there counts any more, and nothing is lost."""
+        """Clear: the source moved to another time, which counts as no loss."""
 
 
 class SeriesFeed:
-    """Who wants the messages of which topics. One thread uses it (the window's).
+    """Receivers of messages by topic. Not thread-safe: use it from the window's thread.
 
-    A topic is subscribed while somebody takes its messages, also while no panel can be seen: a plot that is
-    looked at again has no hole. ``origin_ns`` is the time that all series count their seconds from.
+    A topic is subscribed to while it has a receiver, also while no panel is visible, so that plots have no
+    gaps. ``origin_ns`` is the time from which all series count their seconds.
     """
 
     def __init__(
@@ -35,10 +35,8 @@ class SeriesFeed:
         clock_ns: Callable[[], int],
         set_room: Callable[[str, int | None], None] = lambda _topic, _messages: None,
     ) -> None:
-        """``watch`` looks at a topic by its name among those of all networks.
-
-        ``set_room`` says how many of its messages are to be kept between two ticks (`Mailbox.set_room`).
-        """
+        # `watch` opens a watch by topic key; `set_room` sets the number of messages kept between ticks
+        # (`Mailbox.set_room`).
         self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
         self._takers: dict[str, list[SeriesTaker]] = {}
         self._deep: dict[str, list[SeriesTaker]] = {}
@@ -47,17 +45,17 @@ class SeriesFeed:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """The topics whose messages somebody takes."""
+        """Topics with receivers."""
         return tuple(self._takers)
 
     def now_s(self) -> float:
-        """This computer's time in the seconds of all series."""
+        """Return this computer's time in the seconds of all series."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
     def join(self, topic: str, taker: SeriesTaker, *, deep: bool = True) -> None:
-        """Give ``taker`` the messages of a topic from now on.
+        """Pass the messages of a topic to ``taker`` from now on.
 
-        Who is not ``deep`` gets along without those that a late window drops, and without a recording's past.
+        If not ``deep``, it accepts drops of a late window, and gets no history of a recording.
         """
         self._takers.setdefault(topic, []).append(taker)
         if deep:
@@ -69,7 +67,7 @@ class SeriesFeed:
             self._watching[topic] = self._watch(topic)
 
     def leave(self, topic: str, taker: SeriesTaker) -> None:
-        """Give it nothing more; said twice it does nothing."""
+        """Remove a receiver. Idempotent."""
         takers, deep = self._takers.get(topic, []), self._deep.get(topic, [])
         if taker in takers:
             takers.remove(taker)
@@ -83,13 +81,13 @@ class SeriesFeed:
                 self._set_room(topic, None)
 
     def rewind(self, topics: Iterable[str] | None = None) -> None:
-        """The source is at another time: what these topics (None: all) had is forgotten."""
+        """Clear these topics (None: all): the source moved to another time."""
         for topic in list(self._takers) if topics is None else topics:
             for taker in self._takers.get(topic, ()):
                 taker.rewind()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
-        """Hand over what arrived since the last tick, by topic."""
+        """Pass on the messages of a tick, by topic."""
         if not self._takers:
             return
         now_ns = self._clock_ns()

@@ -1,8 +1,8 @@
-"""Field paths: where a value is in a message: ``pose.x[2]``, ``joints[*].position``.
+"""Field paths to values in messages: ``pose.x[2]``, ``joints[*].position``.
 
-A path is parsed once; then it only looks. A key that is no plain word stands in brackets as a JSON string,
-as in ``people["first name"]``, and ``[*]`` means every element of a list. The value of a message that is no
-object or list is called ``value``.
+A path is parsed once. A key that is not a plain word is a JSON string in brackets, as in ``people["first
+name"]``; ``[*]`` means every element of an array. The value of a message that is neither object nor array is
+called ``value``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from nep.errors import nearest
 from nep.i18n import _
 
 EVERY: Final = "*"
-"""The step that means every element of a list; as a key it would stand in brackets and quotes."""
+"""Step for every element of an array; as a key it would be quoted in brackets."""
 MOST_STEPS, MOST_EVERY, MOST_FIELDS = 32, 65, 2000
 LONGEST = 400
 ALONE = "value"
@@ -28,16 +28,16 @@ _STEP = re.compile(
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
 )
 _PLAIN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
-"""Keys that are nothing to calculate: `head-yaw` would be a difference, so it is written `["head-yaw"]`."""
+"""Keys that can't be confused with a calculation: `head-yaw` would be a difference, so it is written
+`["head-yaw"]`."""
 
 FieldKind = Literal["number", "state", "list"]
 
 
 class Missing:
-    """What a path finds where there is nothing."""
+    """Result of a path without a value."""
 
     def __repr__(self) -> str:
-        """Its name."""
         return "MISSING"
 
 
@@ -45,10 +45,9 @@ MISSING: Final = Missing()
 
 
 class Every:
-    """The step ``[*]``."""
+    """Step ``[*]``."""
 
     def __repr__(self) -> str:
-        """As it is written."""
         return "[*]"
 
 
@@ -57,19 +56,19 @@ Step = str | int | Every
 
 
 def is_list(value: object) -> bool:
-    """Whether a value is a list; text and bytes are values."""
+    """Return whether a value is an array; strings and bytes are not."""
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes, bytearray, memoryview))
 
 
 @dataclass(frozen=True, slots=True)
 class FieldPath:
-    """The steps from a message to a value: keys, indexes, `ALL`."""
+    """Steps from a message to a value: keys, indexes, `ALL`."""
 
     steps: tuple[Step, ...]
 
     @classmethod
     def parse(cls, text: str) -> FieldPath:
-        """The path that is written so. Raises `CurveError` that says where it can't be read."""
+        """Parse a path. Raises `CurveError` if it is invalid."""
         steps: list[Step] = []
         at = 0
         while at < len(text):
@@ -85,19 +84,20 @@ class FieldPath:
 
     @property
     def has_every(self) -> bool:
-        """Whether it means several values."""
+        """True if it stands for several values."""
         return ALL in self.steps
 
     def __str__(self) -> str:
-        """As people write it; `parse` reads it back."""
+        # Can be parsed again.
         written = "".join(_written(step) for step in self.steps)
         return written.removeprefix(".")
 
     def value_in(self, payload: object) -> object:
-        """The value in a decoded message; `MISSING` when it has none there."""
+        """Return the value in a decoded message; `MISSING` if there is none."""
         here = payload
         for step in self.steps:
-            if type(here) is dict or isinstance(here, Mapping):  # which takes ten times as long to be asked
+            # `isinstance` with an ABC takes ten times as long
+            if type(here) is dict or isinstance(here, Mapping):
                 here = here.get(step, MISSING)
             elif isinstance(step, int) and is_list(here):
                 few: Sequence[object] = here  # type: ignore[assignment]
@@ -109,9 +109,9 @@ class FieldPath:
         return here
 
     def expanded(self, payload: object) -> list[FieldPath]:
-        """The paths without `ALL` that a message has for it, 65 at most; itself when it has none.
+        """Return the paths without `ALL` for a message, at most 65; itself if it has none.
 
-        That is one more than a plot has curves, so that too many are told and not cut off.
+        That is one more than the curves of a plot, so that too many are reported and not silently cut.
         """
         if not self.has_every:
             return [self]
@@ -149,7 +149,7 @@ def _written(step: Step) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FieldFound:
-    """A value of a message that can be plotted: a number, a state (text, yes or no), or a list of such."""
+    """Plottable value of a message: a number, a state (text, boolean), or an array of numbers."""
 
     path: FieldPath
     kind: FieldKind
@@ -158,7 +158,10 @@ class FieldFound:
 
 
 def fields_of(payload: object, most: int = MOST_FIELDS) -> Iterator[FieldFound]:
-    """What of a message can be plotted, upper levels first; of a list the first elements and ``[*]``."""
+    """Yield the plottable values of a message, upper levels first.
+
+    Of an array the first elements and ``[*]``.
+    """
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
         waiting = [((ALONE,), payload)]
@@ -180,7 +183,10 @@ def fields_of(payload: object, most: int = MOST_FIELDS) -> Iterator[FieldFound]:
 
 
 def kind_of_value(value: object) -> FieldKind | None:
-    """How a value can be plotted; None for objects, bytes, null, and lists of anything but numbers."""
+    """Return how a value can be plotted.
+
+    None for objects, bytes, null, and arrays of anything but numbers.
+    """
     if isinstance(value, (bool, str)):
         return "state"
     if isinstance(value, (int, float)):
@@ -193,7 +199,7 @@ def kind_of_value(value: object) -> FieldKind | None:
 
 
 def completed(text: str, known: Sequence[str]) -> str:
-    """``text`` completed to the next dot, bracket or end in which all of ``known`` that begin so agree."""
+    """Complete ``text`` to the next dot, bracket or end that all matching entries of ``known`` share."""
     fitting = [each for each in known if each.startswith(text)]
     if not fitting:
         return text
@@ -206,5 +212,5 @@ def completed(text: str, known: Sequence[str]) -> str:
 
 
 def meant_field(path: FieldPath, payload: object) -> str | None:
-    """The nearest field that a message does have, as it is written; None when none is near."""
+    """Return the path of the most similar field that a message has; None if none is similar."""
     return nearest(str(path), [str(each.path) for each in fields_of(payload)])

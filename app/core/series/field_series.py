@@ -1,4 +1,4 @@
-"""The series of one topic: each message is placed in time once, then each field is looked up in it."""
+"""Series of one topic: each message gets its time once, then each field is read from it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 LATEST_STAMP_NS = 1 << 63
-"""Later stamps (the year 2262) are none: such a message has no place in time, and is counted."""
+"""Latest valid time stamp (the year 2262); messages beyond are counted and skipped."""
 SILENCE_S, SILENCES = 1.0, 8.0
-"""A silence is a gap when it is longer than a second and than eight usual pauses."""
+"""Minimum silence that counts as a gap: one second, and eight usual intervals."""
 SILENCES_IN_A_ROW = 3
-"""After so many silences that is how often the topic comes now: each message as a gap would be no line."""
+"""Number of consecutive silences after which they are the usual interval; otherwise each message would be a
+gap."""
 MOST_PUBLISHERS = 64
 UNREAD = object()
-"""What stands for a message that can't be read."""
+"""Placeholder for an unreadable message."""
 
 
 class FieldSeries:
-    """What one field was: `numbers`, and `states` where it was text or yes or no.
+    """History of one field: `numbers`, and `states` where it was text or boolean.
 
-    ``last`` is its newest value as it came, ``missing`` counts messages that had no such value.
+    ``last`` is its newest value as received; ``missing`` counts messages without the field.
     """
 
     def __init__(self, topic: str, path: FieldPath) -> None:
-        """Nothing has come yet."""
         self.topic, self.path = topic, path
         self.numbers, self.states = Samples(), States()
         self.last: object = MISSING
@@ -44,11 +44,11 @@ class FieldSeries:
 
     @property
     def is_state(self) -> bool:
-        """Whether its newest value is a text, or yes or no."""
+        """True if its newest value is text or boolean."""
         return kind_of_value(self.last) == "state"
 
     def take(self, times_s: Sequence[float], payloads: Sequence[object], gaps: Sequence[bool]) -> None:
-        """Look the field up in messages that came at these times; ``gaps``: something is missing before."""
+        """Add the field's values in messages at these times; ``gaps`` marks missing messages before each."""
         find = self.path.value_in
         times: list[float] = []
         values: list[float] = []
@@ -84,7 +84,7 @@ class FieldSeries:
             self.numbers.break_line()
 
     def rewind(self) -> None:
-        """Begin anew."""
+        """Clear everything."""
         self.numbers.clear()
         self.states.clear()
         self.last = MISSING
@@ -92,7 +92,7 @@ class FieldSeries:
 
 
 def number_of(value: object) -> float:
-    """A number as the plot has it; one that is too large for it is infinite, which is not drawn."""
+    """Convert a number to float; infinite when too large, which is not drawn."""
     try:
         return float(value)  # type: ignore[arg-type]
     except OverflowError:
@@ -100,33 +100,34 @@ def number_of(value: object) -> float:
 
 
 class TopicSeries:
-    """All series that are picked from one topic; takes its messages (`app.core.series.feed`).
+    """All series of one topic; receives its messages (`app.core.series.feed`).
 
-    ``lost`` counts messages that did not get here, ``unread`` those that can't be read or are too large,
-    ``unplaced`` those whose stamp is no time. ``payload`` is the newest message's.
+    ``lost`` counts messages that did not arrive, ``unread`` unreadable or too large ones, ``unplaced`` those
+    with an invalid time stamp. ``payload`` is the newest one.
     """
 
     def __init__(self, topic: str, origin_ns: int) -> None:
-        """Its times are seconds after ``origin_ns``."""
+        # Times are seconds after `origin_ns`.
         self.topic, self._origin_ns = topic, origin_ns
         self.fields: list[FieldSeries] = []
         self.received = self.lost = self.unread = self.unplaced = 0
         self.payload: object = MISSING
-        self._gap = False  # something is missing before whatever comes next
+        self._gap = False  # messages are missing before the next one
         self._seqs: dict[int | None, int] = {}
         self._last_s: float | None = None
         self._usual_s: float | None = None
-        self._silences = 0  # in a row
+        self._silences = 0  # consecutive
 
     def join(self, field: FieldSeries) -> None:
-        """One more field is looked up from now on, in the newest message too."""
+        """Add a field, read from now on and in the newest message."""
         self.fields.append(field)
         if self.payload is not MISSING and self._last_s is not None:
             field.take([self._last_s], [self.payload], [False])
 
     def take(self, batch: Batch, now_ns: int) -> None:
-        """Take over what arrived."""
-        seen: set[int | None] = set()  # publishers: what was dropped are jumps of their first numbers, too
+        """Add received messages."""
+        # publishers, because dropped messages also appear as jumps of their sequence numbers
+        seen: set[int | None] = set()
         lost = first_jumps = 0
         times: list[float] = []
         payloads: list[object] = []
@@ -157,7 +158,7 @@ class TopicSeries:
             field.take(times, payloads, gaps)
 
     def rewind(self) -> None:
-        """Forget what came: the next message is of another time."""
+        """Clear: the source moved to another time."""
         self._seqs.clear()
         self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
         self.received = self.lost = self.unread = self.unplaced = 0
@@ -166,7 +167,7 @@ class TopicSeries:
             field.rewind()
 
     def _missed(self, message: Message) -> int:
-        """How many messages of its publisher are missing right before this one."""
+        # Number of messages of its publisher missing immediately before this one.
         seq, publisher = message.seq, message.publisher
         if seq is None:
             return 0
@@ -174,7 +175,7 @@ class TopicSeries:
         if before is None and len(self._seqs) >= MOST_PUBLISHERS:
             self._seqs.clear()
         self._seqs[publisher] = seq
-        # one that is latched comes again; one that begins anew has lost nothing
+        # a latched message is repeated; a restarted publisher has lost nothing
         return seq - before - 1 if before is not None and seq > before else 0
 
     def _time_of(self, message: Message, now_ns: int) -> float | None:
@@ -201,7 +202,7 @@ class TopicSeries:
         if self._last_s is None:
             return False
         pause_s, usual_s = time_s - self._last_s, self._usual_s
-        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # nearly always
+        if usual_s is not None and 0 < pause_s <= SILENCE_S:  # almost always
             self._silences = 0
             self._usual_s = usual_s + 0.1 * (pause_s - usual_s)
             return False

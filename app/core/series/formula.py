@@ -1,12 +1,12 @@
-"""What a person types as a curve: a field of a topic, or something calculated from fields.
+"""Typed curves: a field of a topic, or a calculation with fields.
 
 ::
 
     /odom.pose.x          difference(/odom.speed)          mean(/odom.speed, 2 s)
     hypot(/odom.pose.x, /odom.pose.y)                      /odom.speed - 2 * /cmd_vel.linear
 
-Fields are found first and stand as names in what is left, which `ast` reads; only what is listed here is
-carried out, on arrays of numpy. Nothing that was typed is ever run as Python.
+Fields are replaced by names first; `ast` parses the rest. Only the operations listed here are executed,
+on numpy arrays. Typed text is never run as Python.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
     "min": (2, np.minimum), "max": (2, np.maximum), "floor": (1, np.floor), "ceil": (1, np.ceil),
     "sign": (1, np.sign), "deg": (1, np.degrees), "rad": (1, np.radians),
 }  # fmt: skip
-"""What may be called, with how many numbers."""
+"""Allowed functions, with their number of arguments."""
 CONSTANTS = {"pi": np.pi, "e": np.e}
 OPERATORS: dict[type[ast.operator], Callable[[Floats, Floats], Floats]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Mod: np.mod,
@@ -53,40 +53,37 @@ _UNITS = {"ms": 0.001, "s": 1.0, "min": 60.0}
 
 @dataclass(frozen=True, slots=True)
 class FieldSource:
-    """A field of a topic."""
+    """Field of a topic."""
 
     topic: str
     path: FieldPath
 
     def __str__(self) -> str:
-        """As it is typed."""
         written = str(self.path)
         return f"{self.topic}{written}" if written.startswith("[") else f"{self.topic}.{written}"
 
 
 @dataclass(frozen=True, slots=True)
 class WindowSource:
-    """How something changes, or its mean over the last ``window_s``."""
+    """Change of a source over time, or its mean over the last ``window_s``."""
 
     kind: Windowed
     of: Source
     window_s: float = 0.0
 
     def __str__(self) -> str:
-        """As it is typed."""
         return f"mean({self.of}, {self.window_s:g} s)" if self.kind == "mean" else f"{self.kind}({self.of})"
 
 
 @dataclass(frozen=True, slots=True)
 class ExpressionSource:
-    """A number calculated from others: ``calculate`` has ``inputs`` in their order; ``text`` is its name."""
+    """Number calculated from ``inputs``, which ``calculate`` gets in this order; ``text`` is its name."""
 
     text: str
     inputs: tuple[Source, ...]
     calculate: Calculation
 
     def __str__(self) -> str:
-        """As it is typed."""
         return self.text
 
 
@@ -94,9 +91,9 @@ Source = FieldSource | WindowSource | ExpressionSource
 
 
 def address(text: str, topics: Sequence[str]) -> FieldSource | None:
-    """The field that is written at the beginning and nowhere else; None when the text is something else.
+    """Return the field if the text is exactly one; otherwise None.
 
-    Raises `CurveError` when it names a topic, and what follows is no path.
+    Raises `CurveError` when it names a topic with an invalid path.
     """
     topic = _topic_at(text, topics)
     if topic is None:
@@ -108,9 +105,9 @@ def address(text: str, topics: Sequence[str]) -> FieldSource | None:
 
 
 def parse(text: str, topics: Sequence[str]) -> Source:
-    """The curve that a person typed; ``topics`` are those that there are.
+    """Parse a typed curve; ``topics`` are the existing ones.
 
-    Raises `CurveError` with the sentence that says what to change.
+    Raises `CurveError` with the correction.
     """
     text = text.strip()
     if not text or len(text) > LONGEST:
@@ -120,7 +117,7 @@ def parse(text: str, topics: Sequence[str]) -> Source:
 
 
 def _topic_at(text: str, topics: Sequence[str]) -> str | None:
-    """The longest topic that stands at the beginning of a text."""
+    # Longest topic at the start of the text.
     fitting = [name for name in topics if text.startswith(name) and _ends(text, len(name))]
     return max(fitting, key=len, default=None)
 
@@ -130,7 +127,7 @@ def _ends(text: str, place: int) -> bool:
 
 
 class _Reader:
-    """Reads one expression."""
+    """Parser of one expression."""
 
     def __init__(self, text: str, topics: Sequence[str]) -> None:
         self._text, self._topics = text, topics
@@ -150,7 +147,7 @@ class _Reader:
         return source
 
     def _without_fields(self) -> str:
-        """The text as Python would have it: a name for each field, seconds for each duration."""
+        # As Python source: a name for each field, seconds for each duration.
         out: list[str] = []
         place, wants_value = 0, True
         while place < len(self._text):
@@ -174,7 +171,7 @@ class _Reader:
         return "".join(out)
 
     def _field(self, place: int) -> int:
-        """Take over the field that stands there; where it ends."""
+        # Adds the field at this position; returns its end.
         rest = self._text[place:]
         topic = _topic_at(rest, self._topics)
         if topic is None:
@@ -190,7 +187,7 @@ class _Reader:
         return place + path.end()
 
     def _source(self, node: ast.expr) -> Source | None:
-        """What a node is made from; None for a number."""
+        # None for a number.
         if isinstance(node, ast.Name) and node.id[1:].isdigit() and node.id.startswith("_"):
             return self._fields[int(node.id[1:])]
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in WINDOWED:
@@ -217,7 +214,7 @@ class _Reader:
         return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
 
     def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
-        """How a node is calculated from ``inputs``, to which it adds those that it needs."""
+        # Adds the needed sources to `inputs`.
         if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
             number = _constant(node.value)
             return lambda _arrays: number
@@ -246,7 +243,7 @@ class _Reader:
         return lambda arrays: function(*(each(arrays) for each in given))
 
     def _input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
-        """A field, or something that needs more than the numbers of one moment."""
+        # A field, or a function that needs more than the samples of one time.
         called = node.func if isinstance(node, ast.Call) else node
         name = called.id if isinstance(called, ast.Name) else self._words(called)
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
@@ -260,14 +257,13 @@ class _Reader:
             )
             raise CurveError(said.format(name=name[:40], hint=hint))
         source = self._source(node)
-        assert source is not None  # noqa: S101  it is a field or needs one
+        assert source is not None  # noqa: S101  a field, or a function of one
         if source not in inputs:
             inputs.append(source)
         place = inputs.index(source)
         return lambda arrays: arrays[place]
 
     def _words(self, node: ast.expr) -> str:
-        """A node as it is typed."""
         written = ast.unparse(node).replace("**", "^")
         return re.sub(r"\b_(\d+)\b", lambda found: str(self._fields[int(found[1])]), written)
 
@@ -280,7 +276,7 @@ def _constant(value: object) -> Floats:
 
 
 def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
-    """The sentence for a topic that is not there, with the nearest one."""
+    """Return the error for an unknown topic, with the most similar one."""
     near = nearest(name, list(topics))
     if near is None:
         return CurveError(_("topic {topic} does not exist").format(topic=name))

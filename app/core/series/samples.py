@@ -1,8 +1,8 @@
-"""Samples: the numbers of one series over time, bounded, with their gaps and a pyramid of peaks.
+"""Samples of one series over time: bounded, with gaps and a multi-resolution pyramid.
 
-Numbers are finite; where one is missing the next is marked as coming after a gap. For drawing, and for the
-figures of a range, the least, the greatest, the sum are kept for every 16, 128 and 1024 numbers, so that a
-million cost no more than some thousands. It is appended to; what comes late is put in its place.
+Values are finite; after a missing one the next is marked as following a gap. For drawing and statistics,
+minimum, maximum and sum are kept for every 16, 128 and 1024 samples, so that a million samples cost no more
+than some thousands. Samples are appended; late ones are inserted in order.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Indexes = NDArray[np.intp]
 MOST_SAMPLES = 1 << 20
-"""About a million numbers: a quarter of an hour of 1 kHz, 20 MB."""
+"""About a million samples: a quarter of an hour at 1 kHz, 20 MB."""
 LATE_S = 1.0
-"""What comes this much too late is put in its place; what is older says that the clock was set back."""
+"""Maximum lateness of a sample that is inserted; beyond it the clock was set back."""
 SHIFTS = (4, 7, 10)
 RAW_PER_COLUMN = 4
-"""As long as there are no more numbers for each pixel, all of them are drawn."""
+"""Maximum number of samples per pixel up to which all of them are drawn."""
 FEW_RANGES, FEW_NUMBERS = 8, 4096
-"""Of so many, one after the other is quicker than all at once."""
+"""Numbers up to which a Python loop is faster than vectorized reduction."""
 _FIRST_ROOM = 1024
 _GRAIN = 1 << SHIFTS[-1]
 _REWRITES_KEPT = 256
@@ -33,7 +33,7 @@ _REWRITES_KEPT = 256
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What is known of a range: how many numbers, the least, the greatest and their mean (None: none)."""
+    """Statistics of a range: count, minimum, maximum and mean (None: no samples)."""
 
     count: int = 0
     least: float | None = None
@@ -43,7 +43,7 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What is to be drawn: times (s) and values, NaN where the line is broken; whether these are all."""
+    """Polyline to draw: times (s) and values, NaN at gaps; ``is_whole`` if these are all samples."""
 
     times: Floats
     values: Floats
@@ -52,7 +52,7 @@ class Line:
 
 
 class _Level:
-    """Of every ``1 << shift`` numbers the least, the greatest and the sum, as far as they are complete."""
+    """Minimum, maximum and sum of every ``1 << shift`` samples, as far as complete."""
 
     def __init__(self, shift: int) -> None:
         self.shift, self.built = shift, 0
@@ -84,9 +84,9 @@ class _Level:
 
 @dataclass(slots=True)
 class _Pixels:
-    """Pixels from ``first`` to before ``end`` (their numbers) as they are drawn: two points each.
+    """Drawn pixels with numbers from ``first`` (inclusive) to ``end`` (exclusive): two points each.
 
-    ``keys`` are the numbers of those that have any, ``broken`` whether something is missing before them.
+    ``keys`` are the numbers of non-empty pixels; ``broken`` is whether a gap precedes them.
     """
 
     first: float = 0.0
@@ -97,7 +97,7 @@ class _Pixels:
     broken: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
 
     def part(self, first: float, end: float) -> _Pixels:
-        """Those of them from ``first`` to before ``end``; views."""
+        # Views, not copies.
         first, end = max(first, self.first), min(end, self.end)
         if end <= first:
             return _Pixels(first, first)
@@ -109,7 +109,7 @@ class _Pixels:
 
     @classmethod
     def joined(cls, parts: Sequence[_Pixels]) -> _Pixels:
-        """Parts that follow each other."""
+        # The parts must be adjacent.
         names = ("keys", "times", "values", "broken")
         arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
         return cls(parts[0].first, parts[-1].end, *arrays)
@@ -117,9 +117,9 @@ class _Pixels:
 
 @dataclass(slots=True)
 class _Drawn:
-    """The pixels that were drawn last, as far as nothing that comes after what came then changes them.
+    """Cache of the last drawn pixels that later samples can't change.
 
-    A plot that moves on draws nearly the same pixels again; they need not be looked through once more.
+    A moving plot draws almost the same pixels again.
     """
 
     width_s: float = 0.0
@@ -129,14 +129,13 @@ class _Drawn:
 
 
 class Samples:
-    """Times in s, never falling, and finite values. One thread uses it.
+    """Times in s, ascending, and finite values. Not thread-safe: use it from the window's thread.
 
-    ``begun`` were forgotten to stay within ``limit`` (the oldest go first, a quarter at a time), ``undone``
-    because a clock was set back. An absolute index counts what was forgotten, too.
+    ``begun`` samples were evicted to stay within ``limit`` (the oldest, a quarter at a time), ``undone``
+    removed because a clock was set back. An absolute index includes evicted samples.
     """
 
     def __init__(self, limit: int = MOST_SAMPLES) -> None:
-        """Nothing is known yet."""
         self.limit = limit
         self.begun = self.undone = 0
         self._count = 0
@@ -149,48 +148,48 @@ class Samples:
         self._gap_wanted = False
 
     def __len__(self) -> int:
-        """How many are kept."""
         return self._count
 
     @property
     def end(self) -> int:
-        """The absolute index of the next one."""
+        """Absolute index of the next sample."""
         return self.begun + self._count
 
     @property
     def times(self) -> Floats:
-        """When they were (s), oldest first; a view."""
+        """Times (s), oldest first; a view."""
         return self._times[: self._count]
 
     @property
     def values(self) -> Floats:
-        """The numbers; a view."""
+        """Values; a view."""
         return self._values[: self._count]
 
     @property
     def gaps(self) -> NDArray[np.bool_]:
-        """Whether something is missing right before each; a view."""
+        """True if a gap precedes each sample; a view."""
         return self._gaps[: self._count]
 
     @property
     def last_s(self) -> float | None:
-        """When the newest was."""
+        """Time of the newest sample."""
         return float(self._times[self._count - 1]) if self._count else None
 
     @property
     def size_bytes(self) -> int:
-        """The memory that it has."""
+        """Allocated memory in bytes."""
         levels = sum(each.low.nbytes * 3 for each in self._levels)
         return self._times.nbytes + self._values.nbytes + self._gaps.nbytes + levels
 
-    # -- what comes ------------------------------------------------------------------------------------------
+    # -- input
+    # --------------------------------------------------------------------------------------------------
 
     def break_line(self) -> None:
-        """Something is missing before whatever comes next."""
+        """Mark a gap before the next sample."""
         self._gap_wanted = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
-        """Add numbers that came in this order; what is not finite is left out, and a gap."""
+        """Append samples in order of arrival; non-finite ones become gaps."""
         good = np.isfinite(times) & np.isfinite(values)
         if not good.all():
             gaps = _gaps_carried(gaps, good)
@@ -214,7 +213,7 @@ class Samples:
         self._forget_old()
 
     def add(self, time_s: float, value: float, *, gap: bool = False) -> None:
-        """Add one number."""
+        """Append one sample."""
         self.extend(np.array([time_s]), np.array([value]), np.array([gap]))
 
     def _append(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
@@ -249,7 +248,7 @@ class Samples:
         self._rewrite(place, time_s)
 
     def truncate(self, time_s: float) -> None:
-        """Undo what is at or after a time: the clock was set back, or a recording goes on from there."""
+        """Remove samples at or after a time: the clock was set back, or a recording continues from there."""
         place = int(np.searchsorted(self.times, time_s, side="left"))
         if place < self._count:
             self.undone += self._count - place
@@ -258,7 +257,7 @@ class Samples:
         self._gap_wanted = self._gap_wanted and self._count > 0
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Remove all samples."""
         self.truncate(-np.inf)
         self.begun = self.undone = 0
 
@@ -269,7 +268,7 @@ class Samples:
         self._rewrites.append((self.rewritten, time_s))
 
     def rewritten_from(self, seen: int) -> float | None:
-        """From which time on it is not as it was when ``rewritten`` was ``seen``; None when all is."""
+        """Return the earliest time changed since ``rewritten`` was ``seen``; None when nothing changed."""
         if seen == self.rewritten:
             return None
         if not self._rewrites or self._rewrites[0][0] > seen + 1:
@@ -287,7 +286,7 @@ class Samples:
                 setattr(self, name, new)
 
     def _give_room_back(self) -> None:
-        """Where the limit has become much smaller, as more curves share what a plot may keep."""
+        # After the limit became much smaller, because more curves share the plot's capacity.
         if len(self._times) > 4 * max(self.limit, self._count, _FIRST_ROOM):
             for name in ("_times", "_values", "_gaps"):
                 setattr(self, name, getattr(self, name)[: self._count].copy())
@@ -309,15 +308,16 @@ class Samples:
         self._count, self.begun = kept, self.begun + drop
         self._give_room_back()
 
-    # -- what is asked ---------------------------------------------------------------------------------------
+    # -- queries
+    # ------------------------------------------------------------------------------------------------
 
     def places(self, begin_s: float, end_s: float) -> tuple[int, int]:
-        """The indexes of what lies in a range, both ends too: the first, and one behind the last."""
+        """Return the index range of samples in an inclusive time range: first, and one behind the last."""
         first = np.searchsorted(self.times, begin_s, side="left")
         return int(first), int(np.searchsorted(self.times, end_s, side="right"))
 
     def at(self, time_s: float) -> tuple[float, float] | None:
-        """The newest number up to a time and when it was; None before the first one, and in a gap."""
+        """Return the newest sample up to a time, with its time; None before the first one, and in a gap."""
         place = int(np.searchsorted(self.times, time_s, side="right")) - 1
         if place < 0:
             return None
@@ -326,7 +326,7 @@ class Samples:
         return float(self._times[place]), float(self._values[place])
 
     def beside(self, time_s: float, steps: int) -> float | None:
-        """The time of the number so many ``steps`` after (or before) a time; None when there is none."""
+        """Return the time of the sample ``steps`` after (or before) a time; None when there is none."""
         if steps > 0:
             place = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
         else:
@@ -334,7 +334,7 @@ class Samples:
         return float(self._times[place]) if 0 <= place < self._count else None
 
     def figures(self, begin_s: float, end_s: float) -> Figures:
-        """The least, the greatest and the mean of a range."""
+        """Return the statistics of a range."""
         first, end = self.places(begin_s, end_s)
         if end <= first:
             return Figures()
@@ -343,9 +343,11 @@ class Samples:
         return Figures(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
 
     def line(self, begin_s: float, end_s: float, columns: int) -> Line:
-        """What to draw of a range on so many pixels: all, or the least and greatest of each pixel.
+        """Return what to draw of a range on ``columns`` pixels.
 
-        One number on each side of the range comes with it, so that the line reaches the edges.
+        All samples, or minimum and maximum per pixel.
+
+        Includes one sample on each side of the range, so that the line reaches the edges.
         """
         first, end = self.places(begin_s, end_s)
         points = end - first
@@ -357,7 +359,7 @@ class Samples:
         return self._peaks(begin_s, end_s, columns, (first, end))
 
     def _whole(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
-        """All numbers between two indexes, NaN in the gaps; one alone between two gaps is a pixel wide."""
+        # NaN at gaps; a sample between two gaps is drawn one pixel wide.
         times, values, gaps = self._times[first:end], self._values[first:end], self._gaps[first:end]
         begins, ends = gaps.copy(), np.append(gaps[1:], end == self._count or self._gaps[end])
         if first == 0:
@@ -374,19 +376,19 @@ class Samples:
 
     def _peaks(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
         width = (end_s - begin_s) / columns
-        if 1e-30 < width < 1e30:  # rounded, so that pixels have the same edges while the plot moves on
+        if 1e-30 < width < 1e30:  # rounded, so that the edges of pixels stay the same while the plot moves
             width = float(np.float32(width))
         begin = float(np.floor(begin_s / width))
-        first, end = begin - 1, begin + columns + 1  # one pixel more, so that the line reaches the edge
+        first, end = begin - 1, begin + columns + 1  # one more pixel, so that the line reaches the edge
         known = self._known(width).part(first, end - 1)
         if len(known.keys) and known.keys[0] == first:
             pixels = _Pixels.joined((known, self._pixels(width, (known.end, end), None, part[1])))
         else:
             place, inside = np.searchsorted(self.times, (width * first, width * begin))
-            alone = bool(place == inside)  # then the number before the range stands in for it
+            alone = bool(place == inside)  # then the sample before the range stands in for it
             pixels = self._pixels(width, (first, end), max(0, int(place) - alone), part[1])
             first += alone
-        sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later ones may get more numbers
+        sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
         kept = pixels.part(first, max(first, min(sure, end - 1)))
         self._drawn = _Drawn(width, self.rewritten, self.begun, kept)
         times, values = pixels.times, pixels.values
@@ -397,7 +399,7 @@ class Samples:
         return Line(times, values, part[1] - part[0], is_whole=False)
 
     def _known(self, width_s: float) -> _Pixels:
-        """What of the pixels that were drawn last is still as it was."""
+        # The part of the last rendering that is still valid.
         drawn = self._drawn
         if drawn.width_s != width_s:
             return _Pixels()
@@ -410,10 +412,8 @@ class Samples:
         return pixels
 
     def _pixels(self, width: float, keys: tuple[float, float], first: int | None, last: int) -> _Pixels:
-        """The pixels from a number to before another; the last has all to before ``last``, too.
-
-        ``first`` is the place of the first number of them; None: where their edge is.
-        """
+        # The last pixel includes all samples before `last`. `first` is the index of the first sample; None:
+        # at the edge of the first pixel.
         edges = width * (keys[0] + np.arange(round(keys[1] - keys[0]) + 1))
         places = np.searchsorted(self._times[:last], edges)
         if first is not None:
@@ -425,13 +425,14 @@ class Samples:
         starts, ends = places[there], places[there + 1]
         low, high = self._least_and_most(starts, ends)
         times, values = np.repeat(edges[there] + width / 2, 2), np.empty(2 * len(there))
-        rising = self._values[ends - 1] < self._values[starts]  # nearer to how the line really runs
+        rising = self._values[ends - 1] < self._values[starts]  # closer to the real shape of the line
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
-        times[1::2] += np.where(low == high, width / 2, 0.0)  # or one alone between two gaps would be nothing
+        # otherwise a sample between two gaps would be invisible
+        times[1::2] += np.where(low == high, width / 2, 0.0)
         return _Pixels(*keys, keys[0] + there.astype(np.float64), times, values, self._gaps[starts])
 
     def _least_and_most(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
-        """Of each range of indexes; none is empty."""
+        # Of each index range; none is empty.
         if len(starts) > FEW_RANGES or ends[-1] - starts[0] > FEW_NUMBERS:
             low, high, _total = self._reduced(starts, ends)
             return low, high
@@ -439,7 +440,7 @@ class Samples:
         return np.array([part.min() for part in parts]), np.array([part.max() for part in parts])
 
     def _reduced(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
-        """The least, greatest and sum of each range of indexes; none is empty. Exact: no bucket is cut."""
+        # Minimum, maximum and sum of each index range; none is empty. Exact: partial buckets use the samples.
         mean_count = float(np.mean(ends - starts))
         fitting = [level for level in self._levels if 4**level.shift <= mean_count * 4]
         if not fitting:
@@ -463,7 +464,7 @@ class Samples:
 def _reduce(
     lows: Floats, highs: Floats, totals: Floats, starts: Indexes, ends: Indexes
 ) -> tuple[Floats, Floats, Floats]:
-    """As `Samples._reduced`; ranges may be empty: then the least is inf, the greatest -inf, the sum 0."""
+    # As `Samples._reduced`, but ranges may be empty: minimum inf, maximum -inf, sum 0.
     low, high = np.full(len(starts), np.inf), np.full(len(starts), -np.inf)
     total = np.zeros(len(starts))
     there = ends > starts
@@ -479,7 +480,7 @@ def _reduce(
 
 
 def _gaps_carried(gaps: NDArray[np.bool_], good: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The gaps with those that what is left out leaves before what comes next."""
+    # Moves the gaps of skipped samples to the next one.
     bad_before = np.concatenate([[False], ~good[:-1]])
     carried = gaps.copy()
     pending = False

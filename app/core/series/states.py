@@ -1,4 +1,4 @@
-"""States over time: texts, and yes or no, as runs of the same value; bounded, with their gaps."""
+"""States over time: text and boolean values as runs of equal values; bounded, with gaps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST_STATE = 200
 
 @dataclass(frozen=True, slots=True)
 class StateRun:
-    """A value that was there from ``begin_s`` until ``end_s``; ``word`` is None where nothing is known."""
+    """Value from ``begin_s`` to ``end_s``; ``word`` is None where unknown."""
 
     begin_s: float
     end_s: float
@@ -23,10 +23,9 @@ class StateRun:
 
 
 class States:
-    """The runs of one field. Of more than 10 000 changes the oldest are forgotten, and counted."""
+    """Runs of one field. Beyond `MOST_RUNS` changes the oldest are evicted and counted."""
 
     def __init__(self, limit: int = MOST_RUNS) -> None:
-        """Nothing is known yet."""
         self._limit = limit
         self._begins: list[float] = []
         self._words: list[str | None] = []
@@ -34,13 +33,12 @@ class States:
         self.forgotten = self.undone = 0
 
     def __len__(self) -> int:
-        """How many runs are kept."""
         return len(self._begins)
 
     def add(self, time_s: float, word: str | None, *, gap: bool = False) -> None:
-        """The field had this value at this time; ``gap``: something is missing right before. None: no value.
+        """Add a value (None: no value) at a time; ``gap``: messages are missing before.
 
-        What comes a little too late changes nothing; much too late says that the clock was set back.
+        Slightly late values are ignored; a very late one means that the clock was set back.
         """
         if self.last_s is not None and time_s < self.last_s:
             if self.last_s - time_s <= LATE_S:
@@ -63,7 +61,7 @@ class States:
             self.forgotten += drop
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Remove all runs."""
         self._begins.clear()
         self._words.clear()
         self.last_s = None
@@ -78,10 +76,9 @@ class States:
     def runs(
         self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
     ) -> Iterator[StateRun]:
-        """The runs that a range sees, oldest first; the newest one ends with the last message.
+        """Yield the runs in a range, oldest first; the newest one ends with the last message.
 
-        With a ``step_s`` one in each such time is enough. ``without``: these words are passed over, and so is
-        what is not known.
+        With ``step_s`` one run per step is enough. ``without``: skip these words, and unknown parts.
         """
         place, end = self._places(begin_s, end_s)
         while place < end:
@@ -90,16 +87,16 @@ class States:
                 place += 1
                 continue
             yield StateRun(at_s, self._end_of(place), word)
-            # the last one that begins within the step may go on beyond it
+            # the last run that begins within the step may extend beyond it
             place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
 
     def words(self, begin_s: float, end_s: float) -> set[str]:
-        """The values that it had in a range."""
+        """Return the values in a range."""
         first, end = self._places(begin_s, end_s)
         return {word for word in set(self._words[first:end]) if word is not None}
 
     def _places(self, begin_s: float, end_s: float) -> tuple[int, int]:
-        """The indexes of the runs that a range sees: the first, and one behind the last."""
+        # Index range of the runs in a time range: first, and one behind the last.
         first = max(0, bisect_right(self._begins, begin_s) - 1)
         return first, bisect_right(self._begins, end_s)
 
@@ -109,18 +106,18 @@ class States:
         return self._begins[place] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
-        """The value at a time; None when none is known."""
+        """Return the value at a time, or None."""
         place = bisect_right(self._begins, time_s) - 1
         return self._words[place] if place >= 0 else None
 
     def changes(self, begin_s: float, end_s: float) -> int:
-        """How often it changed in a range."""
+        """Return the number of changes in a range."""
         first, end = self._places(begin_s, end_s)
         words = [word for word in self._words[first:end] if word is not None]
         return sum(one != other for one, other in pairwise(words))
 
     def lasted_s(self, word: str, begin_s: float, end_s: float) -> float:
-        """How long it had a value in a range."""
+        """Return how long a value lasted in a range, in seconds."""
         return sum(
             max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
             for place in range(*self._places(begin_s, end_s))
