@@ -1,1 +1,1 @@
-"""Reports of problems: crashes as they are noticed and kept, and the one file that a person may give away."""
+"""Problem reports: stored crash reports, and the zip file that the user can share."""

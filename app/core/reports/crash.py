@@ -1,7 +1,7 @@
-"""What a crash is: which part of Studio ended, how, and what it said. Whoever notices one logs it.
+"""Crashes: the part of Studio that ended, how, and its output. The code that detects a crash logs it.
 
-A record with the ``extra`` of `crash_extra` is for the log, as any other, and becomes a crash report where
-Studio keeps them (`app.core.reports.crash_reports.CrashLog`).
+A log record with the ``extra`` of `crash_extra` is also stored as a crash report
+(`app.core.reports.crash_reports.CrashLog`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ CRASH_SIGNALS = frozenset(
     for name in ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV", "SIGSYS", "SIGTRAP")
     if hasattr(signal, name)
 )
-"""By which processes end that nobody asked to end. The system ends by SIGKILL what takes all its memory."""
+"""Signals of an unexpected end. SIGKILL is what the system sends when memory runs out."""
 FIRST_BAD_STATUS = 0xC0000000
-"""On Windows the exit code of a crash is its status, from here on."""
+"""Lowest exit code of a crash on Windows, where it is a status."""
 ASKED_STATUS = 0xC000013A
-"""What Ctrl+C and the end of a session leave on Windows."""
+"""Exit code after Ctrl+C and at the end of a session on Windows."""
 STATUS_WORDS = {
     0xC0000005: "access violation",
     0xC000001D: "illegal instruction",
@@ -34,15 +34,15 @@ STATUS_WORDS = {
     0xC0000409: "abort",
 }
 TRACE_BEGINS = ("Fatal Python error:", "Windows fatal exception:")
-"""How the lines of Python's faulthandler begin."""
+"""First words of a trace of Python's faulthandler."""
 MAYBE_CAUGHT = "Windows fatal exception: code "
 
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """One crash: the part that ended, how in a few English words, and what is known beside (a traceback).
+    """Crash: the part that ended, how (in English), and details such as a traceback.
 
-    ``version`` is that of the Studio that crashed: after an update it is not the one that notices.
+    ``version`` is that of the crashed Studio, which after an update is not the running one.
     """
 
     part: Part
@@ -52,19 +52,19 @@ class Crash:
 
 
 def crash_extra(part: Part, how: str, text: str = "") -> dict[str, object]:
-    """The ``extra`` of a log record that tells of a crash."""
+    """Return the ``extra`` of a log record about a crash."""
     return {"crash": Crash(part, how, text)}
 
 
 def is_crash(code: int) -> bool:
-    """Whether a process with this exit code crashed; negative is the number of a signal."""
+    """Return whether an exit code means a crash; negative ones are numbers of signals."""
     if code < 0:
         return -code in CRASH_SIGNALS
     return code >= FIRST_BAD_STATUS and code != ASKED_STATUS
 
 
 def end_words(code: int) -> str:
-    """How a process ended, in English: "ended by signal 11 (SIGSEGV)"."""
+    """Describe the end of a process in English: "ended by signal 11 (SIGSEGV)"."""
     if code < 0:
         try:
             name = f" ({signal.Signals(-code).name})"
@@ -78,7 +78,7 @@ def end_words(code: int) -> str:
 
 
 def split_trace(said: str) -> tuple[str, str]:
-    """What a process said by itself, and what Python's faulthandler said of its crash behind that ("")."""
+    """Split a process's output into its own part and the trace of Python's faulthandler, or ""."""
     lines = said.splitlines(keepends=True)
     for place, line in enumerate(lines):
         if line.startswith(TRACE_BEGINS):
@@ -87,10 +87,9 @@ def split_trace(said: str) -> tuple[str, str]:
 
 
 def fatal_line(trace: str) -> str:
-    """The line of a trace that says how a process ended; "" when none does.
+    """Return the line of a trace that names the cause, or "".
 
-    On Windows faulthandler also writes of exceptions with a number that a library of the system raises and
-    catches itself.
+    On Windows faulthandler also writes exceptions that a system library raises and catches itself.
     """
     told = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
     return next((line for line in reversed(told) if not line.startswith(MAYBE_CAUGHT)), "")

@@ -1,4 +1,4 @@
-"""The crash reports that are kept: a text file each, the newest ten. The next start offers each once."""
+"""Stored crash reports: one text file each, the newest ten. The next start offers each once."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _log = logging.getLogger("studio.crashes")
 
 @dataclass(frozen=True, slots=True)
 class CrashReport:
-    """A report that is kept: its file, which part crashed, when it was noticed, whether nobody was told."""
+    """Stored crash report: file, crashed part, time of detection, and whether it was not offered yet."""
 
     path: Path
     part: Part
@@ -54,15 +54,15 @@ class CrashReport:
 
 
 class CrashReports:
-    """The reports in a folder. Several Studios may use it; nothing here raises for what the disk refuses."""
+    """Crash reports in a folder, shared by all instances. Disk errors are never raised."""
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
-        """They are in ``folder`` (default: ``crashes`` beside the log files); ``clock`` gives epoch s."""
+        # `folder` defaults to `crashes` beside the log files; `clock` is epoch seconds.
         self._folder = folder if folder is not None else log_folder() / "crashes"
         self._clock = clock
 
     def add(self, crash: Crash) -> Path | None:
-        """Keep a report, of the oldest no more than ten; its file, None when it can't be kept."""
+        """Store a report and evict old ones; return its file, or None when it can't be written."""
         now = self._clock()
         try:
             path = self._free(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
@@ -71,18 +71,18 @@ class CrashReports:
             _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
             return None
         for old in self.all()[MOST:]:
-            with suppress(OSError):  # another Studio was quicker
+            with suppress(OSError):  # another instance was faster
                 old.path.unlink(missing_ok=True)
         return path
 
     def _free(self, stem: str) -> Path:
-        """A file of this name that is not there, told or not."""
+        # An unused name, considering both offered and new reports.
         taken = {each.path.name.replace(".new.txt", ".txt") for each in self.all()}
         names = (stem, *(f"{stem} {number}" for number in range(2, len(taken) + 3)))
         return self._folder / f"{next(name for name in names if f'{name}.txt' not in taken)}.new.txt"
 
     def all(self) -> list[CrashReport]:
-        """The reports that are kept, the newest first."""
+        """Return the stored reports, newest first."""
         try:
             found = [_report(path) for path in self._folder.glob("crash *.txt")]
         except OSError:
@@ -91,42 +91,42 @@ class CrashReports:
         return sorted(known, key=lambda each: (each.noticed_s, each.path.name), reverse=True)
 
     def take_new(self) -> list[CrashReport]:
-        """Those that nobody was told of, the newest first; nobody gets them again.
+        """Return new reports, newest first, and mark them as offered.
 
-        One that can't be marked as told is not returned: it would be told at each start.
+        A report that can't be marked is omitted: it would be offered at each start.
         """
         taken = []
         for each in self.all():
             if each.is_new:
                 told = each.path.with_name(each.path.name.replace(".new.txt", ".txt"))
-                with suppress(OSError):  # another Studio took it, or the disk can't be written
+                with suppress(OSError):  # another instance took it, or the disk is read-only
                     replace_file(each.path, told)
                     taken.append(CrashReport(told, each.part, each.noticed_s, is_new=False))
         return taken
 
 
 class CrashLog(logging.Handler):
-    """Makes a report of each log record that tells of a crash; of a crash that comes again, now and then."""
+    """Logging handler that stores a report for each crash record; repetitions are throttled."""
 
     def __init__(self, reports: CrashReports) -> None:
         super().__init__(logging.WARNING)
         self._reports, self._once = reports, RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a report when the record has a crash with it (`app.core.reports.crash.crash_extra`)."""
+        """Store a report if the record has a crash (`app.core.reports.crash.crash_extra`)."""
         crash = getattr(record, "crash", None)
         if isinstance(crash, Crash) and self._once.filter(record) is not None:
             self._reports.add(crash)
 
 
 def offer(alerts: Alerts, reports: CrashReports) -> None:
-    """Say once what crashed since the last start, with a button that leads to the report of a problem."""
+    """Alert crashes since the last start once, with a button for a problem report."""
     found = reports.take_new()
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))
         version = _version_of(worst)
         told = [_(DETAIL)]
-        if version not in {"", __version__}:  # it may be mended already
+        if version not in {"", __version__}:  # it may be fixed already
             told.insert(0, _(OF_ANOTHER).format(version=version, own=__version__))
         alerts.put(
             ALERT, "warn", _(TITLES[worst.part]), " ".join(told), button=_("Report a problem"), action=OFFER
@@ -134,7 +134,7 @@ def offer(alerts: Alerts, reports: CrashReports) -> None:
 
 
 def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
-    """The file names and the texts of reports; what can't be read is left out."""
+    """Return the file names and texts of reports; unreadable ones are skipped."""
     found = []
     for each in reports:
         with suppress(OSError):
@@ -143,7 +143,7 @@ def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
 
 
 def _version_of(report: CrashReport) -> str:
-    """The version that crashed, as the report's first line has it; "" when it has none."""
+    # From the report's first line; "" if it has none.
     try:
         first = read_whole(report.path, LARGEST_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
     except OSError:
@@ -153,7 +153,7 @@ def _version_of(report: CrashReport) -> str:
 
 
 def _text(crash: Crash, now_s: float) -> str:
-    """For developers, so in English."""
+    # For developers, therefore in English.
     noticed = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now_s))
     by = "" if crash.version == __version__ else f" by NEP Studio {__version__}"
     lines = (

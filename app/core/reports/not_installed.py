@@ -1,7 +1,7 @@
-"""What Studio needs and this computer lacks: packages of Python, and system libraries of Qt on Linux.
+"""Missing dependencies: Python packages, and system libraries of Qt on Linux.
 
-Wheels of PySide6 bring no system libraries, and Python's error names only the first one that is missing.
-It imports nothing that is not there without the extra ``studio``.
+Wheels of PySide6 contain no system libraries, and Python's error names only the first missing one. This
+module imports nothing that the extra ``studio`` installs.
 """
 
 from __future__ import annotations
@@ -56,10 +56,8 @@ LIBRARIES: Mapping[str, str] = {
     "libxkbfile.so.1": "libxkbfile1",
     "libz.so.1": "zlib1g",
 }
-"""Each library with its package in Debian and Ubuntu; `tools/system_packages.py` installs them.
-
-What only the plug-in for X11 needs, such as libxcb-cursor0, Qt itself names when it starts.
-"""
+"""Library names with their packages in Debian and Ubuntu; `tools/system_packages.py` installs them. Libraries
+that only the X11 plug-in needs, such as libxcb-cursor0, are reported by Qt itself at the start."""
 EXTRA_MODULES = (
     "PySide6",
     "cv2",
@@ -71,7 +69,7 @@ EXTRA_MODULES = (
     "platformdirs",
     "pyqtgraph",
 )
-"""Modules of the extra ``studio`` in pyproject.toml without which there is no window."""
+"""Modules of the extra ``studio`` in pyproject.toml that the window needs."""
 _RENAMED = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
 _RENAMED_SINCE = {"debian": 13.0, "ubuntu": 24.04}
 _UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
@@ -79,19 +77,19 @@ _UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
 
 @dataclass(frozen=True)
 class MissingLibraries:
-    """What is missing: names of libraries, and the packages that bring those whose package is known."""
+    """Missing libraries, and their packages where known."""
 
     names: tuple[str, ...]
     packages: tuple[str, ...]
 
     @property
     def command(self) -> str:
-        """What installs them on Debian and Ubuntu; "" when no package is known."""
+        """Command that installs them on Debian and Ubuntu; "" when no package is known."""
         return f"sudo apt install {' '.join(self.packages)}" if self.packages else ""
 
     @property
     def start_title(self) -> str:
-        """Say that there can be no window."""
+        """Sentence that the window can't be opened."""
         words = ngettext(
             "NEP Studio can't start: the system library {names} is missing.",
             "NEP Studio can't start: the system libraries {names} are missing.",
@@ -101,7 +99,7 @@ class MissingLibraries:
 
     @property
     def start_remedy(self) -> str:
-        """Say how to get a window."""
+        """Sentence how to fix that."""
         if not self.command:
             return _("Install the package that contains it, then start Studio again.")
         words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
@@ -109,7 +107,7 @@ class MissingLibraries:
 
     @property
     def title(self) -> str:
-        """Say that there can be no block editor."""
+        """Sentence that the block editor can't be opened."""
         words = ngettext(
             "The block editor can't open: the system library {names} is missing.",
             "The block editor can't open: the system libraries {names} are missing.",
@@ -119,7 +117,7 @@ class MissingLibraries:
 
     @property
     def remedy(self) -> str:
-        """Say how to get the block editor."""
+        """Sentence how to fix that."""
         if not self.command:
             return _(
                 "Install the package that contains it, then start Studio again. The Developer layout works "
@@ -136,10 +134,10 @@ def missing_libraries(
     load: Callable[[str], object] = ctypes.CDLL,
     release: Callable[[], Mapping[str, str]] = platform.freedesktop_os_release,
 ) -> MissingLibraries | None:
-    """Return all libraries that are missing where an import failed because of one; None for other errors.
+    """Return all missing libraries after an import failed because of one; None for other errors.
 
-    Python's error names one of them; the others are looked for by loading each that Qt may need. A library
-    also fails to load when one that it needs itself is missing: then that one is named.
+    Python's error names one; the others are found by loading each that Qt may need. A library also fails to
+    load when a dependency is missing: then the dependency is returned.
     """
     named = _named_in(str(error))
     if not named:
@@ -154,12 +152,12 @@ def missing_libraries(
 
 
 def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
-    """Put the alert that the block editor can't open, on the start page already."""
+    """Show the alert that the block editor can't be opened, already on the start page."""
     alerts.put(ALERT, "error", missing.title, missing.remedy, count=0)
 
 
 def _named_in(error: str) -> str:
-    """Return the library that an error of the dynamic linker names; "" when it names none."""
+    # From an error of the dynamic linker; "" when it names none.
     found = _UNOPENED.search(error)
     return found[1] if found is not None else ""
 
@@ -168,7 +166,7 @@ def why_not_imported(
     error: ImportError,
     is_installed: Callable[[str], bool] = lambda name: bool(importlib.util.find_spec(name)),
 ) -> str:
-    """Return what is missing and how to install it; "" when the error is about something else."""
+    """Return the missing packages and how to install them; "" for other import errors."""
     package = (error.name or "").partition(".")[0]
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]
@@ -188,7 +186,7 @@ def _missing(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -
 
 
 def _has_time64_names(release: Callable[[], Mapping[str, str]]) -> bool:
-    """Whether this is a Debian or Ubuntu whose packages were renamed for 64-bit times."""
+    # Debian or Ubuntu with packages renamed for 64-bit times.
     try:
         told = release()
         return float(told.get("VERSION_ID", "0")) >= _RENAMED_SINCE[told.get("ID", "")]

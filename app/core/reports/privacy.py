@@ -1,4 +1,4 @@
-"""What leaves this computer in a report, and what does not: the home folder's name, settings, secrets."""
+"""Privacy of reports: the home folder, settings and secrets that stay on this computer."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ HARMLESS = frozenset({
     "begun", "first_steps", "format", "high_contrast", "language", "layout", "less_motion", "robots_heard",
     "shortcuts", "text_percent", "theme", "toolbox_pinned", "virtual_robots_come_back", "window",
 })  # fmt: skip
-"""The settings that go into a report. Of all others only the names do: what a later version keeps here, say
-keys of networks and access codes, stays here until somebody has thought about it."""
+"""Settings that a report includes. Of others only the names are included: future settings, such as keys of
+networks and access codes, stay private until they are added here."""
 LEFT_OUT = "(left out)"
 _END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
 
 
 def without_home(text: str, folder: Path | None = None) -> str:
-    """The text with ``~`` for the home folder, however that is written: also in JSON, or in a URL."""
+    """Replace the home folder by ``~`` in all its spellings: also in JSON, or in a URL."""
     home = str(folder if folder is not None else Path.home()).rstrip("/\\")
-    if len(home) < 2:  # the home of nobody is the root: every path would be shortened
+    if len(home) < 2:  # a home folder "/" would shorten every path
         return text
     slashes = home.replace("\\", "/")
     forms = {home, slashes, home.replace("\\", "\\\\"), quote(slashes), quote(slashes, safe="/:")}
@@ -32,5 +32,5 @@ def without_home(text: str, folder: Path | None = None) -> str:
 
 
 def shown_settings(values: Mapping[str, object]) -> dict[str, object]:
-    """The settings as a report has them: harmless ones whole, of all others the names."""
+    """Return the settings for a report: harmless ones with values, of others only the names."""
     return {name: value if name in HARMLESS else LEFT_OUT for name, value in sorted(values.items())}

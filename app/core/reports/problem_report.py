@@ -1,6 +1,6 @@
-"""The report of a problem: one zip that a person may give to somebody. Nothing is ever sent from here.
+"""Problem report: a zip file for the user to share. Studio never sends it.
 
-What is for developers in it is in English; what goes in is said to the person before (`what_goes_in`).
+Content for developers is in English; the user sees the list of contents first (`what_goes_in`).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ Facts = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class ReportedWork:
-    """An open behaviour as it is now: its name, and its file's bytes."""
+    """Open behaviour in its current state: name, and file content."""
 
     name: str
     data: bytes
@@ -66,9 +66,9 @@ class ReportedWork:
 
 @dataclass(frozen=True)
 class ReportParts:
-    """Where a report comes from: what the window knows, the folders, and ``doctor``, which may take a while.
+    """Sources of a report: information of the window, folders, and ``doctor``, which may take a while.
 
-    ``facts`` are what only the window knows: of Qt and of the screen.
+    ``facts`` are known only to the window: versions of Qt, and the screen.
     """
 
     facts: Facts
@@ -79,12 +79,12 @@ class ReportParts:
 
 
 def file_name(now_s: float) -> str:
-    """The name that a report has at first."""
+    """Return the default file name of a report."""
     return f"nep-studio-report-{time.strftime('%Y-%m-%d', time.localtime(now_s))}{ENDING}"
 
 
 def what_goes_in(parts: ReportParts) -> list[str]:
-    """What a report has in it, a short line each, for the person who is to decide."""
+    """Return the list of contents, one line each, for the user's decision."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
         _("The versions of Studio, Python, Qt and this system, and the size of the screen"),
@@ -102,12 +102,12 @@ def what_goes_in(parts: ReportParts) -> list[str]:
 
 
 def work_words(names: Sequence[str]) -> str:
-    """Which behaviours would go in."""
+    """Return the line about included behaviours."""
     return _("Current settings: {names}").format(names=listed([f"“{name}”" for name in names]))
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
-    """The zip. It takes a moment, and as long as the doctor: not for the window's thread."""
+    """Create the zip. Slow because of the doctor, so don't call it in the window's thread."""
     files: list[tuple[str, bytes]] = [
         ("README.txt", READ_ME.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
@@ -116,7 +116,7 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
         ("doctor.txt", _private(parts.doctor())),
     ]
     for path in _logs(parts.log):
-        with suppress(OSError):  # it was moved on, or nobody may read it: the others tell
+        with suppress(OSError):  # rotated or unreadable; the other files are included
             files.append((f"log/{path.name}", _private(read_whole(path).decode("utf-8", "replace"))))
     for name, data in texts(parts.crashes.all()):
         files.append((f"crashes/{name}", _private(data.decode("utf-8", "replace"))))
@@ -129,7 +129,7 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
 
 
 def write_report(path: Path, data: bytes) -> None:
-    """Write the zip, whole or not at all. Raises ReportError with what to do next."""
+    """Write the zip atomically. Raises ReportError with the next step."""
     try:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
@@ -140,24 +140,24 @@ def write_report(path: Path, data: bytes) -> None:
 
 
 class ReportWriter:
-    """Makes and writes one report in a thread of its own, which ends with it."""
+    """Creates and writes one report in a thread of its own."""
 
     def __init__(self, path: Path, make: Callable[[], bytes]) -> None:
-        """Begin at once; ``make`` is called in the thread."""
+        # Starts at once; `make` is called in the thread.
         self.path = path
         self.problem = ""
-        """Why it could not be written, in a sentence without a full stop; "" while nothing is wrong."""
+        """Sentence without a full stop why it could not be written, or ""."""
         self._make = make
         self._thread = threading.Thread(target=self._work, name="studio-report")
         self._thread.start()
 
     @property
     def is_done(self) -> bool:
-        """Whether it is written, or has failed."""
+        """True if it has been written, or failed."""
         return not self._thread.is_alive()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for it; whether it is done."""
+        """Wait for it; return whether it is done."""
         self._thread.join(timeout_s)
         return self.is_done
 
@@ -166,7 +166,7 @@ class ReportWriter:
             write_report(self.path, self._make())
         except ReportError as error:
             self.problem = str(error)
-        except Exception as error:  # noqa: BLE001  a report of problems must not have one that nobody hears of
+        except Exception as error:  # noqa: BLE001  shown to the user
             _log.exception("can't make a report")
             self.problem = _("can't write the report: {error}").format(error=error_words(error))
 
@@ -187,7 +187,7 @@ def _settings(values: Mapping[str, object]) -> str:
 
 
 def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
-    """The behaviours as files, each under a name of its own that every system takes."""
+    # Each with a unique name that is valid on every system.
     found: dict[str, bytes] = {}
     for each in work:
         plain = "".join(c if c.isalnum() or c in " -_," else "_" for c in each.name)[:LONGEST_NAME].strip()
@@ -206,7 +206,7 @@ def _versions(parts: ReportParts) -> str:
 
 
 def _own_facts() -> Facts:
-    """What is known without a window."""
+    # Available without a window.
     memory = psutil.virtual_memory()
     names = ("XDG_SESSION_TYPE", "XDG_CURRENT_DESKTOP", "QT_QPA_PLATFORM", "NEP_MASTER", "NEP_LANG")
     return (

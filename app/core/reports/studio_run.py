@@ -1,7 +1,7 @@
-"""Whether Studio ended in order: a run leaves a mark, and the next start reads those that are still there.
+"""Detection of crashes of Studio: each run creates a marker, and the next start checks remaining ones.
 
-Each run has a mark of its own (so has each window), with the lock that its process holds; a file beside it in
-which Python writes where native code crashed; and takes both away when it ends in order.
+Each run (each window) has its own marker, locked by its process, and a trace file for crashes in native code;
+it deletes both at a normal end.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ else:
 LOG_LINES = 80
 MOST_TRACE = 1_000_000
 CLOCK_S = 2.0
-"""By so much what the system says of a process's begin may differ from the clock."""
+"""Tolerance between the system's start time of a process and the clock."""
 WITHOUT_A_WORD = (
     "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
     "computer's session ended"
@@ -48,7 +48,7 @@ _log = logging.getLogger("studio.run")
 
 
 class StudioRun:
-    """This run of Studio, from `begin` to `end`; as a context manager, an exception that ends it is kept."""
+    """Run of Studio, from `begin` to `end`. As a context manager it stores an exception that ends it."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class StudioRun:
         log: Path | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """Marks are in ``folder`` (default: ``runs`` in the folder for state), traces in that of the log."""
+        # Markers are in `folder` (default: `runs` in the state folder), traces in the log folder.
         self._folder = folder if folder is not None else state_home() / "runs"
         self._log = log if log is not None else log_folder()
         self._clock = clock
@@ -67,11 +67,11 @@ class StudioRun:
 
     @property
     def is_noted(self) -> bool:
-        """Whether there is a mark: without, nobody will know how this run ended."""
+        """True if the marker exists; otherwise a crash of this run will not be detected."""
         return self._mark.exists()
 
     def begin(self) -> None:
-        """Leave the mark. Where nothing can be written there is none, and one line in the log says so."""
+        """Create the marker. Logs one line if it can't be written."""
         self._began_s = self._clock()
         try:
             self._write(asked=False)
@@ -82,33 +82,32 @@ class StudioRun:
             _log.warning("if Studio crashes, the next start will not know: %s", error, extra=IN_CONSOLE)
 
     def expect_end(self) -> None:
-        """Somebody, or the end of the session, asks Studio to end: if it ends now, that is no crash."""
+        """Record that Studio was asked to end, so that its end does not count as a crash."""
         if self.is_noted:
             with contextlib.suppress(OSError):
                 self._write(asked=True)
 
     def end(self) -> None:
-        """It ends in order."""
+        """Delete the marker: Studio ends normally."""
         self._take_away()
 
     def __enter__(self) -> Self:
-        """Begin."""
         self.begin()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End; an exception that nobody caught is reported before it goes on."""
+        # An uncaught exception is stored and propagates.
         if isinstance(error, Exception):
             told = "".join(traceback.format_exception(kind, error, trace))
             CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_words(error), told))
         self.end()
 
     def left(self) -> list[Crash]:
-        """The runs that did not end in order; each is told to one caller only.
+        """Return crashed runs; each is returned to one caller only.
 
-        A run that the computer's own restart ended is none, nor one that was asked to end.
+        Runs ended by a restart of the computer, or after a request to end, don't count.
         """
         try:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]
@@ -144,26 +143,27 @@ class StudioRun:
         self._lock.release()
         _remove(self._mark, self._log)
 
-    # -- those before ---------------------------------------------------------------------------------------
+    # -- earlier runs
+    # -----------------------------------------------------------------------------------------
 
     def _look(self, mark: Path) -> Crash | None:
         lock = FileLock(mark)
         if not lock.acquire():
-            return None  # its process lives
+            return None  # its process is running
         judged: tuple[Mapping[str, object], float] | None = None
         try:
             entry = json.loads(read_whole(mark))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
-            if _runs(pid, began_s):  # on a disk without locks
+            if _runs(pid, began_s):  # on a file system without locks
                 return None
-            mark.unlink()  # who can do so tells of it
+            mark.unlink()  # only one instance succeeds, which then reports it
             judged = entry, began_s
         except OSError:
             return None
         except (ValueError, TypeError, KeyError, RecursionError):
-            pass  # it is damaged, and tells nothing
+            pass  # damaged, so nothing is known
         finally:
-            lock.release()  # before it is removed: Windows removes no file that is open
+            lock.release()  # before it is deleted: Windows can't delete an open file
         trace = self._trace_of(mark)
         _remove(mark, self._log)
         return self._judged(*judged, trace) if judged is not None else None
@@ -204,7 +204,7 @@ def _remove(mark: Path, log: Path) -> None:
 
 
 def _runs(pid: int, began_s: float) -> bool:
-    """Whether the process of that number lives and is as old as the mark: numbers are given out again."""
+    # Checks the start time too, because process ids are reused.
     try:
         process = psutil.Process(pid)
         is_old = process.create_time() <= began_s + CLOCK_S

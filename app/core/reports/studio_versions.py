@@ -1,4 +1,4 @@
-"""Which versions of Studio ran here, and since when: what went wrong after an update is looked for there."""
+"""History of Studio's versions on this computer, for diagnosing problems after an update."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from collections.abc import Mapping
 from nep.version import __version__
 
 KEY = "studio_versions"
-"""The name of the setting: the versions, the newest last, each with the time of its first start (epoch s)."""
+"""Setting with the versions, newest last, each with the time of its first start (epoch seconds)."""
 MOST = 10
 PLAIN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
-"""What a version looks like; nothing else is taken out of a file."""
+"""Valid version; anything else in a file is ignored."""
 EARLIER = "earlier"
-"""Stands for the versions that kept settings, but not yet this; they began at no known time (0)."""
+"""Placeholder for versions before this setting existed; start time 0."""
 _LATEST_S = 1e10
-"""No time is later: a damaged file may have one that no calendar can show."""
+"""Latest valid time: a damaged file may have one that the calendar doesn't support."""
 
 Kept = list[dict[str, object]]
 
 
 def plain_version(value: object) -> str:
-    """What a file says of a version; "" for what is none."""
+    """Return a version from a file; "" if it is invalid."""
     return value if isinstance(value, str) and PLAIN.fullmatch(value) else ""
 
 
 def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
-    """The versions in the settings and their first starts (epoch s), the newest last; no damaged one."""
+    """Return valid versions in the settings with their first starts (epoch seconds), newest last."""
     entries = values.get(KEY)
     found = []
     for entry in entries if isinstance(entries, list) else ():
@@ -47,7 +47,7 @@ def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
 def with_this_version(
     values: Mapping[str, object], now_s: float, *, is_first: bool, version: str = __version__
 ) -> Kept | None:
-    """What to keep now that this version runs; None when it ran last, too.
+    """Return the value to save for this version; None when it was also the last one.
 
     ``is_first``: no Studio ran here before.
     """
@@ -58,7 +58,7 @@ def with_this_version(
 
 
 def used_here(values: Mapping[str, object]) -> str:
-    """The versions in one line, for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
+    """Format the versions for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
     told = [
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
         for version, since_s in known(values)
