@@ -1,4 +1,4 @@
-"""What moves: who has been quiet for a minute, and how often services are called."""
+"""Activity: nodes without traffic for a minute, and call rates of services."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from app.core.networks.kinds import kind_named
 QUIET_S = 60.0
 CALLS_OVER_S = 60.0
 LOOKS = 61
-"""Looks at services that are kept: one a second."""
+"""Number of stored samples of the call counts: one a second."""
 
 
 class QuietNodes:
-    """Follows the counters of every node. One thread uses it (the window's).
+    """Finds quiet nodes by their counters. Not thread-safe: use it from the window's thread.
 
-    What nobody counts is not quiet: a network that tells no figures, an original program that only hears.
+    Nodes without counters are not quiet: those of a network without statistics, an original program that only
+    subscribes.
     """
 
     def __init__(self) -> None:
-        """Know nobody yet."""
         self._counted: dict[str, tuple[int, float]] = {}
 
     def update(self, facts: GraphFacts, now: float) -> None:
-        """Take over new figures; ``now`` is a monotonic clock in s. Who is new has just moved."""
+        """Apply new statistics; ``now`` is monotonic seconds. New nodes count as active."""
         sums = {entry.key: 0 for entry in facts.nodes if entry.gone_s is None}
         unknown = {
             entry.key
@@ -48,24 +48,23 @@ class QuietNodes:
                 self._counted[entry] = total, now if moved or had is None else had[1]
 
     def quiet(self, now: float) -> frozenset[str]:
-        """The keys of those without a message or a call for `QUIET_S` at this time."""
+        """Return the keys of nodes without a message or call for `QUIET_S`."""
         return frozenset(entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_S)
 
 
 class CallRates:
-    """How often services are called, over a minute. One thread uses it (the window's)."""
+    """Call rates of services over a minute. Not thread-safe: use it from the window's thread."""
 
     def __init__(self) -> None:
-        """Know no service yet."""
         self._looks: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=LOOKS)
 
     def update(self, facts: GraphFacts, now: float) -> None:
-        """Take over the counts of calls; a look within a second of the last one adds nothing."""
+        """Apply call counts; ignored within a second of the last ones."""
         if not self._looks or now - self._looks[-1][0] >= 1.0:
             self._looks.append((now, {name: info.calls for name, info in facts.services.items()}))
 
     def rates_hz(self) -> dict[str, float]:
-        """Calls a second by service; a service that has not been known for two looks is not in it."""
+        """Return calls per second by service; services with fewer than two samples are omitted."""
         if len(self._looks) < 2:
             return {}
         last_at, last = self._looks[-1]
@@ -82,7 +81,7 @@ class CallRates:
 
 
 def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
-    """(key of an entry, messages or calls so far); None where nobody counts them. nep's own say nothing."""
+    # (key of a node, messages or calls so far); None where not counted. Internal topics are skipped.
     for topic in facts.topics:
         if topic.info is None or topic.name.startswith(OWN):
             continue

@@ -1,4 +1,4 @@
-"""The graph in DOT, the language of Graphviz, for other programs."""
+"""Export of the graph to DOT, the language of Graphviz."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from app.core.graph.node_graph import GraphLine, NodeGraph
 
 
 def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
-    """The graph as a text. ``group_names`` by key; ``label`` says what stands at a line."""
+    """Return the graph as DOT. ``group_names`` is by key; ``label`` returns the label of a line."""
     names = {node.key: f"n{number}" for number, node in enumerate(graph.nodes)}
     lines = ["digraph nodes {", "  rankdir=LR;", "  node [shape=box, style=rounded];"]
     inside: dict[str, list[str]] = {}
@@ -35,6 +35,6 @@ def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[Gr
 
 
 def quoted(text: str) -> str:
-    r"""A text in DOT's quotation marks: its own marks and backslashes stay, its lines end by ``\n``."""
+    r"""Quote a string for DOT: quotes and backslashes are escaped, line breaks become ``\n``."""
     kept = text.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "")
     return '"' + "\\n".join(kept.splitlines() or [""]) + '"'

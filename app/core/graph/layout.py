@@ -1,8 +1,8 @@
-"""Where everything stands: layered by a library at first, and what is there keeps its place when others come.
+"""Layout of the graph: layered by a library first; existing nodes keep their places when others appear.
 
-The library (graphlay) puts nodes into layers so that few lines cross, and leads lines round nodes. It is
-asked for places once; after that only for the ways of lines. All lengths are pixels at 100 % zoom, x to the
-right and y downwards, places are middles.
+The library (graphlay) places nodes in layers with few crossings, and routes lines around nodes. It computes
+places once; later only routes. All lengths are pixels at 100 % zoom, x to the right and y down; places are
+centres.
 """
 
 from __future__ import annotations
@@ -23,26 +23,27 @@ Place = tuple[float, float]
 Box = tuple[float, float, float, float]
 """Left, top, width, height."""
 RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
-"""A line's key, and from whom to whom."""
+"""Key of a line, source node, target node."""
 
 MOST_ROUTES = 6000
-"""Ways that are found and drawn; of more, those of the lines with the most ends are left out, and counted."""
+"""Maximum number of drawn routes; of more, those of lines with the most ends are omitted and counted."""
 MOST_PLACES = 4000
-"""Places that are kept of those who left, so that they find theirs again."""
+"""Maximum number of places kept of nodes that left, for their return."""
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ALONE_COLUMNS = 4
-"""Nodes that talk with nobody of their group stand in so many columns."""
+"""Number of columns for nodes without lines within their group."""
 MANY = 60
-"""From so many boxes on the library takes less trouble."""
+"""Number of boxes from which the library uses less effort."""
 MOST_LED = 400
-"""Of more ways none is led round nodes, which would take many seconds: they run straight."""
+"""Maximum number of routes around nodes, which would take many seconds beyond: then they are straight."""
 WIDEST, ASPECT = 3.0, 1.6
-"""A row of groups that is wider than so many times its height is broken into rows of about this shape."""
+"""Maximum ratio of width to height of a row of groups; a wider one is broken into rows of about this shape.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class LayoutSizes:
-    """How large things are: a node, a group's head, the room around its nodes, the line about quiet ones."""
+    """Sizes: a node, a group's header, the margins around its nodes, the line about quiet nodes."""
 
     node: Place = (152.0, 48.0)
     head: float = 36.0
@@ -51,7 +52,7 @@ class LayoutSizes:
     letter: float = 8.0
 
     def scaled(self, share: float) -> LayoutSizes:
-        """The same for text of another size."""
+        """Return the sizes for another text size."""
         wide, high = self.node
         return LayoutSizes(
             (wide * share, high * share),
@@ -64,10 +65,10 @@ class LayoutSizes:
 
 @dataclass(frozen=True, slots=True)
 class GraphLayout:
-    """Where boxes and groups stand and how lines run.
+    """Positions of boxes and groups, and routes of lines.
 
-    ``kept`` are places of those who are gone, by key, the oldest first. ``routes`` begin and end at the edges
-    of boxes. ``left_out`` ways were too many. ``is_plain``: the library failed, and boxes stand in rows.
+    ``kept`` are places of nodes that left, by key, oldest first. ``routes`` begin and end at the edges of
+    boxes. ``left_out`` counts omitted routes. ``is_plain``: the library failed, and boxes are in rows.
     """
 
     places: Mapping[str, Place] = field(default_factory=dict)
@@ -78,7 +79,7 @@ class GraphLayout:
     is_plain: bool = False
 
     def bounds(self, sizes: LayoutSizes) -> Box:
-        """The box around everything; of size 0 when there is nothing."""
+        """Return the bounding box of everything; of size 0 when empty."""
         boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.places.values())]
         boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
         return _around(boxes)
@@ -87,10 +88,10 @@ class GraphLayout:
 def arrange(
     graph: NodeGraph, before: GraphLayout | None = None, sizes: LayoutSizes | None = None
 ) -> GraphLayout:
-    """Give everything in ``graph`` a place; what has one in ``before`` keeps it.
+    """Compute the layout of ``graph``; nodes with a place in ``before`` keep it.
 
-    Everything is placed anew without ``before``, or when more came than stayed. May take seconds for hundreds
-    of nodes: `LayoutThread` calls it.
+    Everything is placed again without ``before``, or when more nodes appeared than stayed. Takes seconds for
+    hundreds of nodes, so that `LayoutThread` calls it.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
     ways, left_out = _ways(graph)
@@ -113,7 +114,7 @@ def arrange(
 
 
 def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
-    """Everything in rows, without the library: when that failed, or took too long."""
+    """Lay everything out in rows without the library, when that failed or took too long."""
     places = _in_rows(graph, sizes)
     ways, left_out = _ways(graph)
     return GraphLayout(
@@ -127,7 +128,7 @@ def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
 
 
 def _ways(graph: NodeGraph) -> tuple[list[RouteKey], int]:
-    """Every way of every line, lines with few ends first; and how many are left out."""
+    # Routes of lines with few ends first; and the number of omitted ones.
     found: list[RouteKey] = []
     left_out = 0
     for line in sorted(graph.lines, key=_ends_of):
@@ -163,10 +164,7 @@ def _options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
 
 
 def _placed(graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes) -> tuple[dict[str, Place], bool]:
-    """Everything placed anew; and whether that was done without the library, which failed.
-
-    First the nodes within each group, then the groups among each other.
-    """
+    # First the nodes within each group, then the groups. Also returns whether the library failed.
     inside: dict[str, list[str]] = {}
     for node in graph.nodes:
         inside.setdefault(node.group, []).append(node.key)
@@ -202,7 +200,6 @@ def _placed(graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes) -> t
 def _place_block(
     keys: Sequence[str], ways: Sequence[RouteKey], sizes: LayoutSizes, effort: str
 ) -> dict[str, Place]:
-    """The nodes of one group among each other."""
     if len(keys) == 1:
         return {keys[0]: (0.0, 0.0)}
     index = {key: number for number, key in enumerate(keys)}
@@ -214,7 +211,7 @@ def _place_block(
 
 
 def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes: LayoutSizes) -> Box:
-    """What a group takes of the drawing; of a node without a group the node itself."""
+    # Bounding box of a group; of a node without a group the node itself.
     group = next((each for each in graph.groups if each.key == block and not each.is_closed), None)
     box = _around(_box_at(place, sizes.node) for place in places.values())
     if group is None:
@@ -224,7 +221,7 @@ def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes:
 
 
 def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Place]:
-    """The middles of boxes of any size among each other."""
+    # Centres of boxes of any size.
     if len(boxes) == 1:
         return dict.fromkeys(boxes, (0.0, 0.0))
     index = {block: number for number, block in enumerate(boxes)}
@@ -241,7 +238,7 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
 
 
 def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[str, Place]:
-    """Many groups that would stand in one long row, in several rows, in the same order."""
+    # Breaks one long row of groups into several, in the same order.
     area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
     room = max(math.sqrt(area * ASPECT), *(box[2] for box in boxes.values()))
     found: dict[str, Place] = {}
@@ -258,7 +255,7 @@ def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[
 def _routed(
     places: Mapping[str, Place], ways: Sequence[RouteKey], sizes: LayoutSizes
 ) -> dict[RouteKey, tuple[Place, ...]]:
-    """How lines run round the boxes; {} when the library can't tell: then they run straight."""
+    # Routes around the boxes; {} when the library fails: then they are straight.
     if not ways or len(ways) > MOST_LED:
         return {}
     index = {key: number for number, key in enumerate(places)}
@@ -296,11 +293,11 @@ def _point(told: Mapping[str, float]) -> Place:
     return float(told["x"]), float(told["y"])
 
 
-# -- without it ----------------------------------------------------------------------------------------------
+# -- without the library ---------------------------------------------------------------------------------
 
 
 def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
-    """Each group a column of its own, side by side."""
+    # Each group is a column.
     wide, high = sizes.node
     columns: dict[str, list[str]] = {}
     for node in graph.nodes:
@@ -314,7 +311,7 @@ def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
 
 
 def _grown(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
-    """The places of those who stay, and beside them one for each who came."""
+    # Existing nodes keep their places; new ones are placed beside them.
     neighbours = _neighbours(graph)
     for node in graph.nodes:
         if node.key in places:
@@ -334,7 +331,7 @@ def _grown(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> di
 def _free_place(
     mates: Sequence[Place], near: Sequence[Place], taken: Iterable[Place], sizes: LayoutSizes
 ) -> Place:
-    """A free place in the columns of the group, nearest to those it talks with."""
+    # In the columns of the group, nearest to the connected nodes.
     high = sizes.node[1] + NODE_GAP
     wide = sizes.node[0]
     there = list(taken)
@@ -355,7 +352,7 @@ def _free_place(
 
 
 def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: LayoutSizes) -> None:
-    """Move whole groups down until none lies on one that has grown."""
+    # Moves whole groups down until none overlaps one that has grown.
     members: dict[str, list[str]] = {}
     for node in graph.nodes:
         if node.key in places:
@@ -391,7 +388,7 @@ def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:
 
 
 def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSizes) -> dict[str, Box]:
-    """The box of each group that is open: around its nodes, as wide as its name."""
+    # Around the nodes of each expanded group, at least as wide as its name.
     inside: dict[str, list[Box]] = {}
     for node in graph.nodes:
         inside.setdefault(node.group, []).append(_box_at(places[node.key], sizes.node))
@@ -407,7 +404,7 @@ def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSiz
 
 
 def _room(box: Box, group: str, sizes: LayoutSizes) -> Box:
-    """The box of a node with the room around it that its group takes; as it is without a group."""
+    # With the margins of its group; unchanged without a group.
     if not group:
         return box
     left, top, wide, high = box
@@ -437,7 +434,7 @@ def _overlap(one: Box, other: Box) -> bool:
 
 
 def _straight(source: Place, target: Place, sizes: LayoutSizes) -> tuple[Place, ...]:
-    """From the right edge of one to the left edge of the other; the reverse when that lies to the left."""
+    # From the right edge to the left edge; reversed when the target is to the left.
     half = sizes.node[0] / 2
     way = half if source[0] <= target[0] else -half
     return (source[0] + way, source[1]), (target[0] - way, target[1])

@@ -1,7 +1,7 @@
-"""Large graphs get their places in a process of their own: the library holds Python's lock while it works.
+"""Layout of large graphs in a child process: the library holds the GIL while it works.
 
-Started by `LayoutThread` as a module. Standard input has what `arrange` is given, standard output what it
-gives, both pickled: parent and child are the same program.
+Started by `LayoutThread` as a module. Standard input has the arguments of `arrange`, standard output its
+result, both pickled: parent and child are the same program.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from nep.masters.process import NO_CONSOLE
 
 TIMEOUT_S = 60.0
 MOST_HERE, MOST_LINES_HERE = 40, 60
-"""Graphs up to this size take some milliseconds, far less than a process takes to start."""
+"""Maximum size of graphs laid out in this process, which takes some milliseconds, far less than starting a
+process."""
 
 
 class LayoutProcess:
-    """Arranges one graph; another thread may end it by `kill`."""
+    """Process that lays out one graph; another thread may end it by `kill`."""
 
     def __init__(self) -> None:
-        """Start it."""
         self._process = subprocess.Popen(
             module_command("app.core.graph.layout_process"),
             stdin=subprocess.PIPE,
@@ -36,7 +36,7 @@ class LayoutProcess:
         )
 
     def arrange(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout | None:
-        """As `arrange`; None when the process failed, was ended, or took longer than `TIMEOUT_S`."""
+        """Call `arrange` in the process; None when it failed, was killed, or took longer than `TIMEOUT_S`."""
         bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:
             told, _nothing = self._process.communicate(pickle.dumps((bare, before, sizes)), TIMEOUT_S)
@@ -47,31 +47,31 @@ class LayoutProcess:
             self._leave()
         if self._process.returncode or not told:
             return None
-        made = pickle.loads(told)  # noqa: S301 - what our own child wrote
+        made = pickle.loads(told)  # noqa: S301 - written by our own child
         return made if isinstance(made, GraphLayout) else None
 
     def _leave(self) -> None:
-        """It has ended, or was: nothing of it stays open."""
+        # Closes the pipes and reaps the process.
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
-                with suppress(OSError):  # what it did not read any more
+                with suppress(OSError):  # unread input
                     pipe.close()
         self._process.wait()
 
     def kill(self) -> None:
-        """End it at once, whatever it does."""
+        """Kill the process."""
         self._process.kill()
 
 
 def is_large(graph: NodeGraph) -> bool:
-    """Whether a graph is better arranged by another process."""
+    """Return whether a graph should be laid out by another process."""
     lines = sum(len(line.sources) * len(line.targets) for line in graph.lines)
     return len(graph.nodes) > MOST_HERE or lines > MOST_LINES_HERE
 
 
 def main() -> None:
-    """See the module."""
-    graph, before, sizes = pickle.load(sys.stdin.buffer)  # noqa: S301 - what our own parent wrote
+    """Lay out the graph on standard input; see the module."""
+    graph, before, sizes = pickle.load(sys.stdin.buffer)  # noqa: S301 - written by our own parent
     sys.stdout.buffer.write(pickle.dumps(arrange(graph, before, sizes)))
     sys.stdout.buffer.flush()
 

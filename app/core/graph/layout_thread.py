@@ -1,4 +1,4 @@
-"""LayoutThread: gives a graph its places outside the window's thread, the newest graph only."""
+"""Layout in a background thread, of the newest graph only."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Arrange = Callable[[NodeGraph, "GraphLayout | None", LayoutSizes], GraphLayout]
 
 
 class LayoutThread:
-    """One thread, which begins with the first graph; a graph that waits is replaced by a newer one.
+    """Thread that starts with the first graph; a pending graph is replaced by a newer one.
 
-    A large graph is given to a process: see `layout_process`.
+    A large graph is passed to a process (see `layout_process`).
     """
 
     def __init__(self, arranged: Arrange | None = None) -> None:
-        """Does nothing yet. ``arranged`` may arrange graphs instead, of any size."""
+        # `arranged` replaces the layout function, for graphs of any size.
         self._arrange = arranged if arranged is not None else self._arrange_anywhere
         self._process: LayoutProcess | None = None
         self._news = threading.Condition()
@@ -33,12 +33,12 @@ class LayoutThread:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a graph waits for its places."""
+        """True if a graph is being laid out or pending."""
         with self._news:
             return self._is_busy or self._waiting is not None
 
     def ask(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
-        """Give this graph its places; one that waits is forgotten. After `close` nothing happens."""
+        """Lay out this graph, replacing a pending one. No effect after `close`."""
         with self._news:
             if self._is_closing:
                 return
@@ -49,13 +49,13 @@ class LayoutThread:
             self._news.notify()
 
     def take(self) -> tuple[NodeGraph, GraphLayout] | None:
-        """The newest graph that has its places, and those; None when there is none since the last time."""
+        """Return the newest finished graph with its layout once; None when there is none."""
         with self._news:
             made, self._made = self._made, None
             return made
 
     def close(self) -> None:
-        """End; returns when its thread has ended, or after `END_S` when the library does not come back."""
+        """Stop; returns when the thread has ended, or after `END_S` if the library hangs."""
         with self._news:
             self._is_closing, self._waiting = True, None
             self._news.notify()
@@ -90,7 +90,7 @@ class LayoutThread:
                 return GraphLayout()
             try:
                 self._process = process = LayoutProcess()
-            except OSError:  # this computer starts no more processes
+            except OSError:  # no more processes can be started
                 return arrange_plainly(graph, sizes)
         try:
             made = process.arrange(graph, before, sizes)

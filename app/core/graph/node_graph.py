@@ -1,4 +1,4 @@
-"""The graph as it is drawn: nodes in groups, and lines, each of which stands for one topic or several."""
+"""Graph for drawing: nodes in groups, and lines, each for one or several topics."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "origina
 LineKind = Literal["topic", "service"]
 
 OWN = "/nep/"
-"""Topics and services that nep itself makes, such as the log's: every node has them."""
+"""Prefix of nep's own topics and services, such as the log's, which every node has."""
 MOST_OPEN = 200
-"""With more nodes all groups are closed at first."""
+"""Number of nodes above which all groups are collapsed at first."""
 BRIDGE_TO = "-to-"
-"""A bridge's nodes are called "bridge-NAME-to-BACKEND"."""
+"""Infix of bridge node names: "bridge-NAME-to-BACKEND"."""
 
 
 WEB_LANGUAGE = "web"
@@ -37,10 +37,7 @@ WEB_GROUP = "web:"
 
 @dataclass(frozen=True, slots=True)
 class GraphFacts:
-    """What is known of all networks; ``services`` are the native one's, ``robots`` the names of robots.
-
-    ``pages`` are the pages of Studio's own web server by the names of their nodes.
-    """
+    """Input of all networks; ``services`` are the native one's, ``robots`` the names of robots."""
 
     nodes: Sequence[NodeEntry] = ()
     topics: Sequence[Topic] = ()
@@ -53,10 +50,10 @@ class GraphFacts:
 
 @dataclass(frozen=True, slots=True)
 class GraphChoices:
-    """What a person wants to see of them.
+    """Options of the drawing.
 
-    ``quiet`` are the keys of entries that have been quiet; they are left out while ``hides_quiet``, but for
-    the groups ``quiet_shown``. ``starts_closed``: groups are closed, but for those ``toggled``; else the
+    ``quiet`` are the keys of quiet nodes; with ``hides_quiet`` they are hidden except in the groups
+    ``quiet_shown``. With ``starts_closed`` groups are collapsed except those ``toggled``; otherwise the
     reverse.
     """
 
@@ -70,16 +67,16 @@ class GraphChoices:
     toggled: frozenset[str] = frozenset()
 
     def is_closed(self, group: str) -> bool:
-        """Whether a group is drawn as one box."""
+        """Return whether a group is drawn as one box."""
         return bool(group) and self.starts_closed is not (group in self.toggled)
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnNode:
-    """One box. ``key`` is the same for a program that is started again; ``entry`` is what is known of it now.
+    """Drawn box. ``key`` is the same for a restarted program; ``entry`` is its current state.
 
-    A closed group is a box, too, with no entry and the number of its ``members``. ``joins`` is what a bridge
-    joins this network with, in words; ``has_pictures`` whether it publishes pictures.
+    A collapsed group is a box too, without an entry and with the number of its ``members``. ``joins`` is the
+    network that a bridge connects to, in words; ``has_pictures`` is whether it publishes images.
     """
 
     key: str
@@ -99,9 +96,9 @@ class DrawnNode:
 
 @dataclass(frozen=True, slots=True)
 class GraphLine:
-    """Who tells whom: every one of ``sources`` every one of ``targets``, on the same ``topics``.
+    """Line from each of the ``sources`` to each of the ``targets``, for the same ``topics``.
 
-    ``topics`` are named as among all networks (`key_of`); of a service its clients are the sources.
+    ``topics`` are keys among all networks (`key_of`); the sources of a service are its clients.
     """
 
     kind: LineKind
@@ -111,11 +108,11 @@ class GraphLine:
 
     @property
     def key(self) -> tuple[LineKind, tuple[str, ...], tuple[str, ...]]:
-        """Names the line while the same nodes are at its ends."""
+        """Key of the line, constant while its ends are the same."""
         return self.kind, self.sources, self.targets
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """From whom to whom; nobody to itself."""
+        """Return the pairs of different sources and targets."""
         return ((source, target) for source in self.sources for target in self.targets if source != target)
 
 
@@ -134,7 +131,7 @@ class GraphGroup:
 
 @dataclass(frozen=True, slots=True)
 class NodeGraph:
-    """What is drawn, each in a settled order; ``nodes_there`` counts all that are there, also hidden ones."""
+    """Drawing, in a stable order; ``nodes_there`` counts all nodes, including hidden ones."""
 
     nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
@@ -146,16 +143,16 @@ class NodeGraph:
     pages_there: int = 0
 
     def node(self, key: str) -> DrawnNode | None:
-        """The box of that key, or None."""
+        """Return the box with this key, or None."""
         return next((node for node in self.nodes if node.key == key), None)
 
     def line_of(self, topic: str) -> GraphLine | None:
-        """The line that carries a topic or service, or None."""
+        """Return the line of a topic or service, or None."""
         return next((line for line in self.lines if topic in line.topics), None)
 
 
 def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
-    """What is drawn of these facts by these choices. Takes no longer than nodes and their topics are many."""
+    """Return the drawing of these facts and options. Linear in the number of nodes and topics."""
     boxes = _boxes(facts, choices)
     groups = _groups(facts, choices, boxes)
     closed = {group.key for group in groups if group.is_closed}
@@ -191,7 +188,7 @@ def _is_hidden(node: DrawnNode, choices: GraphChoices) -> bool:
 
 
 def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
-    """The box of each entry, by the entry's key; groups are not closed yet."""
+    # By the entry's key; groups are not collapsed yet.
     pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
     made: dict[str, DrawnNode] = {}
     taken: Counter[str] = Counter()
@@ -236,14 +233,11 @@ def _is_page(entry: NodeEntry) -> bool:
 
 
 def _name_of(entry: NodeEntry) -> str:
-    """Its name; of a behaviour's program that of the behaviour, of a page its address."""
-    if _is_page(entry):
-        return entry.name.removeprefix("web_")
     return entry.name.removeprefix(PROGRAM) or entry.name
 
 
 def _joined_by(entry: NodeEntry) -> str:
-    """What a bridge joins this network with; "" when its name does not tell."""
+    # "" when its name does not contain it.
     _before, found, back_end = entry.name.rpartition(BRIDGE_TO)
     if not entry.is_bridge or not found:
         return ""
@@ -252,7 +246,7 @@ def _joined_by(entry: NodeEntry) -> str:
 
 
 def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
-    """The key of its group: "host:lab-pc", "network:ros2", "robot:Pepper", "web:"; "" where there is none."""
+    # "host:lab-pc", "network:ros2", "robot:Pepper"; "" for none.
     if group_by == "nothing":
         return ""
     if _is_page(entry):
@@ -270,7 +264,7 @@ def _belongs(entry: NodeEntry, robot: str) -> bool:
 def _groups(
     facts: GraphFacts, choices: GraphChoices, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
-    """The groups in the order of their keys. One of which all are hidden is closed: it stays in sight."""
+    # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
     members: dict[str, list[DrawnNode]] = {}
     for node in boxes.values():
         members.setdefault(node.group, []).append(node)
@@ -291,7 +285,6 @@ def _groups(
 
 
 def _host_of(group: str) -> str:
-    """The name in a group's key; "" for what has none."""
     return group.partition(":")[2]
 
 
@@ -307,7 +300,7 @@ def _icon_of(group: str, nodes: Iterable[DrawnNode], facts: GraphFacts) -> str:
 
 
 def _addresses(facts: GraphFacts) -> dict[str, str]:
-    """By the key of an entry the address of its computer, where its publishers can be reached from others."""
+    # By the key of an entry, where its publishers are reachable from other computers.
     found: dict[str, str] = {}
     for topic in facts.topics:
         if topic.info is None:
@@ -322,7 +315,7 @@ def _addresses(facts: GraphFacts) -> dict[str, str]:
 
 
 def _address_in(endpoint: str) -> str:
-    """The address in "tcp://192.168.1.20:40001"; "" for one that only this computer has, or none."""
+    # "tcp://192.168.1.20:40001" -> "192.168.1.20"; "" for a local address.
     try:
         host = urlsplit(endpoint).hostname or ""
     except ValueError:
@@ -342,7 +335,7 @@ _Ends = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def is_shown(topic: str, choices: GraphChoices) -> bool:
-    """Whether topics of this name are drawn at all: nep's own only when they are asked for."""
+    """Return whether topics with this name are drawn: internal ones only on request."""
     return choices.shows_own or not topic.startswith(OWN)
 
 
@@ -375,7 +368,7 @@ def _service_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str,
 
 
 def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
-    """(network, pattern, entry) of everybody who hears all topics that match a pattern."""
+    # (network, pattern, entry) of subscribers of patterns.
     return [
         (entry.network, topic, entry.key)
         for entry in facts.nodes
@@ -386,7 +379,7 @@ def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
 
 
 def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _Ends:
-    """Where a line begins and ends: boxes that are drawn, each once."""
+    # Boxes that are drawn, each once.
     return _places(sources, place), _places(targets, place)
 
 

@@ -1,4 +1,4 @@
-"""The arrow keys: from a node along its lines to those that it talks with, and up and down between them."""
+"""Navigation with arrow keys: from a node along its lines to connected nodes, and up and down."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Arrow = Literal["left", "right", "up", "down"]
 
 @dataclass(frozen=True, slots=True)
 class GraphChoice:
-    """What is chosen: the node of this ``key``, or the topic of that name.
+    """Selection: the node with this ``key``, or the topic with this name.
 
-    One came to a topic from the node ``origin``; ``is_outward``: the topic leads away from that node.
+    A topic was reached from the node ``origin``; ``is_outward`` is whether the topic leads away from it.
     """
 
     kind: Literal["node", "topic"]
@@ -27,10 +27,10 @@ class GraphChoice:
 def step(
     graph: NodeGraph, layout: GraphLayout, chosen: GraphChoice | None, arrow: Arrow
 ) -> GraphChoice | None:
-    """What an arrow key leads to; what is chosen stays where nothing follows; None in an empty graph.
+    """Return the selection after an arrow key; unchanged where nothing follows, None in an empty graph.
 
-    Right goes from a node to a line that leaves it and on to who hears it, left against the arrows; up and
-    down go to the next line of that node, or the next node above or below.
+    Right goes from a node to an outgoing line and on to its target; left goes against the arrows. Up and down
+    go to the next line of that node, or the next node above or below.
     """
     if chosen is None or not _is_there(graph, layout, chosen):
         first = min(layout.places, key=lambda key: (layout.places[key], key), default=None)
@@ -77,8 +77,7 @@ def _from_line(graph: NodeGraph, layout: GraphLayout, chosen: GraphChoice, arrow
 
 
 def _lines_at(graph: NodeGraph, layout: GraphLayout, key: str, *, outward: bool) -> list[GraphLine]:
-    """The lines that leave a node, or come to it, the uppermost first."""
-
+    # Outgoing or incoming lines of a node, uppermost first.
     def height(line: GraphLine) -> tuple[float, tuple[str, ...]]:
         others = line.targets if outward else line.sources
         levels = [layout.places[each][1] for each in others if each in layout.places]
@@ -94,7 +93,7 @@ def _nearest(layout: GraphLayout, keys: list[str], near: Place | None) -> str:
 
 
 def _beside(layout: GraphLayout, key: str, arrow: Arrow) -> str:
-    """The next node above or below: rather in the same column than near; itself when there is none."""
+    # Prefers the same column to a small distance; itself when there is none.
     x, y = layout.places[key]
     way = 1 if arrow == "down" else -1
     others = {
