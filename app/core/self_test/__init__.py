@@ -1,8 +1,8 @@
-"""The self-test by which every package of Studio is tested: what it may take, its report, its watch.
+"""Self-test for testing packages of Studio: time limits, report, watchdog.
 
-`surroundings` gives it a folder, a home and a master of its own, `report` is what it leaves there, `test` is
-the whole: the steps' times, what ends it when nothing moves any more, and what is left of its processes. What
-it does in the window is in `app.ui.self_test`.
+`surroundings` gives it a folder, a home and a master of its own, `report` is its result, `test` runs the
+steps with time limits, a watchdog against hanging, and a check for remaining processes. The steps in the
+window are in `app.ui.self_test`.
 """
 
 from app.core.self_test.surroundings import UnwritableFolderError as UnwritableFolderError

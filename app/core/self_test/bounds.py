@@ -1,4 +1,4 @@
-"""How long the self-test may take, in seconds: generous, because a slow computer is no failure."""
+"""Time limits of the self-test in seconds: generous, because slow computers must pass too."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ STEP_S: dict[str, float] = {
     "close": 60.0,
     "processes": 20.0,
 }
-"""Each step, by its name in the report, in the order in which they are taken."""
+"""Limit of each step by its name in the report, in order."""
 ALL_S = 480.0
-"""All steps together."""
+"""Limit of all steps together."""
 GRACE_S = 10.0
-"""How much later the watch ends the process: a window that still answers says itself what it lacks."""
+"""Delay after a limit before the watchdog kills the process, in which a responsive window reports the failure
+itself."""
 END_S = 30.0
-"""How long the process may take to end after the report says that all is well."""
+"""Time that the process gets to end after the report says that all is well."""

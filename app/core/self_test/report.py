@@ -1,4 +1,4 @@
-"""What a self-test leaves: a JSON file that is true at any moment, also when the process is killed."""
+"""Report of a self-test: a JSON file that is valid at any moment, also if the process is killed."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from nep.version import __version__
 
 FORMAT, FORMAT_VERSION = "nep-studio-selftest", 1
 OLDEST_S = 24 * 3600.0
-"""No process is older when it begins its self-test: else its clock was set meanwhile."""
+"""Maximum age of the process at the start of the self-test; an older one means that the clock was set."""
 
 
 @dataclass
 class StepReport:
-    """One step: what it is to show, and what became of it; times in ms since the process began."""
+    """One step: expectation and result; times in ms since the start of the process."""
 
     name: str
     words: str
@@ -34,7 +34,7 @@ class StepReport:
     said: str = ""
 
     def to_json(self) -> dict[str, object]:
-        """As the report has it."""
+        """Return the form used in the report."""
         return {
             "name": self.name,
             "ok": self.ok,
@@ -47,7 +47,7 @@ class StepReport:
 
 
 def seconds_since_start() -> float:
-    """How long this process has been there, as the system says; 0 where it does not."""
+    """Return the age of this process as reported by the system, or 0."""
     try:
         age = time.time() - psutil.Process().create_time()
     except psutil.Error:
@@ -56,10 +56,9 @@ def seconds_since_start() -> float:
 
 
 class Report:
-    """The report of one self-test; it may be told from any thread, and is written each time."""
+    """Report of one self-test, written at each change. Thread-safe."""
 
     def __init__(self, path: Path, facts: dict[str, object]) -> None:
-        """``facts`` are told with it, beside what it knows of this computer itself."""
         self._path = path
         self._lock = threading.RLock()
         self._offset_s = seconds_since_start() - time.monotonic()
@@ -79,39 +78,39 @@ class Report:
         self._over = False
 
     def now_ms(self) -> int:
-        """Milliseconds since the process began."""
+        """Return milliseconds since the start of the process."""
         return round((time.monotonic() + self._offset_s) * 1000)
 
     @property
     def why(self) -> str:
-        """Why it failed, as a sentence; "" while nothing has."""
+        """Sentence why it failed, or ""."""
         return self._why
 
     @property
     def step(self) -> StepReport | None:
-        """The step that is under way."""
+        """Step in progress, or None."""
         with self._lock:
             newest = self._steps[-1] if self._steps else None
             return newest if newest is not None and newest.ms is None else None
 
     def tell(self, **facts: object) -> None:
-        """Something that was found out about this computer."""
+        """Add facts about this computer."""
         with self._lock:
             self._facts.update(facts)
 
     def mark(self, name: str) -> None:
-        """This moment, once: ``NAME_ms`` in the report."""
+        """Record this moment once, as ``NAME_ms``."""
         with self._lock:
             self._marks.setdefault(f"{name}_ms", self.now_ms())
 
     def begin(self, name: str, words: str, bound_s: float) -> None:
-        """A step begins; the one before is over."""
+        """Start a step, which ends the previous one."""
         with self._lock:
             self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
             self._write()
 
     def seen(self, said: str = "") -> None:
-        """What the step is to show was seen."""
+        """Record that the step succeeded."""
         with self._lock:
             step = self.step
             if step is not None:
@@ -119,7 +118,7 @@ class Report:
                 self._write()
 
     def fail(self, why: str) -> None:
-        """The test has failed; the first sentence counts."""
+        """Record that the test failed; the first sentence counts."""
         with self._lock:
             step = self.step
             if step is not None:
@@ -128,7 +127,7 @@ class Report:
             self._write()
 
     def end(self) -> bool:
-        """It is over; whether all was well."""
+        """Record the end; return whether all was well."""
         with self._lock:
             self._over = True
             self.mark("total")
@@ -152,6 +151,6 @@ class Report:
         text = json.dumps(told, indent=1, ensure_ascii=False)
         try:
             write_atomically(self._path, text.encode("utf-8", "backslashreplace") + b"\n", durable=False)
-        except OSError as error:  # the disk is full, or the folder has gone: the exit code says that much
+        except OSError as error:  # disk full, or folder deleted: the exit code still reports the failure
             reason = (error.strerror or str(error)).lower()
             self._why = self._why or _("The report can't be written ({reason})").format(reason=reason)

@@ -1,4 +1,4 @@
-"""Where a self-test lives: a folder, settings and a master of its own, so that it meets no other Studio."""
+"""Environment of a self-test: folder, settings and master of its own, isolated from other instances."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.system.addresses import MASTER_VARIABLE
 
 REPORT, PICTURE, CRASH = "report.json", "window.png", "crash.txt"
 BEGUN = b"{}\n"
-"""A report before anything is known: no reader takes the one of an earlier test for this one's."""
+"""Initial report, so that no reader takes the one of an earlier test for this one's."""
 
 
 class UnwritableFolderError(AppError):
@@ -35,25 +35,25 @@ class UnwritableFolderError(AppError):
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The folder for the results, and in it the home (settings, journal, log) of this test alone."""
+    """Folder of the results, which contains the home (settings, journal, log) of this test."""
 
     folder: Path
     home: Path
     master: str
 
     def path(self, name: str) -> Path:
-        """One of the files of the results."""
+        """Return the path of a result file."""
         return self.folder / name
 
 
 def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> Surroundings:
-    """Make the folder and a home in it, and put them and a free port for the master into ``environ``.
+    """Create the folder and a home in it; set them and a free master port in ``environ``.
 
-    What an earlier test left there under the names of the results is removed, and nothing else. Studio's
-    browser runs as root only without its sandbox: the test loads nothing but Studio's own page, and switches
-    it off for itself. Raises UnwritableFolderError.
+    Result files of an earlier test are removed, and nothing else. The web engine runs as root only without
+    its sandbox: the test loads nothing but Studio's own page, and disables it for itself. Raises
+    UnwritableFolderError.
     """
-    folder = Path(os.path.abspath(folder))  # noqa: PTH100 - a link in it may stay, the name is told as given
+    folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_atomically(folder / REPORT, BEGUN, durable=False)
@@ -66,7 +66,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     made = Surroundings(folder, home, f"127.0.0.1:{_free_port()}")
     environ["NEP_STUDIO_HOME"] = str(home)
     environ["NEP_STATE_DIR"] = str(home / "state")
-    environ["NEP_GATEWAY"] = "0"  # its ports are fixed: another Studio, or another test, may have them
+    environ["NEP_GATEWAY"] = "0"  # its ports are fixed, and another instance or test may use them
     environ[MASTER_VARIABLE] = made.master
     if is_root and sys.platform.startswith("linux"):
         environ.setdefault("QTWEBENGINE_DISABLE_SANDBOX", "1")
@@ -74,7 +74,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
 
 
 def remove_home(made: Surroundings) -> None:
-    """Remove the test's own home, as far as that can be done: files may be held by what has just ended."""
+    """Remove the test's home as far as possible: ended processes may still hold files."""
     for path in sorted(made.home.rglob("*"), reverse=True):
         with suppress(OSError):
             path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

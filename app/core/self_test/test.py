@@ -1,4 +1,4 @@
-"""One self-test of this process: its steps one after the other, and a watch that ends it in any case."""
+"""Self-test of this process: its steps in order, and a watchdog that ends it in any case."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ KILL_S = 5.0
 
 
 class SelfTest:
-    """What the steps tell, and what happens when they tell nothing. Methods may be called in any thread."""
+    """Progress of the steps, and the watchdog. Thread-safe."""
 
     def __init__(self, place: Surroundings, facts: dict[str, object]) -> None:
-        """Begin: from now on the process ends in time, whatever its threads do."""
+        # Starts the watchdog: from now on the process ends in time, whatever its threads do.
         self.place = place
         self.report = Report(place.path(REPORT), {**facts, "bound_s": bounds.ALL_S})
         self._news = threading.Condition()
@@ -38,7 +38,7 @@ class SelfTest:
         self._what = ""
         self._crash: TextIO = place.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
-        # Of the two watches this one needs neither Python nor its lock; what it writes is where all stood.
+        # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
         last_s = bounds.ALL_S + 2 * bounds.GRACE_S
         faulthandler.dump_traceback_later(last_s, exit=True, file=self._crash)
         threading.Thread(target=self._watch, name="self-test watch", daemon=True).start()
@@ -46,27 +46,29 @@ class SelfTest:
     # -- steps --------------------------------------------------------------------------------------------
 
     def begin(self, name: str, words: str) -> None:
-        """The step of that name (of `bounds.STEP_S`) begins; ``words`` say what is to be seen."""
+        """Start the step with this name (of `bounds.STEP_S`); ``words`` describes the expectation."""
         bound_s = bounds.STEP_S[name]
         self.report.begin(name, words, bound_s)
         self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
 
     def seen(self, said: str = "") -> None:
-        """What the step is to show was seen; ``said`` tells what exactly."""
+        """Record that the step succeeded; ``said`` gives details."""
         self.report.seen(said)
 
     def fail(self, why: str) -> None:
-        """It has failed; the first sentence counts."""
+        """Record that the test failed; the first sentence counts."""
         self.report.fail(why)
 
     def run(self, show: Callable[[], int]) -> int:
-        """Let ``show`` do the steps until the window is closed, then end what is left; the exit code.
+        """Run ``show``, which does the steps until the window is closed.
 
-        0 when all was well; 1 when something was not, also when ``show`` raises or gives another code.
+        End the rest and return the exit code.
+
+        0 when all was well; 1 otherwise, also when ``show`` raises or returns another code.
         """
         try:
             code = show()
-        except Exception as error:  # noqa: BLE001  whatever it is: the report says it
+        except Exception as error:  # noqa: BLE001  written to the report
             traceback.print_exc(file=self._crash)
             self._crash.flush()
             self.fail(
@@ -83,7 +85,7 @@ class SelfTest:
         return 0 if well else FAILED
 
     def _finish(self) -> None:
-        """All is told. The process must still end: until then something watches."""
+        # The watchdog continues until the process ends.
         faulthandler.cancel_dump_traceback_later()
         faulthandler.disable()
         self._crash.close()
@@ -92,14 +94,14 @@ class SelfTest:
             if crash.stat().st_size == 0:
                 crash.unlink()
         if not self.report.why:
-            logging.shutdown()  # the log is there, too, and Windows removes no file that is open
+            logging.shutdown()  # the log file is in the folder too, and Windows can't delete an open file
             remove_home(self.place)
         self._wait_until(time.monotonic() + bounds.END_S, _("the end of the process"))
 
     # -- processes ----------------------------------------------------------------------------------------
 
     def _end_processes(self) -> None:
-        """Nothing may be left of what was started but the master, which waits for us, and is ended here."""
+        # Only the master may remain, which waits for this process; it is ended here.
         if self.report.why:
             end_family()
             return
@@ -117,7 +119,7 @@ class SelfTest:
         else:
             self.seen()
 
-    # -- the watch ----------------------------------------------------------------------------------------
+    # -- watchdog -----------------------------------------------------------------------------------------
 
     def _wait_until(self, until: float, what: str) -> None:
         with self._news:
@@ -133,14 +135,14 @@ class SelfTest:
             _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
         )
         self.report.end()
-        with suppress(OSError, ValueError):  # it is closed at the very end
+        with suppress(OSError, ValueError):  # closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)
         end_family()
         os._exit(FAILED)
 
 
 def children() -> list[psutil.Process]:
-    """Every process that this one has started, and those that they have."""
+    """Return all child processes, recursively."""
     try:
         return psutil.Process().children(recursive=True)
     except psutil.Error:
@@ -148,7 +150,7 @@ def children() -> list[psutil.Process]:
 
 
 def command(process: psutil.Process) -> list[str]:
-    """Its command line; nothing for one that has ended."""
+    """Return the command line of a process; empty if it has ended."""
     try:
         return process.cmdline()
     except (psutil.Error, OSError):  # see `is_web`
@@ -156,33 +158,33 @@ def command(process: psutil.Process) -> list[str]:
 
 
 def is_master(process: psutil.Process) -> bool:
-    """Whether it is a master that was started for its owner: it ends by itself, a moment after us."""
+    """Return whether a process is a master with an owner, which ends by itself shortly after the owner."""
     words = command(process)
     return "master" in words and "--owner-pid" in words
 
 
 def is_web(process: psutil.Process) -> bool:
-    """Whether it belongs to the web view, whose processes end with the one that they belong to."""
+    """Return whether a process belongs to the web view, whose processes end with their parent."""
     try:
         return process.name().lower().startswith(WEB_PROCESS[:15])
-    except (psutil.Error, OSError):  # Windows' own word, where psutil has none for it
+    except (psutil.Error, OSError):  # raised on Windows, where psutil has no own exception
         return False
 
 
 def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
-    """Whether its program is one of Windows itself, in the folder ``root``; elsewhere there is none.
+    """Return whether a process is a program of Windows itself, in the folder ``root``.
 
-    Windows starts some in our name, such as the host of a console, and ends them when it likes.
+    Windows starts some as children, such as console hosts, and ends them at any time.
     """
     try:
         program = process.exe()
-    except (psutil.Error, OSError):  # not every Windows tells it of every process; see `is_web`
+    except (psutil.Error, OSError):  # not available on every Windows for every process; see `is_web`
         program = next(iter(command(process)), "")
     return bool(root) and PureWindowsPath(program).is_relative_to(PureWindowsPath(root))
 
 
 def end_family() -> None:
-    """End all of them without asking."""
+    """Kill all child processes."""
     family = children()
     for each in family:
         with suppress(psutil.Error):
