@@ -1,4 +1,4 @@
-"""What is kept on the disk between starts: settings and files, written so that a crash leaves no half.
+"""Storage: settings and files, written atomically.
 
-Behaviours, journals and versions use it; it knows none of them.
+Used by behaviours, journals and versions, which it doesn't depend on.
 """

@@ -1,6 +1,6 @@
-"""Files of Studio's own: written so that a crash never leaves half of them, read only when they are files.
+"""Atomic writing and safe reading of Studio's files.
 
-What only concerns its user (settings, unsaved work, versions) is for nobody else to read, whatever the umask.
+Files that concern only their user (settings, unsaved work, versions) are private, whatever the umask.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from nep.system.replace_file import replace_file
 
 LEFT_AFTER_S = 60.0
 LARGEST_BYTES = 10_000_000
-"""What is larger is not read into memory."""
+"""Maximum size of a file that is read into memory."""
 _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 
 
 def read_whole(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
-    """A regular file of at most so many bytes. Raises OSError for all else, with the reason in ``strerror``.
+    """Return the content of a regular file. Raises OSError otherwise, with the reason in ``strerror``.
 
-    What only looks like a file (a pipe, a device, a folder, a link to one) is never waited for.
+    Never blocks on a pipe, a device, a folder, or a link to one.
     """
-    # Without NONBLOCK the opening of a pipe waits for its writer, for ever.
+    # Without NONBLOCK, opening a pipe waits for its writer forever.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     try:
         about = os.fstat(handle)
@@ -56,11 +56,15 @@ def write_atomically(
 ) -> None:
     """Replace ``path`` by ``data``: readers see the old file or the new one, never a part.
 
-    With ``durable`` the data are on the disk before the old file goes (a power cut leaves one of the two);
-    without, only the death of this process is survived. A ``private`` file is for its owner only, and so is a
-    folder that is made for it. Raises OSError, and then the old file is untouched.
+    On OSError the old file is unchanged.
 
-    ``data`` may come in parts, so that no large file is whole in memory; what they raise ends the writing.
+    Args:
+        path: File; its folder is created if necessary.
+        data: Bytes, or parts of them, so that a large file need not fit into memory; exceptions of the
+            iterable cancel the write.
+        durable: Flush to disk before the old file is replaced, so that one of both survives a power cut.
+            Otherwise only a crash of this process is covered.
+        private: Make the file, and a folder that is created, accessible for its owner only.
     """
     if isinstance(data, bytes) and not data:
         raise ValueError("an empty file is never written over a full one")
@@ -74,7 +78,7 @@ def write_atomically(
             file.flush()
             if durable:
                 os.fsync(file.fileno())
-        if not private:  # mkstemp makes files that only the owner may read
+        if not private:  # mkstemp creates private files
             _keep_mode(path, Path(name))
         replace_file(Path(name), path)
     except BaseException:
@@ -86,25 +90,25 @@ def write_atomically(
 
 
 def _sweep(path: Path) -> None:
-    """Take away what writers that were killed left beside the file; a write that goes on now is younger."""
+    # Removes parts left by killed writers; writes in progress are younger.
     before = time.time() - LEFT_AFTER_S
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
-        with contextlib.suppress(OSError):  # somebody else was quicker, or it is not ours to take
+        with contextlib.suppress(OSError):  # removed by another process, or not permitted
             if part.stat().st_mtime < before:
                 part.unlink()
 
 
 def private_folder(folder: Path) -> None:
-    """Make the folder if it is not there, and let only its owner into it. Raises OSError if it can't be made.
+    """Create the folder if necessary, and make it private. Raises OSError if it can't be created.
 
-    One that is another's stays as it is, and so does Windows, where a person's folders are private already.
+    Folders of other users are unchanged, as on Windows, where user folders are private already.
     """
     folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
     _close_to_others(folder)
 
 
 def make_private(folder: Path, files: str) -> None:
-    """Let only the owner into a folder and at those files in it (a pattern), as earlier versions did not."""
+    """Make a folder and matching files in it private, which earlier versions did not."""
     if os.name != "posix" or not folder.is_dir():
         return
     _close_to_others(folder)
@@ -117,14 +121,14 @@ def make_private(folder: Path, files: str) -> None:
 def _close_to_others(path: Path) -> None:
     if os.name != "posix":
         return
-    with contextlib.suppress(OSError):  # another's, or a disk without modes: as private as it can be
+    with contextlib.suppress(OSError):  # another user's, or a file system without modes
         mode = stat.S_IMODE(path.stat().st_mode)
         if mode & _OTHERS:
             path.chmod(mode & ~_OTHERS)
 
 
 def _keep_mode(old: Path, new: Path) -> None:
-    # A behaviour is shared as its predecessor was.
+    # A behaviour stays shared as the replaced file was.
     try:
         mode = old.stat().st_mode & 0o777
     except FileNotFoundError:
@@ -133,8 +137,8 @@ def _keep_mode(old: Path, new: Path) -> None:
 
 
 def _mode_of_new_files(beside: Path) -> int:
-    """What the umask leaves of a new file, learnt by making one: to ask is to change it for every thread."""
-    probe = beside.with_name(f"{beside.stem}.mode.part")  # swept away with the others after a crash
+    # Determined by creating a file: reading the umask would change it for all threads.
+    probe = beside.with_name(f"{beside.stem}.mode.part")  # removed with the others after a crash
     os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     try:
         return stat.S_IMODE(probe.stat().st_mode)
@@ -144,7 +148,7 @@ def _mode_of_new_files(beside: Path) -> int:
 
 def _sync_folder(folder: Path) -> None:
     if os.name != "posix":
-        return  # Windows can't open a folder, and its rename is journalled by the file system
+        return  # Windows can't open a folder; its rename is journalled by the file system
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

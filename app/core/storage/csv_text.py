@@ -1,4 +1,4 @@
-"""Rows as CSV (RFC 4180) that spreadsheets open without taking a robot's words for formulas."""
+"""CSV (RFC 4180) that is safe for spreadsheets: values of robots are not interpreted as formulas."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ _START = ("=", "+", "-", "@", "\t", "\r")
 
 
 def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: one that begins like one gets an apostrophe."""
+    """Prefix a text that a spreadsheet would interpret as a formula with an apostrophe."""
     return f"'{text}" if text.startswith(_START) else text
 
 
 def csv_text(rows: Iterable[Sequence[str]]) -> str:
-    """The rows, each with its line end."""
+    """Return the rows as CSV, each with a line end."""
     out = io.StringIO(newline="")
     csv.writer(out).writerows(rows)
     return out.getvalue()

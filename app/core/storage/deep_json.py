@@ -1,8 +1,8 @@
-"""JSON as deep as a long stack of blocks: Blockly nests every block in the one above it.
+"""JSON nested as deep as a long stack of blocks: Blockly nests each block in the one above it.
 
-Python's json gives up at about 1000 levels, which is a stack of 480 blocks. What is deeper is read and
-written in a thread of its own with a larger stack, up to `LEVELS` (less in early releases of Python 3.12);
-beyond that it is a RecursionError as ever.
+Python's json supports about 1000 levels, a stack of 480 blocks. Deeper values are processed in a thread with
+a larger stack, up to `LEVELS` (fewer in early releases of Python 3.12); beyond that RecursionError is raised
+as usual.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from typing import TypeVar
 
 LEVELS = 9_000
 SHALLOW = 8_000
-"""So many brackets can't be nested too deep."""
+"""Number of brackets that can't be nested too deep."""
 STACK_BYTES = 255 * 1024 * 1024
-"""Python for Windows refuses 256 MiB: less, it says, are valid."""
+"""Stack size; Python for Windows rejects 256 MiB."""
 
 T = TypeVar("T")
 _one_at_a_time = threading.Lock()
 
 
 def loads(text: str | bytes) -> object:
-    """Return the value of a JSON text; bytes may be UTF-8, UTF-16 or UTF-32, with or without a mark.
+    """Parse JSON; bytes may be UTF-8, UTF-16 or UTF-32, with or without a BOM.
 
-    ValueError for what is no JSON, RecursionError beyond 9000 levels.
+    Raises ValueError for invalid JSON, RecursionError beyond 9000 levels.
     """
     return deeply(lambda: json.loads(text))
 
 
 def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
-    """The JSON text of a value; with ``ascii`` all else is escaped. RecursionError beyond 9000 levels.
+    """Return a value as JSON, escaped with ``ascii``. Raises RecursionError beyond 9000 levels.
 
     A deep value is not indented: its text would be mostly spaces.
     """
@@ -43,12 +43,12 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
 
 
 def same(one: object, other: object) -> bool:
-    """Whether two values are equal, however deep."""
+    """Return whether two values are equal, however deep."""
     return deeply(lambda: one == other)
 
 
 def start_deep(thread: threading.Thread) -> None:
-    """Start a thread that may go as deep as a long stack of blocks."""
+    """Start a thread with a stack for deep values."""
     with _one_at_a_time:
         size = threading.stack_size(STACK_BYTES)
         try:
@@ -58,7 +58,10 @@ def start_deep(thread: threading.Thread) -> None:
 
 
 def deeply(work: Callable[[], T]) -> T:
-    """What `work` gives, which may go as deep as a long stack of blocks; it is tried twice, so it is pure."""
+    """Return the result of ``work``, with a larger stack if necessary.
+
+    It may run twice, so it must be pure.
+    """
     try:
         return work()
     except RecursionError:
@@ -72,7 +75,7 @@ def deeply(work: Callable[[], T]) -> T:
         except (ValueError, RecursionError) as error:
             failed.append(error)
 
-    # the limit is the whole process's, and the stack's size is that of the next thread: one at a time
+    # the recursion limit is global, and the stack size applies to the next thread: one at a time
     with _one_at_a_time:
         limit, size = sys.getrecursionlimit(), threading.stack_size(STACK_BYTES)
         sys.setrecursionlimit(max(limit, LEVELS))

@@ -1,4 +1,4 @@
-"""A lock that several Studios on one computer share: a file beside what is written."""
+"""Lock file shared by several instances on one computer."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if sys.platform == "win32":
     import msvcrt
     from ctypes import wintypes
 
-    # Not msvcrt.locking: Microsoft's C library lets the thread sleep for a second before it says that
-    # another process has the lock, also when it is told not to wait.
+    # Not msvcrt.locking: Microsoft's C library sleeps for a second before it reports a held lock, even in
+    # non-blocking mode.
     _kernel = ctypes.WinDLL("kernel32", use_last_error=True)
     _FIRST_BYTE = (0, 0, 1, 0)  # offset and length, each as two halves
     for _call in (_kernel.LockFile, _kernel.UnlockFile):
@@ -32,7 +32,7 @@ if sys.platform == "win32":
             raise ctypes.WinError(ctypes.get_last_error())
 
     def _unlock(file: IO[bytes]) -> None:
-        # A file that is only closed Windows unlocks when it has the time for it.
+        # Windows unlocks a closed file only eventually.
         _kernel.UnlockFile(msvcrt.get_osfhandle(file.fileno()), *_FIRST_BYTE)
 else:
     import fcntl
@@ -41,15 +41,15 @@ else:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def _unlock(file: IO[bytes]) -> None:
-        pass  # closing does it; a child that has the file, too, keeps the lock as before
+        pass  # closing unlocks it; a child that inherited the file keeps the lock
 
 
 HELD = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
-"""What systems say of a lock that another process has; all else is a disk that has no locks."""
+"""Error numbers of a held lock; all others mean that the file system has no locks."""
 
 
 def _wait_for(file: IO[bytes], until: float) -> bool:
-    """Take the lock of a file, at the latest at that time; whether it is ours. A disk has none: at once."""
+    # Returns whether the lock was acquired. Without lock support False at once.
     pause = threading.Event()
     while True:
         try:
@@ -63,22 +63,25 @@ def _wait_for(file: IO[bytes], until: float) -> bool:
 
 
 def _opened(path: Path) -> IO[bytes]:
-    """The file beside ``path`` that is locked. Raises OSError."""
-    # Only for its owner; a pipe that somebody put there is not waited for.
+    # The lock file of `path`. Raises OSError.
+    # Private; never blocks on a pipe of that name.
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NONBLOCK", 0)
     return os.fdopen(os.open(path.with_name(f"{path.name}.lock"), flags, 0o600), "ab")
 
 
 class FileLock:
-    """A lock that is kept until it is left, or until this process ends."""
+    """Lock held until it is released, or this process ends."""
 
     def __init__(self, path: Path) -> None:
-        """It is the file ``<name>.lock`` beside ``path``."""
+        # The lock file is `<name>.lock` beside `path`.
         self._path = path
         self._file: IO[bytes] | None = None
 
     def acquire(self) -> bool:
-        """Whether nobody else has it; then it is ours. Also where there is no lock to be had."""
+        """Try to acquire the lock; return False when another process has it.
+
+        True also without lock support.
+        """
         if self._file is not None:
             return True
         try:
@@ -95,7 +98,7 @@ class FileLock:
         return True
 
     def release(self) -> None:
-        """Let others have it; said twice it does nothing."""
+        """Release the lock. Idempotent."""
         if self._file is not None:
             _unlock(self._file)
             self._file.close()
@@ -104,10 +107,10 @@ class FileLock:
 
 @contextmanager
 def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
-    """Hold the lock of ``path`` (the file ``<name>.lock`` beside it); whether it could be had in time.
+    """Hold the lock of ``path`` (the file ``<name>.lock``); yield whether it was acquired in time.
 
-    Where there is none to be had (a network disk, a folder that can't be written) the work goes on without,
-    and at once. The lock of a process that dies is free at once.
+    Without lock support (a network disk, a read-only folder) the body runs at once without the lock. The lock
+    of a process that dies is released at once.
     """
     until = time.monotonic() + within_s
     try:

@@ -1,4 +1,4 @@
-"""A file in which a part of Studio keeps what a person made: what is damaged is put aside, never lost."""
+"""Files with data of the user: damaged ones are renamed, never lost."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class KeptFile(Generic[T]):
-    """What was read of such a file.
+    """Result of reading such a file.
 
-    ``value`` is None when there was nothing, or nothing of it could be read. ``problem`` is a sentence that
-    says what became of a file that could not be read, or only in part; "" when all is well. A file that
-    ``is_newer`` than this Studio is left as it is, so nothing may be written there.
+    ``value`` is None when the file is missing or unreadable. ``problem`` is a sentence about a file that was
+    not, or only partly, readable; otherwise "". With ``is_newer`` it was written by a newer Studio and must
+    not be overwritten.
     """
 
     value: T | None = None
@@ -33,11 +33,10 @@ class KeptFile(Generic[T]):
 def read_kept(
     path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
 ) -> KeptFile[T]:
-    """Read a file of at most so many bytes; of one that is damaged what can be read is used.
+    """Read a file of limited size; the readable part of a damaged one is used.
 
-    ``parse`` gives what is in it, and why that is not all ("" when it is). It raises `NepError` for what
-    can't be read at all, and ``newer`` for what a newer Studio wrote. The damaged file is kept beside:
-    "alarms.json" as "alarms.damaged.json".
+    ``parse`` returns the value, and a problem or "". It raises `NepError` for an unreadable file, and
+    ``newer`` for that of a newer Studio. A damaged file is kept: "alarms.json" as "alarms.damaged.json".
     """
     try:
         data = read_whole(path, most_bytes)
@@ -56,7 +55,7 @@ def read_kept(
 
 
 def _put_aside(path: Path, reason: str, data: bytes | None = None) -> str:
-    """Keep the file beside, and say so; with its ``data`` the file itself stays, whose rest is used."""
+    # With `data` a copy is kept beside the file, whose readable part is used.
     beside = path.with_name(f"{path.stem}.damaged{path.suffix}")
     with suppress(OSError):
         if data is None:

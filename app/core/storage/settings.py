@@ -1,4 +1,4 @@
-"""What a person chose, kept between starts: one JSON file in the user's configuration folder."""
+"""User settings: one JSON file in the configuration folder."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from nep.i18n import _
 from nep.system.replace_file import replace_file
 
 FORMAT = 1
-"""Goes up when this version can't understand what the next one keeps; what is only new needs no other number.
-The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are in here, too."""
+"""Format version; increased when older versions can't read newer settings. New keys need no new version.
+States of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are included."""
 _OWN_NAME = f"settings.format-{FORMAT}.json"
 RECENT_LIMIT = 12
 _LATEST_S = 1e12
-"""No time is later: a damaged file may have a number that no clock can show."""
+"""Latest valid time: a damaged file may have one that the calendar doesn't support."""
 T = TypeVar("T")
 
 
 def home() -> Path:
-    """Studio's own folder: ``$NEP_STUDIO_HOME``, else the system's place for configuration."""
+    """Return Studio's folder: ``$NEP_STUDIO_HOME``, else the system's configuration folder."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_config_dir("nep-studio", appauthor=False))
 
 
 def _is_file(path: Path) -> bool:
-    """Whether it is there; nothing is that has a name which no file can have."""
+    # False for names that no file can have.
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -43,24 +43,24 @@ def _is_file(path: Path) -> bool:
 
 
 def data_home() -> Path:
-    """Where Studio keeps what is large: ``$NEP_STUDIO_HOME``, else the system's place for data."""
+    """Return the folder for large data: ``$NEP_STUDIO_HOME``, else the system's data folder."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("nep-studio", appauthor=False))
 
 
 def state_home() -> Path:
-    """Where Studio keeps what concerns its own runs: ``$NEP_STUDIO_HOME``, else the system's place."""
+    """Return the folder for runtime state: ``$NEP_STUDIO_HOME``, else the system's state folder."""
     chosen = os.environ.get("NEP_STUDIO_HOME")
     return Path(chosen) if chosen else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
 
 
 def kept_folder() -> Path:
-    """Where Studio saves behaviours that were closed and had no file yet."""
+    """Return the folder of behaviours that were closed without a file."""
     return home() / "kept"
 
 
 def kept_language(folder: Path | None = None) -> str:
-    """The language that a person chose, "" for none: for who has no words yet. Nothing is moved or made."""
+    """Return the chosen language or "", before translations are loaded. Creates and moves no file."""
     place = folder if folder is not None else home()
     values = _values_in(place / "settings.json")
     if _format_of(values) > FORMAT:
@@ -70,7 +70,7 @@ def kept_language(folder: Path | None = None) -> str:
 
 
 def _values_in(path: Path) -> dict[str, object]:
-    """What a file says; nothing when it can't be read."""
+    # Empty if the file can't be read.
     try:
         values = json.loads(read_whole(path))
     except (OSError, ValueError, RecursionError):
@@ -80,7 +80,7 @@ def _values_in(path: Path) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True)
 class RecentFile:
-    """A file that was opened or saved, and when (epoch seconds)."""
+    """Recently opened or saved file, and the time (epoch seconds)."""
 
     path: Path
     name: str
@@ -89,50 +89,50 @@ class RecentFile:
 
 
 class ListSettings(Protocol):
-    """What is needed of the settings to keep lists there."""
+    """Part of the settings for storing lists."""
 
     def get(self, key: str, default: list[T]) -> list[T]:
-        """A list that was kept."""
+        """Return a stored list."""
 
     def set(self, key: str, value: object) -> None:
-        """Keep it."""
+        """Store a list."""
 
 
 class Settings:
-    """Chosen values by name. A damaged file is kept beside (``settings.damaged.json``), never lost.
+    """Settings by name. A damaged file is renamed (``settings.damaged.json``), never lost.
 
-    The file of a newer Studio, with a format that is not known here, is left as it is: what can be read of it
-    is taken, and what is chosen is kept beside it, in ``settings.format-1.json``.
+    The file of a newer Studio with an unknown format is unchanged: its readable values are used, and changes
+    are stored beside it, in ``settings.format-1.json``.
     """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
-        """Read ``settings.json`` in ``folder`` (default: `home`); none yet is fine."""
+        # Reads `settings.json` in `folder` (default: `home`), if it exists.
         self.path = (folder if folder is not None else home()) / "settings.json"
         self.damaged: Path | None = None
         self.notice = ""
-        """What a person should know of the file that was found, once, in a sentence; "" for nothing."""
+        """Sentence for the user about the file that was found, once; or ""."""
         self.are_new = False
-        """Whether nothing was kept here before: Studio starts for the first time."""
+        """True if there were no settings: the first start of Studio."""
         self.not_kept: str | None = None
-        """Why the file could not be written last, as a sentence; None when it could."""
+        """Sentence why the last write failed; None when it succeeded."""
         self._unwritten: dict[str, object] = {}
         self._clock = clock
         make_private(self.path.parent, "settings*.json")
         self._values: dict[str, object] = self._read()
 
     def get(self, key: str, default: T) -> T:
-        """The value of ``key``; ``default`` when there is none or it is of another type."""
+        """Return the value of ``key``; ``default`` when it is missing or of another type."""
         value = self._values.get(key, default)
         if default is None or isinstance(value, type(default)):
             return value  # type: ignore[return-value]  # checked on the line above
         return default
 
     def set(self, key: str, value: object) -> None:
-        """Keep ``value`` (anything JSON can say) and write the file. Raises SettingsError.
+        """Set a value (any JSON) and write the file. Raises SettingsError.
 
-        Raises TypeError or ValueError for what JSON can't say: not kept, as nothing else could be written
-        beside it. What another Studio on this computer has kept meanwhile stays, but for this key. What could
-        not be written stays here, and is written with the next value.
+        Raises TypeError or ValueError if it can't be JSON; then nothing changes. Values that another instance
+        has written meanwhile stay, except this key. A value that could not be written is kept in memory, and
+        written with the next one.
         """
         if key in self._values and self._values[key] == value and self.not_kept is None:
             return
@@ -143,17 +143,17 @@ class Settings:
             self._write()
 
     def all(self) -> dict[str, object]:
-        """Every value that is kept, by its name."""
+        """Return all values by name."""
         return dict(self._values)
 
     @property
     def recent(self) -> list[RecentFile]:
-        """Files opened lately, newest first; those that are gone are left out."""
+        """Recent files, newest first, without missing ones."""
         return [file for file in self.recent_known if file.there]
 
     @property
     def recent_known(self) -> list[RecentFile]:
-        """Files opened lately, newest first; those that are gone say so."""
+        """Recent files, newest first, with missing ones marked."""
         found = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
@@ -174,7 +174,7 @@ class Settings:
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
     def rename_recent(self, old: Path, new: Path) -> None:
-        """A file has another name: it stays where it was among the recent ones. Raises SettingsError."""
+        """Rename a recent file in place. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
         self._values = self._of_others()
         kept = [file for file in self.recent_known if file.path != new]
@@ -182,7 +182,7 @@ class Settings:
         self.set_recent(named)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
-        """Remember these files and no others, newest first. Raises SettingsError."""
+        """Set the recent files, newest first. Raises SettingsError."""
         told = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:RECENT_LIMIT]
@@ -210,11 +210,11 @@ class Settings:
         return self._set_aside() if self.path == self._own_path() else self._beside(values)
 
     def _own_path(self) -> Path:
-        """Where the settings are while a newer Studio has its own in their place."""
+        # Used while a newer Studio has its settings in the usual place.
         return self.path.with_name(_OWN_NAME)
 
     def _beside(self, newer: dict[str, object]) -> dict[str, object]:
-        """Leave the file of a newer Studio alone; from now on there is one of our own beside it."""
+        # The file of a newer Studio stays unchanged; a file of this version is used beside it.
         found = self.path.name
         self.path = self._own_path()
         if self.path.exists():
@@ -226,14 +226,14 @@ class Settings:
         return {name: value for name, value in newer.items() if name != "format"}
 
     def _of_others(self) -> dict[str, object]:
-        """What the file says now, with what is not written yet; what is known here if it can't be read."""
+        # Current file content with unwritten values; the known values if it can't be read.
         try:
             values = json.loads(read_whole(self.path))
         except (OSError, ValueError, RecursionError):
             return self._values
         if not isinstance(values, dict):
             return self._values
-        if _format_of(values) > FORMAT:  # a newer Studio runs on this computer, too
+        if _format_of(values) > FORMAT:  # a newer Studio also runs on this computer
             self._beside(values)
             return self._values
         return {**values, **self._unwritten}
@@ -253,7 +253,8 @@ class Settings:
     def _write(self) -> None:
         values = {**self._values, "format": FORMAT}
         text = json.dumps(values, indent=1, ensure_ascii=False, sort_keys=True)
-        # A file's name that is no UTF-8 has lone surrogates: JSON has them as backslash, u and four digits.
+        # A file name that is not UTF-8 has lone surrogates, which JSON represents by backslash, u and four
+        # digits.
         data = text.encode("utf-8", "backslashreplace")
         try:
             write_atomically(self.path, data, durable=False, private=True)
@@ -266,6 +267,6 @@ class Settings:
 
 
 def _format_of(values: Mapping[str, object]) -> int:
-    """The number of the format; 1 for settings that were kept before there were numbers."""
+    # 1 for settings from before there were versions.
     found = values.get("format", 1)
     return found if isinstance(found, int) and not isinstance(found, bool) else 1
