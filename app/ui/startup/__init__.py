@@ -1,4 +1,4 @@
-"""What happens once when Studio starts: the interpreter's settings, one window, files to open, Qt's log.
+"""Steps of starting Studio: interpreter settings, single instance, files to open, Qt's log.
 
-`app.ui.application` calls each of them; none knows another.
+`app.ui.application` calls them; they are independent of each other.
 """

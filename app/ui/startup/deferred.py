@@ -1,4 +1,4 @@
-"""What Studio needs soon, but not to show itself: done after the first paint, a little at a time."""
+"""Deferred steps: work needed soon but not for the first paint, done in small portions after it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _log = logging.getLogger(__name__)
 
 
 class DeferredSteps(QObject):
-    """Takes one step in each turn of the event loop, so that a click waits for one step at most."""
+    """Runs one step per cycle of the event loop, so that a click waits for at most one step."""
 
     def __init__(self, window: QWidget, steps: Iterable[Callable[[], object]]) -> None:
-        """Begins with the first paint of ``window``. A step that fails is logged; the others are taken."""
+        # Starts with the first paint of `window`. A failing step is logged; the others continue.
         super().__init__(window)
         self._window, self._steps = window, deque(steps)
         self.began = False
-        """Whether the window was painted, or it took too long."""
+        """True if the window was painted, or the time limit passed."""
         self._turn = QTimer(self)
         self._turn.timeout.connect(self._take)
         self._late = QTimer(self)
@@ -32,7 +32,7 @@ class DeferredSteps(QObject):
         window.installEventFilter(self)
 
     def put_first(self, steps: Sequence[Callable[[], object]]) -> None:
-        """Take these before all others."""
+        """Run these steps before all others."""
         self._steps.extendleft(reversed(steps))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -54,10 +54,10 @@ class DeferredSteps(QObject):
         step = self._steps.popleft()
         try:
             step()
-        except Exception:  # noqa: BLE001  whatever failed fails again, and is told, where it is used
+        except Exception:  # noqa: BLE001  it fails again, and is reported, where it is used
             _log.exception("a step after the first paint failed")
 
     @property
     def done(self) -> bool:
-        """Whether every step was taken."""
+        """True if every step was run."""
         return not self._steps

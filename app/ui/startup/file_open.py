@@ -1,4 +1,4 @@
-"""Files that come from outside: dropped on the window, or opened by the system (double click on macOS)."""
+"""Files from outside: dropped on the window, or opened by the system (double click on macOS)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DROPS = frozenset({QEvent.Type.DragEnter, QEvent.Type.DragMove, QEvent.Type.Drop
 
 
 class IncomingFiles(QObject):
-    """Opens files that are dropped on a window; ``take`` gets their paths."""
+    """Opens files that are dropped on a window; ``take`` is called with their paths."""
 
     def __init__(self, window: QWidget, take: Callable[[Sequence[Path]], object]) -> None:
         super().__init__(window)
@@ -37,11 +37,11 @@ class IncomingFiles(QObject):
 
 
 class Application(QApplication):
-    """The application; macOS tells it, and no window, which files the Finder wants to be opened.
+    """Application; on macOS it receives the files that the Finder opens, instead of a window.
 
-    A Python event filter of the whole application would hear of them, too, and end the process with the first
-    event of the block editor's browser: PySide asks each receiver for its C++ type, and Chromium's have none
-    (ADR 0018). So there can be no such filter, neither of ours nor of a plug-in.
+    It supports no Python event filter: that would receive the events of the block editor's browser too and
+    crash the process, because PySide queries each receiver for its C++ type, and Chromium's have none (ADR
+    0018). This applies to plug-ins as well.
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -50,7 +50,7 @@ class Application(QApplication):
         self._waiting: list[Path] = []
 
     def open_files_with(self, take: Callable[[Sequence[Path]], object]) -> None:
-        """From now on ``take`` gets what is to be opened, and at once what came before there was a window."""
+        """Set the function that opens files, and call it for files that arrived before."""
         self._take = take
         waiting, self._waiting = self._waiting, []
         if waiting:
@@ -66,7 +66,7 @@ class Application(QApplication):
         return super().event(event)
 
     def installEventFilter(self, filter_object: QObject) -> None:
-        """Raises TypeError, as the class says; filter a window or a widget."""
+        """Raise TypeError; filter a window or a widget instead (see the class)."""
         raise TypeError(
             f"{type(filter_object).__name__} can't filter the events of the whole application: the first one "
             "of the block editor's browser would end Studio; filter those of a window or a widget"
@@ -74,5 +74,5 @@ class Application(QApplication):
 
 
 def paths_of(dropped: QMimeData) -> list[Path]:
-    """The files of this computer in what is dragged."""
+    """Return the local files of a drag."""
     return [Path(url.toLocalFile()) for url in dropped.urls() if url.isLocalFile()]

@@ -1,8 +1,8 @@
-"""Draw without the graphics driver where there is no graphics processor, and the driver is a program, too.
+"""Software rendering on machines without a GPU, where the graphics driver is software too.
 
-Qt has a graphics driver compose a window once it shows a web page, on every change all of it. Without a
-processor of its own the driver (llvmpipe on Linux, WARP on Windows) is slow: it took a third of a core for
-pictures 25 times a second. Qt's own drawing takes nothing beyond the window's.
+Once a window shows a web page, Qt lets the graphics driver compose the whole window at every change. Without
+a GPU the driver (llvmpipe on Linux, WARP on Windows) is slow: it took a third of a core for images at 25 Hz.
+Qt's own software renderer adds almost nothing.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from collections.abc import Callable, MutableMapping, Sequence
 
 CHOICE, BY_SOFTWARE = "QT_QUICK_BACKEND", "software"
 DEVICES = ("/dev/dri/renderD*", "/dev/nvidia[0-9]*", "/dev/dxg", "/dev/mali*", "/dev/kgsl*", "/dev/pvr*")
-"""What a graphics processor is asked through on Linux, also in Windows' subsystem and on small boards."""
+"""Devices of graphics processors on Linux, including WSL and single-board computers."""
 BASIC = ("Microsoft Basic Display", "Microsoft Basic Render")
-"""How Windows calls what stands in for a graphics driver."""
+"""Names of Windows' fallback graphics adapters."""
 _ATTACHED = 0x1
 
 
 def draw_by_software(
     environ: MutableMapping[str, str], platform: str, there: Callable[[str], bool] | None = None
 ) -> bool:
-    """Let Qt draw by itself when there is no graphics processor; whether it does.
+    """Select Qt's software renderer on machines without a GPU; return True if selected.
 
-    A person's own choice in the environment stays. Called before Qt is used. ``there`` tells of a platform
-    whether it has one.
+    A choice in the environment is respected. Call it before Qt is used. ``there`` returns whether a platform
+    has a GPU.
     """
     if not environ.get(CHOICE) and not (there or has_graphics_processor)(platform):
         environ[CHOICE] = BY_SOFTWARE
@@ -34,21 +34,21 @@ def draw_by_software(
 
 
 def has_graphics_processor(platform: str) -> bool:
-    """Whether this computer has one, as far as the system tells; where it tells nothing it has."""
+    """Return whether this computer has a GPU; True where the system doesn't report it."""
     if platform.startswith("linux"):
-        return any(glob.glob(pattern) for pattern in DEVICES)  # noqa: PTH207 - of no folder of ours
+        return any(glob.glob(pattern) for pattern in DEVICES)  # noqa: PTH207 - absolute patterns
     if platform == "win32":
         return has_driver(adapters())
     return True
 
 
 def has_driver(names: Sequence[str]) -> bool:
-    """Whether any of these adapters is more than Windows' stand-in; none at all tells nothing."""
+    """Return whether one of these adapters is not Windows' fallback; True for an empty list."""
     return not names or any(not name.startswith(BASIC) for name in names)
 
 
 def adapters() -> list[str]:
-    """How Windows calls the graphics adapters that show something; none elsewhere."""
+    """Return the names of the active graphics adapters on Windows; empty elsewhere."""
     found: list[str] = []
     if sys.platform == "win32":
 

@@ -1,16 +1,16 @@
-"""Python's own settings that a window needs: how soon a thread has its turn, and when garbage is collected.
+"""Interpreter settings for a responsive window: thread switching and garbage collection.
 
-Painting a table gives Python up and wants it back hundreds of times. While a thread of ours receives 50 000
-messages a second each of these could take 5 ms, Python's own measure, and a click waited for several.
+Painting a table releases and reacquires the GIL hundreds of times. While another thread receives 50 000
+messages per second, each reacquisition could take Python's default interval of 5 ms, and a click waited for
+several.
 
-A collection of everything takes 50 to 170 ms with what a window is made of, and many messages that come and
-go call for one. So nothing is collected while Studio starts; what stands then is put aside from all later
-collections, which have little left to look at.
+A full collection takes 50 to 170 ms with the objects of a window, and many short-lived messages trigger one.
+So nothing is collected while Studio starts; the objects that exist then are frozen, which leaves little for
+later collections.
 
-Python collects in whichever thread makes one object too many. What a circle holds of Qt's (a timer, a model)
-would be deleted there, while the window's thread may be using it, which ends Studio with a segmentation
-fault; or in the middle of what Qt does with a widget. So only the window's thread collects, and only
-between two events.
+Python collects in whichever thread allocates one object too many. Qt objects in a cycle (a timer, a model)
+would be deleted there while the window's thread may be using them, which crashes Studio; or in the middle of
+Qt's own work with a widget. So only the window's thread collects, and only between two events.
 """
 
 from __future__ import annotations
@@ -24,39 +24,43 @@ SWITCH_INTERVAL_S = 0.0005
 SETTLE_MS = 1000
 COLLECT_MS = 250
 NEW_OBJECTS, COLLECTIONS = 10_000, 20
-"""Objects after which the young are collected, and collections after which the next older are, too."""
+"""Number of new objects after which the youngest generation is collected, and of collections after which the
+next older one is."""
 
 
 def shorten_switch_interval() -> None:
-    """Let every thread have its turn soon; said again it does nothing."""
+    """Shorten the thread switch interval. Idempotent."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
 
 def freeze_garbage() -> None:
-    """Put everything that there is now aside: it is not looked at again. Takes a few microseconds."""
+    """Exclude all existing objects from later collections. Takes a few microseconds."""
     gc.freeze()
 
 
 def collect_garbage() -> None:
-    """Collect here and now what Python would have collected by itself since the last time."""
+    """Collect what Python would have collected automatically since the last call."""
     made, young, middle = gc.get_count()
     if made > NEW_OBJECTS:
         gc.collect(0 if young <= COLLECTIONS else 1 if middle <= COLLECTIONS else 2)
 
 
 class GcTimer(QTimer):
-    """`collect_garbage` four times a second from `start` on, in its own thread; no other collects."""
+    """Calls `collect_garbage` four times a second in its own thread, from `start` on.
+
+    Automatic collection is off.
+    """
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         gc.disable()
-        self.setTimerType(Qt.TimerType.CoarseTimer)  # the computer need not wake for it alone
+        self.setTimerType(Qt.TimerType.CoarseTimer)  # it need not wake the computer
         self.setInterval(COLLECT_MS)
         self.timeout.connect(collect_garbage)
 
 
 class GcFreezeTimer(QTimer):
-    """`freeze_garbage` a second after the last large thing was made; `start` it when one was."""
+    """Calls `freeze_garbage` one second after `start`; start it when many objects were created."""
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)

@@ -1,7 +1,7 @@
-"""The desktop's own file dialogs on Linux: by its portal, when that answers on the session's bus.
+"""Native file dialogs on Linux: through the desktop portal, if it is available on the session bus.
 
-Qt asks the portal when its platform theme "xdgdesktopportal" is chosen before the application is made.
-Without a bus nothing is loaded and nothing waited for.
+Qt uses the portal if its platform theme "xdgdesktopportal" is selected before the application is created.
+Without a bus nothing is loaded or delayed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ LONGEST_MS = 300
 
 
 def has_bus(environ: MutableMapping[str, str]) -> bool:
-    """Whether there is a session's bus to ask."""
+    """Return whether there is a session bus."""
     if environ.get("DBUS_SESSION_BUS_ADDRESS"):
         return True
     folder = environ.get("XDG_RUNTIME_DIR")
@@ -24,7 +24,7 @@ def has_bus(environ: MutableMapping[str, str]) -> bool:
 
 
 def chooser_answers() -> bool:
-    """Whether the portal has a dialog for files; False within 0.3 s when it does not say."""
+    """Return whether the portal has a file chooser; False after 0.3 s without a reply."""
     from PySide6.QtDBus import QDBusConnection, QDBusMessage  # noqa: PLC0415 - only where there is a bus
 
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, "studio-portal")
@@ -41,14 +41,14 @@ def chooser_answers() -> bool:
 def use_portal(
     environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = chooser_answers
 ) -> None:
-    """Choose the portal's dialogs where they are; a theme that somebody chose stays.
+    """Select the portal's dialogs if available, unless a theme is chosen.
 
-    ``platform`` as `sys.platform` says it. Call it before the application is made.
+    ``platform`` is `sys.platform`. Call it before the application is created.
     """
     if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and answers():
         environ[CHOICE] = THEME
 
 
 def has_system_dialogs(environ: MutableMapping[str, str], platform: str) -> bool:
-    """Whether the system's file dialogs are to be used: on Windows and macOS, and on Linux by the portal."""
+    """Return whether native file dialogs are used: on Windows and macOS, and on Linux with the portal."""
     return platform in {"win32", "darwin"} or environ.get(CHOICE) == THEME

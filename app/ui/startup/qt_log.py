@@ -1,7 +1,7 @@
-"""What Qt, Chromium and our own log say: known noise is dropped, the rest goes to the log and the Console.
+"""Log of Qt, Chromium and Studio: known noise is dropped, the rest goes to the log and the Console.
 
-Noise is what these libraries tell on machines without a graphics card or a message bus, where Studio works
-all the same. What is not known to be harmless is never dropped.
+Noise are messages of these libraries on machines without a GPU or a message bus, where Studio works all the
+same. Only messages known to be harmless are dropped.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from app.core.faults import RepeatFilter
 from nep.system import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
-QUIET = "--log-level=3"  # Chromium's own lines: only what ends it
+QUIET = "--log-level=3"  # only fatal messages of Chromium
 NO_WINDOW = "no Qt platform plugin could be initialized"
 KEPT = 200
 
@@ -31,7 +31,7 @@ NOISE = re.compile(
     r"|Unable to detect GPU vendor|GBM is not supported with the current configuration"
     r"|GPUInfo not initialized on GpuInfoUpdate|Sandboxing disabled by user"
     r"|Couldn't (load|resolve) (pipewire|va)\b.* (library|symbols)$"
-    r"|Error loading text-to-speech plug-in "  # the speaker says in its own words that there is no voice
+    r"|Error loading text-to-speech plug-in "  # the speaker reports a missing voice itself
     r"|PulseAudioService: pa_context_connect\(\) failed$|Using Qt multimedia with FFmpeg "
     r"|This plugin does not support (propagateSizeHints|raise|createPlatformVulkanInstance)"
 )
@@ -47,17 +47,17 @@ _log = logging.getLogger("qt")
 
 
 def quiet_chromium(environ: MutableMapping[str, str]) -> None:
-    """Ask Chromium to keep its lines for itself, unless the user's flags say something about its log."""
+    """Silence Chromium's log, unless the user's flags configure it."""
     flags = environ.get(FLAGS, "")
     if "--log-level" not in flags and "--enable-logging" not in flags:
         environ[FLAGS] = f"{flags} {QUIET}".strip()
 
 
 def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
-    """Log one line of Qt, unless it is known noise.
+    """Log one message of Qt, unless it is known noise.
 
-    Where Qt finds that no window can open, which is before Studio has anything to lose, the program ends here
-    with the exit code 2: Qt would advise to reinstall, and abort.
+    If no window can be opened, which happens before there is anything to lose, the program exits here with
+    code 2: Qt would advise to reinstall, and abort.
     """
     if kind == QtMsgType.QtFatalMsg and NO_WINDOW in words:
         _log.critical(
@@ -73,7 +73,7 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
 
 
 class Log(logging.Handler):
-    """Keeps warnings and errors of any thread until the window's thread takes them to the Console."""
+    """Logging handler that stores warnings and errors of any thread for the Console."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -81,7 +81,7 @@ class Log(logging.Handler):
         self._kept: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep one line; what happens again and again is kept with its count."""
+        """Store a record; repetitions are stored with their count."""
         if getattr(record, "in_console", False):
             return
         told = self._once.filter(record)
@@ -90,15 +90,15 @@ class Log(logging.Handler):
             self._kept.append((level, told.name.partition(".")[0], told.getMessage()))
 
     def take(self, add: Callable[[str, str, str], object]) -> None:
-        """Give what was kept to ``add`` (level, origin, words), oldest first."""
+        """Pass stored records to ``add`` (level, origin, text), oldest first."""
         while self._kept:
             add(*self._kept.popleft())
 
 
 class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
-    """Warnings and errors on the standard error output, with the traceback of what is new.
+    """Logging handler that writes warnings and errors to stderr, with the traceback of new ones.
 
-    Nobody waits for it, the window's thread least of all: a terminal may take nothing for hours.
+    Never blocks a thread: a terminal may not accept output for hours.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -108,23 +108,23 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
         self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one line; what happens again and again comes with its count."""
+        """Write a record; repetitions are written with their count."""
         told = self._once.filter(record)
         if told is not None:
             super().emit(told)
-            if told.levelno >= logging.CRITICAL:  # Qt ends the program behind it
+            if told.levelno >= logging.CRITICAL:  # Qt ends the program afterwards
                 self.stream.drain()
 
     def close(self) -> None:
-        """Give what waits a moment to be written; logging calls it at the end of the program."""
+        """Give pending output a moment to be written. Called by logging at exit."""
         self.stream.close()
         super().close()
 
 
 def listen() -> Log:
-    """From now on hear Qt and what is raised anywhere, and keep what is logged.
+    """Install handlers for Qt's messages, uncaught exceptions and log records; return the Console's.
 
-    It also goes to the standard error output and into the log files (`app.core.faults`).
+    Records also go to stderr and into the log files (`app.core.faults`).
     """
     faults.install_hooks()
     qInstallMessageHandler(on_qt_message)

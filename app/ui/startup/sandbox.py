@@ -1,9 +1,8 @@
-"""The sandbox of the block editor's browser, on a Linux that allows a program no name spaces of its own.
+"""Sandbox of the block editor's browser, on Linux systems that deny user namespaces.
 
-Chromium shuts its processes off twice: by name spaces, and by a filter of system calls. Where a guard such
-as AppArmor forbids the first (Ubuntu 24.04 and later, for programs that no profile names), Chromium finds out
-too late and ends the whole of Studio. So it is tried beforehand, and then Chromium is told to do without: the
-filter stays.
+Chromium isolates its processes by namespaces and by a system call filter. Where the former are denied, for
+example by AppArmor (Ubuntu 24.04 and later, for programs without a profile), Chromium finds out too late and
+crashes Studio. So namespaces are tried first, and disabled for Chromium if necessary: the filter stays.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ FILTER_ALONE = "--disable-namespace-sandbox"
 OFF = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
 NOWHERE = b"/proc/self/fdinfo"
-"""Where Chromium's processes are shut in: a folder that is empty once its process has ended."""
+"""Root folder of Chromium's isolated processes, which is empty once its process has ended."""
 LONGEST_S = 2.0
 
 _log = logging.getLogger("studio.editor")
 
 
 class SandboxTrial:
-    """Tries whether this program may shut a process off as Chromium does, by a process that ends at once."""
+    """Tests whether this program may create namespaces as Chromium does, in a short-lived process."""
 
     def __init__(self) -> None:
-        """Begin; the system takes some 20 ms, in which other things can be done."""
-        self._ended, writer = os.pipe()  # it is closed at the other end when that process has ended
+        # Takes about 20 ms, during which other work can be done.
+        self._ended, writer = os.pipe()  # closed at the other end when that process has ended
         try:
             self._process = os.fork()
             if self._process == 0:
@@ -49,7 +48,7 @@ class SandboxTrial:
             os.close(writer)
 
     def allowed(self) -> bool:
-        """Whether it could, asked once; False as well when that can't be found out. Waits at most 2 s."""
+        """Return whether it succeeded; call it once. False also when unknown. Waits at most 2 s."""
         if self._process < 0:
             return False
         if not select.select([self._ended], [], [], LONGEST_S)[0]:
@@ -59,9 +58,9 @@ class SandboxTrial:
 
 
 def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
-    """Begin to try it; None where nothing is to be tried. ``platform`` as `sys.platform` says it.
+    """Start the test; None where it isn't needed. ``platform`` is `sys.platform`.
 
-    Somebody may have switched the sandbox off, or have chosen another one by Chromium's flags.
+    The user may have disabled the sandbox, or chosen another one by Chromium's flags.
     """
     if not platform.startswith("linux") or environ.get(OFF) or "sandbox" in environ.get(FLAGS, ""):
         return None
@@ -69,14 +68,14 @@ def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
 
 
 def fit_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
-    """Let Chromium do with its filter where the trial has failed; call it before the web engine begins."""
+    """Restrict Chromium to its filter if the test failed. Call it before the web engine starts."""
     if trial is not None and not trial.allowed():
         _log.info("no name spaces are allowed here: the block editor's browser has its filter alone")
         environ[FLAGS] = f"{environ.get(FLAGS, '')} {FILTER_ALONE}".strip()
 
 
 def shuts_itself_off() -> bool:
-    """Shut this very process off as Chromium does its own; whether the system let it."""
+    """Isolate this process as Chromium does; return whether the system permits it."""
     if sys.platform == "win32":
         return False
     user, group = os.geteuid(), os.getegid()

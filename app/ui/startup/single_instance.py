@@ -1,7 +1,7 @@
-"""One window for one person: a second start hands its files to the Studio that runs already.
+"""Single instance: a second start passes its files to the running Studio.
 
-Both meet at a local socket in a folder that only this user can reach, and each looks whose the other one is.
-``--new-window`` leaves it.
+Both use a local socket in a private folder, and each checks the owner of the other. ``--new-window`` skips
+it.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ CONNECT_MS = 300
 ANSWER_MS = 3000
 START_S, LOOK_S = 20.0, 0.05
 LONGEST = 1_000_000
-LONGEST_PATH = 100  # a Unix socket's name has 108 bytes at most
+LONGEST_PATH = 100  # the path of a Unix socket has at most 108 bytes
 OK = b"ok\n"
 
 
 @dataclass(frozen=True)
 class StartRequest:
-    """What a second start asks of the window that is there."""
+    """Request of a second start to the running window."""
 
     files: tuple[Path, ...] = ()
     demo: bool = False
 
 
 def place(folder: Path) -> str:
-    """The name of the socket of Studio's folder; empty when there is no folder that only this user reaches.
+    """Return the socket name for Studio's folder; empty without a private folder.
 
-    It lies in the user's runtime folder, else in Studio's own folder, else in a private one for the time
-    being: where others can write, one of them could wait in the place of the window.
+    The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary one: in a
+    shared folder another user could impersonate the window.
     """
     mark = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
     if os.name != "posix":
@@ -73,7 +73,7 @@ def place(folder: Path) -> str:
 
 
 def is_private(folder: Path) -> bool:
-    """Whether it is a folder of this user into which nobody else gets; a link to one is none."""
+    """Return whether a folder belongs to this user and is private; False for a link."""
     try:
         about = folder.lstat()
     except OSError:
@@ -82,7 +82,7 @@ def is_private(folder: Path) -> bool:
 
 
 def is_ours(name: str) -> bool:
-    """Whether the socket of this name is there and this user's own, in a folder that is nobody else's."""
+    """Return whether the socket exists, belongs to this user, and is in a private folder."""
     if os.name != "posix":
         return bool(name)
     try:
@@ -93,7 +93,7 @@ def is_ours(name: str) -> bool:
 
 
 def peer_of(descriptor: int) -> int | None:
-    """The user at the other end of a local socket; None where the system does not tell."""
+    """Return the user id at the other end of a local socket; None where the system doesn't report it."""
     asked = getattr(socket, "SO_PEERCRED", None)
     copy = os.dup(descriptor)
     try:
@@ -113,12 +113,12 @@ def peer_of(descriptor: int) -> int | None:
 
 
 def hand_over(name: str, asked: StartRequest) -> bool:
-    """Let the window that runs do it; False when none runs. Waits at most 3 s for its answer.
+    """Pass the request to the running window; return False when there is none. Waits at most 3 s.
 
-    What another user put there is not talked to.
+    Sockets of other users are ignored.
     """
     if not is_ours(name):
-        return False  # on Unix without Qt's network, which takes its time to load
+        return False  # on Unix before Qt's network module is loaded, which takes time
     line = QtNetwork.QLocalSocket()
     line.connectToServer(name)
     if not line.waitForConnected(CONNECT_MS) or _is_others(line):
@@ -136,17 +136,17 @@ def hand_over(name: str, asked: StartRequest) -> bool:
 
 
 def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
-    """Whether the window that runs, or one that another start is bringing up, does it.
+    """Return whether a running or starting window accepted the request.
 
-    When not, this start has the ``turn`` and brings up a window; it leaves the turn when that can be found.
-    Who clicks twice on Studio's icon gets one window.
+    If not, this start holds the lock ``turn`` and opens a window; it releases the lock when the window is
+    reachable. So a double click on Studio's icon opens one window.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
     while not hand_over(name, asked):
         if not name or time.monotonic() >= until:
             return False
         if turn.acquire():
-            if waited and hand_over(name, asked):  # it came between the two questions
+            if waited and hand_over(name, asked):  # it appeared between the two attempts
                 turn.release()
                 return True
             return False
@@ -163,12 +163,12 @@ def _is_others(line: QtNetwork.QLocalSocket) -> bool:
 
 
 class SingleInstanceServer(QObject):
-    """The place where later starts find this window; `close` leaves it."""
+    """Server by which later starts find this window; `close` ends it."""
 
     def __init__(
         self, name: str, do: Callable[[StartRequest], object], parent: QObject | None = None
     ) -> None:
-        """``do`` is called for each later start."""
+        # `do` is called for each request.
         super().__init__(parent)
         self._do = do
         self._heard: dict[QtNetwork.QLocalSocket, bytes] = {}
@@ -176,12 +176,12 @@ class SingleInstanceServer(QObject):
         self._server.setSocketOptions(QtNetwork.QLocalServer.SocketOption.UserAccessOption)
         self._server.newConnection.connect(self._come)
         self.open = self._listen(name)
-        """Whether later starts can find it; without, each has a window of its own."""
+        """True if later starts can find it; otherwise each opens its own window."""
 
     def _listen(self, name: str) -> bool:
         if not name:
             return False
-        # On Unix a second listener takes the first one's place without a word: look first who is there.
+        # On Unix a second listener replaces the first one silently: check first whether one is there.
         probe = QtNetwork.QLocalSocket()
         probe.connectToServer(name)
         if probe.waitForConnected(CONNECT_MS):
@@ -189,7 +189,7 @@ class SingleInstanceServer(QObject):
             return False
         if self._server.listen(name):
             return True
-        QtNetwork.QLocalServer.removeServer(name)  # what a Studio that was killed left behind
+        QtNetwork.QLocalServer.removeServer(name)  # left behind by a killed instance
         return self._server.listen(name)
 
     def _come(self) -> None:
@@ -222,16 +222,16 @@ class SingleInstanceServer(QObject):
 
     def _gone(self, socket: QtNetwork.QLocalSocket) -> None:
         self._heard.pop(socket, None)
-        if isValid(socket):  # not one that goes with the window
+        if isValid(socket):  # not one that is deleted with the window
             socket.deleteLater()
 
     def close(self) -> None:
-        """Nobody finds this window any more."""
+        """Stop accepting requests."""
         self._server.close()
 
 
 def parse(data: bytes) -> StartRequest | None:
-    """What a start asked; None for what no Studio sends."""
+    """Parse a request; None if it is malformed."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):
