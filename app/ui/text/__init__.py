@@ -1,4 +1,4 @@
-"""Values as people read them: numbers, dates, a robot's sensors.
+"""Formatting of values for people: numbers, dates, sensors.
 
-Words in a language come from `nep.i18n`; no widget is made here.
+Translations come from `nep.i18n`; no widgets here.
 """

@@ -1,4 +1,4 @@
-"""Programs as people read them: of which NEP they are, and what they take of a processor."""
+"""Formatting of nodes: NEP version and CPU use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GENERATIONS = {
 
 
 def generation_words(node: NodeEntry) -> str:
-    """Native, which versions of the original NEP, or which other network."""
+    """Return "native", the versions of the original NEP, or the other network."""
     kind = kind_named(node.network)
     if kind is not None:
         return kind.words
@@ -22,7 +22,7 @@ def generation_words(node: NodeEntry) -> str:
 
 
 def cpu_words(ratio: float | None) -> str:
-    """The share of a core: 0.4 %, 12 %, 130 %; blank when not known."""
+    """Format a share of a core: 0.4 %, 12 %, 130 %; "" if unknown."""
     if ratio is None:
         return ""
     percent = ratio * 100

@@ -1,4 +1,4 @@
-"""Figures as people read them: a number with its unit, blank when it is not known; and keys."""
+"""Formatting of numbers with units, "" if unknown; and of keyboard shortcuts."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ KEYS = {
     "Tab": plazy("key", "Tab"),
     "Up": plazy("key", "Up"),
 }
-"""What stands on keys, by what Qt calls them; letters and F12 are the same everywhere."""
+"""Labels of keys by Qt's names; letters and F12 are the same in all languages."""
 _KEY = re.compile(r"[A-Z][A-Za-z]+")
-THIN = "\u2009"  # a thin space between thousands
+THIN = "\u2009"  # thin space between thousands
 
 
 def rate_words(rate_hz: float | None) -> str:
-    """Messages a second: 30.0, 0.4, 1 204; blank when not known."""
+    """Format a rate in messages per second: 30.0, 0.4, 1 204; "" if unknown."""
     if rate_hz is None:
         return ""
     return number(rate_hz, ".1f") if rate_hz < 1000 else grouped(round(rate_hz))
 
 
 def bandwidth_words(bytes_per_s: float | None) -> str:
-    """92 B/s, 1.6 kB/s, 46 kB/s, 5.1 MB/s; blank when not known."""
+    """Format a bandwidth: 92 B/s, 1.6 kB/s, 46 kB/s, 5.1 MB/s; "" if unknown."""
     return "" if bytes_per_s is None else f"{size_words(bytes_per_s)}/s"
 
 
 def size_words(size_bytes: float) -> str:
-    """412 B, 1.6 kB, 46 kB, 5.1 MB."""
+    """Format a size: 412 B, 1.6 kB, 46 kB, 5.1 MB."""
     if size_bytes < 1000:
         return f"{round(size_bytes)} B"
     value, unit = size_bytes / 1000, "kB"
@@ -62,7 +62,7 @@ def size_words(size_bytes: float) -> str:
 
 
 def age_words(age_s: float | None) -> str:
-    """12 ms, 0.4 s, 6 s, 2 min, 3 h; blank when not known."""
+    """Format an age: 12 ms, 0.4 s, 6 s, 2 min, 3 h; "" if unknown."""
     if age_s is None:
         return ""
     if age_s < 0.0995:
@@ -75,49 +75,48 @@ def age_words(age_s: float | None) -> str:
 
 
 def latency_words(latency_s: float) -> str:
-    """0.6 ms, 41 ms, 1.2 s."""
+    """Format a latency: 0.6 ms, 41 ms, 1.2 s."""
     if latency_s < 0.00995:
         return f"{number(latency_s * 1000, '.1f')} ms"
     return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{number(latency_s, '.1f')} s"
 
 
 def grouped(count: int) -> str:
-    """18 204: thousands apart."""
+    """Format a count with grouped thousands: 18 204."""
     return f"{count:,}".replace(",", THIN)
 
 
 def seconds_words(value_s: float) -> str:
-    """0.4 s, 14 s, 2 min: how long something took."""
+    """Format a duration: 0.4 s, 14 s, 2 min."""
     if value_s < 10:
         return f"{number(value_s, '.1f')} s"
     return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"
 
 
 def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
-    """Shortcuts, by commas, as people write them: "Ctrl+Shift+S"; on a Mac, where Ctrl is Cmd, "⇧⌘S"."""
+    """Format shortcuts, separated by commas: "Ctrl+Shift+S"; on a Mac, where Ctrl is Cmd, "⇧⌘S"."""
     if platform != "darwin":
         return _named_keys(shortcut, {})
     return ", ".join(_mac_key(each) for each in shortcut.split(", "))
 
 
 def _mac_key(shortcut: str) -> str:
-    """One shortcut in the signs of a Mac, in the order of its menus."""
+    # In the order of a Mac's menus.
     *held, key = re.split(r"\+(?=.)", shortcut)
     return "".join(sign for name, sign in MAC_KEYS.items() if name in held) + _named_keys(key, MAC_KEYS)
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
-    """A button's words with its key: "Save (Ctrl+S)"; on a Mac "Save (⌘S)"."""
+    """Return a tooltip with its shortcut: "Save (Ctrl+S)"; on a Mac "Save (⌘S)"."""
     return f"{tip} ({spoken_key(shortcut, platform)})" if shortcut else tip
 
 
 def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
-    """The shortcut with the words that stand on its keys, or these signs instead of them."""
     return _KEY.sub(lambda key: signs.get(key[0]) or _(KEYS.get(key[0], key[0])), shortcut)
 
 
 def length_words(seconds: float) -> str:
-    """0:42, 12:04, 1:32:10: how long a recording is."""
+    """Format the length of a recording: 0:42, 12:04, 1:32:10."""
     whole = int(seconds) if 0 <= seconds < 1e9 else 0
     minutes, rest = divmod(whole, 60)
     hours, minutes = divmod(minutes, 60)

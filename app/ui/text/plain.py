@@ -1,7 +1,7 @@
-"""Names from the network are words, never markup: in tooltips, where Qt guesses, and in menus.
+"""Escaping of names from the network: plain text, never markup, in tooltips and menus.
 
-Qt takes a tooltip that looks like HTML for HTML. A node could then be called ``<img src="//server/share">``,
-and pointing at its name would show a file of this computer, or tell a server who is here.
+Qt interprets a tooltip that looks like HTML as HTML. A node named ``<img src="//server/share">`` could then
+show a file of this computer, or reveal this user to a server, when the mouse is on its name.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ import unicodedata
 from PySide6.QtGui import Qt
 
 LONG_WORD, PIECE = 20, 4
-MAY_BREAK = "\u200b"  # shows nothing; a line may end there
+MAY_BREAK = "\u200b"  # zero-width space, at which a line may break
 
 
 def breakable(words: str) -> str:
-    """The same, with places in very long words where a line may end: a label cuts off what it can't break."""
+    """Insert break opportunities into very long words, which a label would otherwise cut off."""
     return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
 
 
 def _pieces(word: str) -> str:
-    """A letter and what belongs to it (accents, joined signs) stay together."""
+    # Combining characters stay with their letter.
     made, since = "", 0
     for letter in word:
         if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
@@ -31,12 +31,12 @@ def _pieces(word: str) -> str:
 
 
 def tip(words: str) -> str:
-    """What `setToolTip` shows as exactly these words."""
+    """Return a tooltip that shows exactly this text."""
     if not Qt.mightBeRichText(words):
         return words
     return f'<span style="white-space: pre-wrap">{html.escape(words)}</span>'
 
 
 def entry(name: str) -> str:
-    """What a menu shows as exactly this name: an ampersand is no key, a tab begins no shortcut."""
+    """Return a menu entry that shows exactly this name: no mnemonic by an ampersand, no shortcut by a tab."""
     return name.replace("&", "&&").replace("\t", " ")

@@ -1,4 +1,4 @@
-"""A robot's sensor as a row says it: its value in words, what stands beside it, its share of its range."""
+"""Formatting of sensor values for a row: value, details, and share of the range."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ _MAX_NAMES = 20
 
 @dataclass(frozen=True, slots=True)
 class ReadingWords:
-    """``value`` in bold at the right, ``beside`` in the middle, ``share`` (0 to 1) as a bar; None: no bar."""
+    """Formatted reading.
+
+    ``value`` in bold at the right, ``beside`` in the middle, ``share`` (0 to 1) as a bar, or None.
+    """
 
     value: str = ""
     beside: str = ""
@@ -24,7 +27,7 @@ class ReadingWords:
 
 
 def reading_of(sensor: Sensor, value: object) -> ReadingWords:
-    """How to say a sensor's newest value; nothing when there is none yet."""
+    """Format a sensor's newest value; empty when there is none."""
     if value is None:
         return ReadingWords()
     if sensor.kind == "boolean" or isinstance(value, bool):
@@ -44,12 +47,12 @@ def reading_of(sensor: Sensor, value: object) -> ReadingWords:
 
 
 def yes_words(value: object) -> str:
-    """Say "yes" or "no"."""
+    """Return "yes" or "no", translated."""
     return _("yes") if value else _("no")
 
 
 def number_words(value: float, unit: str | None) -> str:
-    """0.82 m, 84 %, 31°: as many decimals as matter."""
+    """Format a number with significant decimals: 0.82 m, 84 %, 31°."""
     if isinstance(value, int) or float(value).is_integer():
         words = f"{value:.0f}"
     elif abs(value) < 10:
@@ -83,7 +86,7 @@ def _detections(value: Mapping[str, object]) -> ReadingWords:
 
 
 def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
-    """Fields of one unit are said together ("1.3, 0.3 m"), the others beside ("facing 31°")."""
+    # Fields with the same unit are combined ("1.3, 0.3 m"), the others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
     numbers = [(field, told) for field, told in known if _is_number(told)]
