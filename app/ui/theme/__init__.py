@@ -1,4 +1,5 @@
-"""The look of Studio: tokens, colours, fonts, icons and the style sheet.
+"""Theme of Studio: tokens, colours, fonts, icons and the style sheet.
 
-`theme` gives each colour, size and font by the name of its role; `tokens` reads them from the design's file.
+`theme` provides each colour, size and font by the name of its role; `tokens` reads them from the design's
+file.
 """

@@ -1,4 +1,4 @@
-"""The bundled fonts: Inter for text, JetBrains Mono for topics, paths, values and programs."""
+"""Bundled fonts: Inter for text, JetBrains Mono for topics, paths, values and programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PySide6.QtGui import QFont, QFontDatabase
 from app import resources
 
 LOADED = "fontsRefused"
-"""What the application remembers: that they were loaded, and what Qt refused of them."""
+"""Application property with the font files that Qt rejected; set once they are loaded."""
 FILES = (
     "Inter-Regular.otf",
     "Inter-Medium.otf",
@@ -24,10 +24,10 @@ FILES = (
 
 
 def load() -> tuple[str, ...]:
-    """Register the bundled fonts with Qt; the files that Qt refused (an empty tuple when all is well).
+    """Register the bundled fonts with Qt; return the rejected files.
 
-    Needs a QGuiApplication. Called again it does nothing: each file that Qt gets, also one that it has, makes
-    it forget how wide and high all words are.
+    Needs a QGuiApplication. Idempotent, because each registration, even of a known file, clears Qt's cache of
+    text sizes.
     """
     application = QCoreApplication.instance()
     if application is not None and application.property(LOADED) is not None:
@@ -43,7 +43,7 @@ def load() -> tuple[str, ...]:
 
 
 def make(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:
-    """A font with figures of one width (``tnum``); letter spacing in em."""
+    """Return a font with tabular figures (``tnum``) and letter spacing in em."""
     font = QFont(list(families))
     font.setPixelSize(max(1, round(size_px)))
     font.setWeight(QFont.Weight(weight))

@@ -1,7 +1,7 @@
-"""Lucide icons in the colour of the words beside them, sharp at every device pixel ratio.
+"""Lucide icons in the colour of the adjacent text, sharp at every device pixel ratio.
 
-One drawing per icon, whatever the theme: an engine puts the colour of a role in place of ``currentColor``
-when it paints. Delegates and painted widgets call `paint_icon`; controls that want a QIcon use `IconEngine`.
+One drawing per icon for all themes: an engine replaces ``currentColor`` by the colour of a role when it
+paints. Delegates and painted widgets call `paint_icon`; controls that need a QIcon use `IconEngine`.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _log = logging.getLogger("studio")
 
 @lru_cache(maxsize=1)
 def _shapes() -> dict[str, str]:
-    """What stands inside each icon's <svg>, by name: all of Lucide, since a robot may name any of them."""
+    # The content of each icon's <svg> by name: all of Lucide, since a robot may name any of them.
     text = resources.path("icons", "lucide.txt").read_text("utf-8")
     return dict(line.split("\t", 1) for line in text.splitlines())
 
 
 def names() -> frozenset[str]:
-    """The icons that Studio ships."""
+    """Return the names of all icons."""
     return frozenset(_shapes())
 
 
@@ -68,9 +68,9 @@ def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) 
 
 
 def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
-    """Paint an icon into a square of logical pixels; ``dot`` is the filled disc of "runs now".
+    """Paint an icon into a square of logical pixels; ``dot`` is the filled disc of a running block.
 
-    For a name that is no icon's a circle with a question mark stands in; the log names the nearest one.
+    An unknown name is replaced by a circle with a question mark, and logged with the most similar one.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -97,18 +97,18 @@ def _drawn(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
 
 
 def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
-    """`paint_icon` for what is painted many times a second: drawn once, then copied to whole pixels."""
+    """Paint an icon from a cached pixmap at whole pixels, for frequent repaints; see `paint_icon`."""
     ratio = painter.device().devicePixelRatioF()
     place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
     painter.drawPixmap(place, _drawn(name, rect.width(), colour.rgba(), ratio))
 
 
-@guard  # no QObject
+@guard  # not a QObject
 class IconEngine(QIconEngine):
-    """Paints one icon in the colours of the moment: enabled, disabled, or chosen."""
+    """Paints one icon in the colours of the current state: enabled, disabled, or selected."""
 
     def __init__(self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor]) -> None:
-        """An engine for ``name``; ``colour`` is asked at each painting: a new theme needs no new icon."""
+        # `colour` is called at each painting, so that a new theme needs no new icon.
         super().__init__()
         _source(name)
         self._name = name

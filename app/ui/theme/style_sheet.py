@@ -1,6 +1,6 @@
-"""The application's one style sheet, made from the roles of a theme: rules by class and dynamic property.
+"""Style sheet of the application, built from the roles of a theme: rules by class and dynamic property.
 
-Labels take their font and colour from the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
+Labels get font and colour by the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
 """
 
 from __future__ import annotations
@@ -16,33 +16,33 @@ LABEL_ROLES = (
 )  # fmt: skip
 
 OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
-"""Labels between the kinds of text in the tokens: size and weight."""
+"""Additional kinds of labels: size and weight."""
 
 
 class ThemeValues(Protocol):
-    """What the sheet asks of a theme."""
+    """Part of a theme that the style sheet needs."""
 
     @property
     def dark(self) -> bool:
-        """Whether the colours are the dark ones."""
+        """True if the theme is dark."""
 
     def hex(self, role: str) -> str:
-        """A role's colour."""
+        """Return a role's colour."""
 
     def radius(self, name: str) -> int:
-        """A corner's radius."""
+        """Return a corner radius."""
 
     def size(self, *path: str) -> int:
-        """A length."""
+        """Return a length."""
 
     def scaled(self, pixels: float) -> float:
-        """Pixels that grow with the text."""
+        """Return a length scaled with the text size."""
 
     def text_kinds(self) -> Mapping[str, TextKind]:
-        """The kinds of text."""
+        """Return the kinds of text."""
 
     def family(self, kind: Literal["text", "mono"]) -> str:
-        """A font's family."""
+        """Return a font family."""
 
 
 SHEET = """
@@ -139,7 +139,7 @@ def _labels(theme: ThemeValues) -> str:
 
 
 class _Roles(dict[str, str]):
-    """Looks every name up in the theme when the sheet asks for it."""
+    """Mapping that falls back to the theme's colours."""
 
     def __init__(self, theme: ThemeValues) -> None:
         super().__init__()
@@ -150,7 +150,7 @@ class _Roles(dict[str, str]):
 
 
 def build(theme: ThemeValues) -> str:
-    """The style sheet in the colours and sizes of ``theme``."""
+    """Return the style sheet in the colours and sizes of ``theme``."""
     roles = _Roles(theme)
     roles.update(
         small=str(theme.radius("small")),

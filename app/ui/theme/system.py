@@ -1,4 +1,4 @@
-"""What the system asks of every program's look: strong contrast and little motion, where it tells."""
+"""Accessibility preferences of the system: high contrast and reduced motion, where available."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ CLIENT_AREA_ANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
 def preference_of(kept: object) -> Preference:
-    """A wish from the settings; those of older versions were only on or off."""
+    """Parse a preference in the settings; older versions stored a boolean."""
     if isinstance(kept, bool):
         return "on" if kept else "system"
     return next((wish for wish in PREFERENCES if wish == kept), "system")
 
 
 def wants_contrast(hints: QStyleHints) -> bool:
-    """Whether the system asks for strong contrast; False where Qt can't tell."""
+    """Return whether the system requests high contrast; False where Qt doesn't know."""
     asked = getattr(hints, "accessibility", None)
     return asked is not None and asked().contrastPreference() == Qt.ContrastPreference.HighContrast
 
 
 def on_contrast(hints: QStyleHints, call: Callable[[], object]) -> None:
-    """Call when the system's wish for contrast changes, where Qt can tell."""
+    """Call ``call`` when the system's contrast preference changes, where Qt supports it."""
     asked = getattr(hints, "accessibility", None)
     if asked is not None:
         asked().contrastPreferenceChanged.connect(call)
 
 
 def wants_less_motion(platform: str = sys.platform) -> bool:
-    """Whether the system asks for little motion; False where it does not tell programs like this one."""
+    """Return whether the system requests reduced motion; False where programs can't query it."""
     if platform != "win32":
         return False
     animated = ctypes.c_int(1)
-    user32 = getattr(ctypes, "windll").user32  # noqa: B009  there is none elsewhere, and mypy knows
+    user32 = getattr(ctypes, "windll").user32  # noqa: B009  mypy knows that it exists only on Windows
     told = user32.SystemParametersInfoW(CLIENT_AREA_ANIMATION, 0, ctypes.byref(animated), 0)
     return bool(told) and animated.value == 0

@@ -1,7 +1,7 @@
-"""The look of Studio: every colour, size, duration and font by the name of its role.
+"""Theme of Studio: every colour, size, duration and font by the name of its role.
 
-`Theme` reads the design tokens and makes a palette, one style sheet and the tokens of the block editor. No
-other module writes a colour down; painters ask ``theme.colour("accent")``. A change repaints at once.
+`Theme` reads the design tokens and creates the palette, the style sheet and the tokens of the block editor.
+No other module contains a colour; painters call ``theme.colour("accent")``. A change repaints immediately.
 """
 
 from __future__ import annotations
@@ -52,25 +52,25 @@ DISABLED_ROLES = (QPalette.ColorRole.Text, QPalette.ColorRole.WindowText, QPalet
 
 
 STYLED = "isFusion"
-"""What the application remembers: with a style sheet it does not tell the style that is below."""
+"""Application property that is set with the style, which Qt doesn't report once a style sheet is set."""
 
 
 class Theme(QObject):
-    """Colours, sizes, fonts and icons of the chosen mode; `changed` when any of them did."""
+    """Colours, sizes, fonts and icons of the current mode; emits `changed` when any of them changed."""
 
     changed = Signal()
 
     def __init__(
         self, mode: Mode = "light", tokens: Tokens | None = None, hints: QStyleHints | None = None
     ) -> None:
-        """A theme in ``mode``; ``system`` follows ``hints`` (the application's) while it lives."""
+        # `system` follows `hints`, by default the application's.
         super().__init__()
         self._tokens = tokens if tokens is not None else theme_tokens.load()
         self._hints = hints if hints is not None else QGuiApplication.styleHints()
         self._mode: Mode = mode
         self._text_percent = TEXT_PERCENT[0]
-        self.motion: Preference = "off"  # less of it
-        self.contrast: Preference = "off"  # more of it
+        self.motion: Preference = "off"  # "on" means reduced motion
+        self.contrast: Preference = "off"  # "on" means high contrast
         self.reduced_motion = self.high_contrast = False
         self._dark = self._wanted_dark()
         self._icons: dict[tuple[str, str, str], QIcon] = {}
@@ -78,30 +78,30 @@ class Theme(QObject):
         self._hints.colorSchemeChanged.connect(self._system_changed)
         system.on_contrast(self._hints, lambda: self.set_contrast(self.contrast))
 
-    # -- the mode ---------------------------------------------------------------------------------
+    # -- mode -------------------------------------------------------------------------------------
 
     @property
     def mode(self) -> Mode:
-        """What was chosen: "light", "dark" or "system"."""
+        """Chosen mode: "light", "dark" or "system"."""
         return self._mode
 
     @property
     def dark(self) -> bool:
-        """Whether the colours are the dark ones now."""
+        """True if the colours are dark now."""
         return self._dark
 
     @property
     def tokens(self) -> Mapping[str, object]:
-        """The design tokens as they stand in their file."""
+        """Design tokens as in their file."""
         return self._tokens.raw
 
     def set_mode(self, mode: Mode) -> None:
-        """Choose light, dark or the system's colours; everything repaints at once."""
+        """Set light, dark or the system's colours, and repaint."""
         self._mode = mode
         self._refresh()
 
     def begin(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
-        """Take over everything that was chosen before, and apply it once."""
+        """Apply all saved choices at once."""
         self._mode, self.contrast = mode, contrast
         self.high_contrast = self._wanted_contrast()
         self._text_percent = min(max(text_percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
@@ -110,19 +110,19 @@ class Theme(QObject):
         self._refresh()
 
     def set_text_percent(self, percent: int) -> None:
-        """Text and what is measured by it, 100 to 200 per cent."""
+        """Set the text size in per cent (100 to 200), which also scales lengths based on text."""
         self._text_percent = min(max(percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
         self._fonts.clear()
         self.apply()
 
     def set_motion(self, wish: Preference) -> None:
-        """Whether nothing fades, glides or breathes: "on" is less motion, "system" as the system says."""
+        """Set reduced motion: "on", "off", or as the system prefers."""
         self.motion = wish
         self.reduced_motion = wish == "on" or (wish == "system" and system.wants_less_motion())
         self.changed.emit()
 
     def set_contrast(self, wish: Preference) -> None:
-        """Whether edges are strong and tints are off: "on", "off", or as the system says."""
+        """Set high contrast (strong edges, no tints): "on", "off", or as the system prefers."""
         self.contrast = wish
         if self._wanted_contrast() != self.high_contrast:
             self.high_contrast = not self.high_contrast
@@ -136,14 +136,14 @@ class Theme(QObject):
 
     @property
     def text_percent(self) -> int:
-        """The size of text, 100 to 200."""
+        """Text size in per cent, 100 to 200."""
         return self._text_percent
 
     def apply(self) -> None:
-        """Give the application this theme's style, palette, style sheet and font, then tell everyone."""
+        """Apply style, palette, style sheet and font to the application, and emit `changed`."""
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            # Each of these goes through all widgets, also when it brings nothing new.
+            # Each of these visits all widgets, even without a change.
             if application.property(STYLED) is None:
                 application.setStyle(QStyleFactory.create("Fusion"))
                 application.setProperty(STYLED, True)
@@ -176,7 +176,7 @@ class Theme(QObject):
         return "dark" if self._dark else "light"
 
     def hex(self, role: str) -> str:
-        """A role's colour as the tokens write it; KeyError when there is no such role."""
+        """Return a role's colour as in the tokens. Raises KeyError for an unknown role."""
         if self.high_contrast:
             if role in STRONGER:
                 role = "controlBorder"
@@ -185,43 +185,46 @@ class Theme(QObject):
         return self._tokens.colours[self._scheme][role]
 
     def colour(self, role: str) -> QColor:
-        """The colour of a role; KeyError when the tokens have no such role."""
+        """Return a role's colour. Raises KeyError for an unknown role."""
         return qt_colour(self.hex(role))
 
     def series(self, index: int) -> QColor:
-        """The colour of a curve; they repeat after the last."""
+        """Return the colour of a curve, cyclically."""
         colours = self._tokens.series[self._scheme]
         return QColor(colours[index % len(colours)])
 
     def block_colour(self, category: str, part: str = "primary") -> QColor:
-        """A block category's "primary", "secondary" or "tertiary" colour; unknown ones look like values."""
+        """Return a block category's "primary", "secondary" or "tertiary" colour.
+
+        Unknown ones are as "values".
+        """
         block = self._tokens.blocks.get(category, self._tokens.blocks["values"])
         return QColor(block[self._scheme][part])
 
     def block_text(self, category: str) -> QColor:
-        """The colour of words and icons on a block."""
+        """Return the colour of text and icons on a block."""
         return QColor(self._tokens.block_text.get(category, self._tokens.block_text["values"]))
 
     def block_icon(self, category: str) -> str:
-        """The icon of a block category."""
+        """Return the icon of a block category."""
         return self._tokens.block_icons.get(category, self._tokens.block_icons["values"])
 
     def status(self, name: str) -> Status:
-        """How "ok", "warn", "error", "info", "off", "running" or "recording" looks."""
+        """Return the style of "ok", "warn", "error", "info", "off", "running" or "recording"."""
         return self._tokens.status[name]
 
     def palette(self) -> QPalette:
-        """The palette of the widgets that Qt paints, in this mode."""
+        """Return the palette for widgets that Qt paints."""
         return _palette(self.colour)
 
     def style_sheet(self) -> str:
-        """The one style sheet, for the application."""
+        """Return the application's style sheet."""
         return style_sheet.build(self)
 
-    # -- sizes and times --------------------------------------------------------------------------
+    # -- sizes and durations ----------------------------------------------------------------------
 
     def size(self, *path: str) -> int:
-        """A length in pixels, such as ``size("row", "compact")``; KeyError when it is not in the tokens."""
+        """Return a length in pixels, such as ``size("row", "compact")``. Raises KeyError if unknown."""
         value: object = self._tokens.sizes
         for step in path:
             if not isinstance(value, Mapping):
@@ -232,7 +235,7 @@ class Theme(QObject):
         return round(value)
 
     def pair(self, *path: str) -> QSize:
-        """A width and height, such as ``pair("stop", "runBar")``."""
+        """Return a width and height, such as ``pair("stop", "runBar")``."""
         value: object = self._tokens.sizes
         for step in path:
             value = value[step] if isinstance(value, Mapping) else None
@@ -241,11 +244,11 @@ class Theme(QObject):
         return QSize(int(value[0]), int(value[1]))
 
     def radius(self, name: str) -> int:
-        """A corner's radius in pixels."""
+        """Return a corner radius in pixels."""
         return self._tokens.radii[name]
 
     def duration(self, name: str) -> int:
-        """A duration in ms; 0 under reduced motion, except how long something is shown."""
+        """Return a duration in ms; 0 with reduced motion, except display times."""
         if self.reduced_motion and not name.endswith("Shown"):
             return 0
         return self._tokens.motion_ms[name]
@@ -253,11 +256,11 @@ class Theme(QObject):
     # -- fonts and icons --------------------------------------------------------------------------
 
     def scaled(self, pixels: float) -> float:
-        """Pixels that grow with the text."""
+        """Return a length scaled with the text size."""
         return pixels * self._text_percent / 100
 
     def font(self, kind: str) -> QFont:
-        """The font of a kind of text in the tokens, or "mono" (body in JetBrains Mono)."""
+        """Return the font of a kind of text, or "mono" (body in JetBrains Mono)."""
         if kind not in self._fonts:
             text = self._tokens.texts["body" if kind == "mono" else kind]
             family = self._tokens.families["mono" if kind in MONO_KINDS else "text"]
@@ -270,19 +273,19 @@ class Theme(QObject):
         return QFont(self._fonts[kind])
 
     def text_kinds(self) -> Mapping[str, theme_tokens.TextKind]:
-        """Every kind of text by name."""
+        """Return all kinds of text by name."""
         return self._tokens.texts
 
     def family(self, kind: Literal["text", "mono"]) -> str:
-        """The family of text or of code."""
+        """Return the font family of text or code."""
         return self._tokens.families[kind]
 
     def icon_name(self, use: str) -> str:
-        """The icon of a meaning, such as "play" for "run"; KeyError when the design gives it none."""
+        """Return the icon of a meaning, such as "play" for "run". Raises KeyError if undefined."""
         return self._tokens.icons[use]
 
     def icon(self, name: str, role: str = "textSecondary", *, active: str = "text") -> QIcon:
-        """An icon in the colour of a role; it recolours itself when the theme changes."""
+        """Return an icon in the colour of a role; it follows changes of the theme."""
         key = (name, role, active)
         if key not in self._icons:
 
@@ -294,10 +297,13 @@ class Theme(QObject):
             self._icons[key] = QIcon(IconEngine(name, colour))
         return self._icons[key]
 
-    # -- the block editor -------------------------------------------------------------------------
+    # -- block editor -----------------------------------------------------------------------------
 
     def blockly_tokens(self) -> dict[str, object]:
-        """What the page of the block editor needs: all roles and block colours of the mode that shows now."""
+        """Return the tokens for the page of the block editor.
+
+        All roles and block colours of the current mode.
+        """
         return theme_tokens.tokens_for_page(
             self._tokens,
             self.hex,
@@ -308,7 +314,6 @@ class Theme(QObject):
 
 
 def _palette(colour: Callable[[str], QColor]) -> QPalette:
-    """The palette; ``colour`` gives that of a role."""
     palette = QPalette()
     for role, name in PALETTE_ROLES.items():
         palette.setColor(role, colour(name))
@@ -318,7 +323,7 @@ def _palette(colour: Callable[[str], QColor]) -> QPalette:
 
 
 def qt_colour(text: str) -> QColor:
-    """A QColor from a token; ``#RRGGBBAA`` has its alpha last, which Qt does not know."""
+    """Convert a token to a QColor; ``#RRGGBBAA`` has its alpha last, which Qt doesn't support."""
     if len(text) == len("#RRGGBBAA"):
         colour = QColor(text[:7])
         colour.setAlpha(int(text[7:], 16))

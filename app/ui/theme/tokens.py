@@ -1,7 +1,7 @@
-"""The design tokens, parsed once: names of roles, sizes and durations become typed, frozen values.
+"""Design tokens, parsed once into typed, frozen values.
 
-Colours keep the form of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` makes Qt values from
-them. Here too is what of them the page of the block editor is given.
+Colours keep the form of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` converts them to Qt
+values. Also the subset for the page of the block editor.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import cast
 from app import resources
 
 Numbers = Mapping[str, "int | float | Numbers | list[int]"]
-# Statuses whose icon the tokens describe in words: their dot is drawn, not loaded.
+# Statuses whose icon the tokens describe in words: their dot is painted.
 _DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
 
 
 @dataclass(frozen=True)
 class Status:
-    """How one status looks: role of its colour, role of its tint (None: no tint) and its icon."""
+    """Style of a status: colour role, tint role (None: no tint) and icon."""
 
     colour: str
     tint: str | None
@@ -31,7 +31,7 @@ class Status:
 
 @dataclass(frozen=True)
 class TextKind:
-    """One size of text: pixels, line height in pixels, weight 400 to 700."""
+    """Text size: pixels, line height in pixels, weight 400 to 700."""
 
     size_px: int
     line_px: int
@@ -40,7 +40,7 @@ class TextKind:
 
 @dataclass(frozen=True)
 class Tokens:
-    """All tokens of ``resources/theme/tokens.json``; ``raw`` is the file as it was read."""
+    """All tokens of ``resources/theme/tokens.json``; ``raw`` is the parsed file."""
 
     raw: Mapping[str, object]
     colours: Mapping[str, Mapping[str, str]]
@@ -59,13 +59,13 @@ class Tokens:
 
 
 def load(path: Path | None = None) -> Tokens:
-    """Read the tokens; KeyError or ValueError if the file is not what `check_tokens` would accept."""
+    """Read the tokens. Raises KeyError or ValueError if the file is invalid (see `check_tokens`)."""
     source = path if path is not None else resources.path("theme", "tokens.json")
     return parse(json.loads(source.read_text("utf-8")))
 
 
 def parse(raw: Mapping[str, object]) -> Tokens:
-    """The typed tokens of a parsed ``tokens.json``."""
+    """Convert a parsed ``tokens.json`` to typed tokens."""
     colours = cast("Mapping[str, Mapping[str, str | list[str]]]", raw["colour"])
     blocks = cast("Mapping[str, Mapping[str, object]]", raw["block"])
     font = cast("Mapping[str, object]", raw["font"])
@@ -117,7 +117,7 @@ def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
 def tokens_for_page(
     tokens: Tokens, colour: Callable[[str], str], *, dark: bool, reduced_motion: bool, text_percent: int
 ) -> dict[str, object]:
-    """All roles and block colours of the mode that shows now; ``colour`` gives a role's colour."""
+    """Return all roles and block colours of the current mode; ``colour`` returns a role's colour."""
     scheme = "dark" if dark else "light"
     return {
         "dark": dark,
