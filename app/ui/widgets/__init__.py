@@ -1,6 +1,6 @@
-"""The small painted widgets that panels and the shell are made of; each takes the theme first.
+"""Small painted widgets of panels and the shell; each takes the theme as its first argument.
 
-None knows the session or a panel; buttons, chips and labels come from here, the rest by full path.
+None depends on the session or a panel. Buttons, chips and labels are exported here, the others by module.
 """
 
 from __future__ import annotations

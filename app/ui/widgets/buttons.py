@@ -1,6 +1,6 @@
-"""Buttons that paint their own icon, gap and word, as Fusion's gap is narrow and fixed.
+"""Buttons that paint their icon, gap and text, because Fusion's gap is narrow and fixed.
 
-Among them Run, Pause, Step and Stop, which keep their place and their width in every state.
+Includes Run, Pause, Step and Stop, which keep their position and width in every state.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nep.i18n import _
 
 Kind = Literal["plain", "primary", "ghost", "run", "stop"]
 Size = Literal["small", "normal", "form", "large"]
-# kind: fill, fill under the mouse, fill pressed, border, words
+# kind: fill, hovered fill, pressed fill, border, text
 _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] = {
     "plain": ("panel", "hover", "pressed", "borderStrong", "text"),
     "ghost": (None, "hover", "pressed", None, "text"),
@@ -35,7 +35,7 @@ Place = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
 BARE_WIDTH = 56
 AIM_WIDTH = 2.0
-RING = 4  # px around Stop, for the ring that says that answers are awaited
+RING = 4  # px around Stop, for the ring while replies are pending
 
 
 class _Measure(NamedTuple):
@@ -56,19 +56,19 @@ _MEASURES: dict[str, _Measure] = {
 
 
 def name_command(widget: QWidget, command: str) -> None:
-    """Say which command a button does: its tooltip is the command's, with the keys of the moment."""
+    """Set the command of a button: its tooltip is the command's, with the current shortcut."""
     widget.setProperty("command", command)
 
 
 class PaintedButton(QAbstractButton):
-    """The base of every button that paints itself; `paint_button` does it.
+    """Base class of painted buttons; subclasses implement `paint_button`.
 
-    It takes the keyboard (the focus ring follows its corners), is painted anew when the mouse comes, presses
-    or goes, grows with the theme's text, and a screen reader says its words until it is given another name.
+    It accepts the keyboard focus (the focus ring follows its corners), repaints on hover and press, scales
+    with the theme's text size, and its accessible name is its text unless another is set.
     """
 
     shortens = False
-    """Whether narrow places shorten its words; its tooltip then has the whole."""
+    """True if the text is elided when narrow; the tooltip then has all of it."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class PaintedButton(QAbstractButton):
         checkable: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        """``radius`` names its corners."""
+        # `radius` is the theme's name of the corner radius.
         super().__init__(parent)
         self._theme = theme
         self.say(text)
@@ -93,28 +93,28 @@ class PaintedButton(QAbstractButton):
 
     @property
     def is_aimed(self) -> bool:
-        """Whether what is in the hand would go there."""
+        """True if it is the drop target of a drag."""
         return self._aimed
 
     def set_aimed(self, aimed: bool) -> None:
-        """Put a ring round it: what is in the hand goes there."""
+        """Draw a ring around it: it is the drop target."""
         if aimed != self._aimed:
             self._aimed = aimed
             self.update()
 
     def say(self, text: str, name: str = "") -> None:
-        """Show these words; a screen reader says them too, or ``name`` where there is one."""
+        """Set the text, and the accessible name, which is ``name`` or the text."""
         self.setText(text)
         self.setAccessibleName(name or text)
 
     @property
     def is_hovered(self) -> bool:
-        """Whether the mouse is on it, and a press would do something."""
+        """True if the mouse is on it and it is enabled."""
         return self.underMouse() and self.isEnabled()
 
     @property
     def is_highlighted(self) -> bool:
-        """Whether the mouse is on it or it is held down."""
+        """True if the mouse is on it or it is held down."""
         return self.is_hovered or self.isDown()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -123,9 +123,9 @@ class PaintedButton(QAbstractButton):
             paint.tell_whole(self, self.text())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Enter presses it as Space does, once while it is held down.
+        """Click on Enter as on Space, without auto-repeat.
 
-        Qt's `autoDefault` would do so only for a QPushButton, and again and again while Enter is held.
+        Qt's `autoDefault` does so only for a QPushButton, and repeatedly while Enter is held.
         """
         if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not is_plain(event):
             super().keyPressEvent(event)
@@ -138,16 +138,16 @@ class PaintedButton(QAbstractButton):
         if self._aimed:
             paint.box(painter, rect, radius, role("accentTint"))
         self.paint_button(painter, rect)
-        if self._aimed:  # above what it paints itself: the tab that opens under held blocks is filled
+        if self._aimed:  # above its own painting: the tab that opens under dragged blocks is filled
             paint.box(painter, rect, radius, None, role("accent"), AIM_WIDTH)
         painter.end()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        """Paint it as it is now; ``rect`` is the whole widget."""
+        """Paint the button in its current state; ``rect`` is the whole widget."""
 
 
 class Button(PaintedButton):
-    """A button with a word and perhaps an icon; filled kinds are for the one thing most people want next."""
+    """Button with a text and optionally an icon; filled kinds are for the main action."""
 
     shortens = True
 
@@ -167,14 +167,14 @@ class Button(PaintedButton):
         self.icon_name = icon
         self.fill_icon = False
         self.icon_role = ""
-        """The colour of its icon, where that is not the one of its words."""
+        """Colour role of the icon; "" for that of the text."""
         self._least: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
     def set_word(self, text: str, icon: str | None = None, *, name: str = "") -> None:
-        """Show another word, and another icon when one is given; the place stays.
+        """Set the text, and the icon if given.
 
-        A screen reader says ``name`` instead of the word, where there is one.
+        ``name`` is the accessible name if it differs from the text.
         """
         same = text == self.text() and (name or text) == self.accessibleName()
         if same and icon in {None, self.icon_name}:
@@ -185,7 +185,7 @@ class Button(PaintedButton):
         self.update()
 
     def set_size(self, size: Size) -> None:
-        """Change the height, font and padding to those of another size."""
+        """Set height, font and padding to those of another size."""
         if self.measure != _MEASURES[size]:
             self.measure = _MEASURES[size]
             self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
@@ -193,13 +193,13 @@ class Button(PaintedButton):
             self.update()
 
     def set_kind(self, kind: Kind) -> None:
-        """Filled or outlined from now on."""
+        """Set whether the button is filled or outlined."""
         if kind != self.kind:
             self.kind = kind
             self.update()
 
     def width_with(self, text: str) -> int:
-        """Return the width that the button wants with this word."""
+        """Return the width for this text."""
         width = paint.width_of(self._theme.font(self.measure.font), text) + 2 * self.measure.padding
         if self.icon_name is not None:
             width += self.icon_side() + (self.measure.gap if text else 0)
@@ -214,16 +214,16 @@ class Button(PaintedButton):
         return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
 
     def let_shrink(self, least: int = 72) -> None:
-        """In narrow places the word is shortened rather than cut off; its tooltip then has the whole."""
+        """Let the text be elided in narrow places, rather than cut off; the tooltip then has all of it."""
         self._least = least
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
 
     def icon_side(self) -> int:
-        """How large the icon is: it grows with the text."""
+        """Return the icon size, which scales with the text."""
         return round(self._theme.scaled(self.measure.icon))
 
     def shown_word(self) -> str:
-        """The word that is painted."""
+        """Return the painted text."""
         return self.text()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -232,7 +232,7 @@ class Button(PaintedButton):
         self.paint_content(painter, ink)
 
     def paint_content(self, painter: QPainter, ink: QColor) -> None:
-        """The icon and the word, centred together."""
+        """Paint icon and text, centred together."""
         font = self._theme.font(self.measure.font)
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
@@ -252,7 +252,7 @@ class Button(PaintedButton):
         paint.words(painter, area, word, font, ink)
 
     def _look(self) -> tuple[QColor | None, QColor | None, QColor]:
-        """Fill, border and ink of the moment."""
+        # Fill, border and text colour.
         theme = self._theme
         rest, hover, pressed, border, ink = _COLOURS[self.kind]
         if not self.isEnabled():
@@ -267,7 +267,7 @@ class Button(PaintedButton):
 
 
 class MenuButton(Button):
-    """A button that opens a menu: a chevron after its word says so."""
+    """Button that opens a menu, marked by a chevron."""
 
     def sizeHint(self) -> QSize:
         return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
@@ -285,7 +285,7 @@ class MenuButton(Button):
 
 
 class ToggleButton(Button):
-    """A button that stays on: in the colours of what is chosen."""
+    """Button that stays checked, in the colours of a selection."""
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__(theme, text, icon, size="small")
@@ -299,7 +299,7 @@ class ToggleButton(Button):
 
 
 class IconButton(PaintedButton):
-    """A button with only an icon; its name and shortcut are its tooltip and what a screen reader says."""
+    """Button with only an icon; its tooltip and accessible name are its name and shortcut."""
 
     def __init__(
         self,
@@ -318,7 +318,7 @@ class IconButton(PaintedButton):
         self.set_name(name, shortcut)
 
     def set_name(self, name: str, shortcut: str = "") -> None:
-        """What the button does, and its key."""
+        """Set the name and the shortcut."""
         self.setAccessibleName(name)
         self.setToolTip(plain.tip(tip_with_key(name, shortcut)))
 
@@ -327,7 +327,7 @@ class IconButton(PaintedButton):
         return self._theme.scaled(self._theme.size("icon", name))
 
     def set_icon(self, icon: str) -> None:
-        """Another icon in the same place."""
+        """Set the icon."""
         self._icon = icon
         self.update()
 
@@ -356,7 +356,7 @@ class IconButton(PaintedButton):
 
 
 class LinkButton(PaintedButton):
-    """Words in the accent that lead somewhere, perhaps with an arrow."""
+    """Link in the accent colour, optionally with an arrow."""
 
     shortens = True
 
@@ -366,7 +366,7 @@ class LinkButton(PaintedButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def set_word(self, text: str, icon: str | None) -> None:
-        """Other words, and another arrow or none."""
+        """Set the text, and an arrow or none."""
         self._icon = icon
         self.say(text)
         self.updateGeometry()
@@ -391,31 +391,31 @@ class LinkButton(PaintedButton):
 
 
 class RunButton(Button):
-    """A button of the run bar: 112 x 44, wider only when the text is larger."""
+    """Button of the run bar: 112 x 44, wider only with a larger text size."""
 
     def __init__(
         self, theme: Theme, text: str, icon: str, *, widest: str = "", parent: QWidget | None = None
     ) -> None:
-        """``widest`` is the longest word it will ever show, so that it never changes its width."""
+        # `widest` is the longest text that it will show, so that its width never changes.
         super().__init__(theme, text, icon, size="large", parent=parent)
         self._widest = widest or text
         self._bare = False
         self.fill_icon = False
 
     def set_filled(self, filled: bool) -> None:
-        """Filled green (Run, Go on) or outlined."""
+        """Set filled green (Run, Resume) or outlined."""
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon, where large text leaves no room for the word; its accessible name stays."""
+        """Show only the icon, where large text leaves no space; the accessible name stays."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def icon_side(self) -> int:
-        return self.measure.icon  # the words need the room
+        return self.measure.icon  # the text needs the space
 
     def shown_word(self) -> str:
         return "" if self._bare else self.text()
@@ -431,15 +431,15 @@ class RunButton(Button):
         return QSize(self.full_width(), height)
 
     def full_width(self) -> int:
-        """How wide it is with its longest word, whether or not that shows now."""
+        """Return the width with its longest text."""
         words = paint.width_of(self._theme.font("button"), self._widest)
         return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + words) + 28)
 
 
 class StopButton(PaintedButton):
-    """Stop: always enabled; its ring says that answers are awaited.
+    """Stop button: always enabled; its ring means that replies are pending.
 
-    A margin of 4 px around it is for that ring.
+    It has a margin of 4 px for that ring.
     """
 
     def __init__(self, theme: Theme, place: Place = "runBar", parent: QWidget | None = None) -> None:
@@ -448,7 +448,7 @@ class StopButton(PaintedButton):
         self._place: Place = place
         self._ring = False
         self.filled = True
-        # A press takes the keyboard from nothing: a sheet stays open, what is typed goes on where it was.
+        # A click doesn't take the focus: sheets stay open, and typing continues where it was.
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         name_command(self, "run.stop")
         self.setProperty("focusInset", RING)
@@ -465,7 +465,7 @@ class StopButton(PaintedButton):
     def sizeHint(self) -> QSize:
         wanted = self._theme.pair("stop", self._place)
         word, key = self._fonts()
-        said = (_("Stop"), _("Stopping"), _("Stop again"))  # one place and size in every state
+        said = (_("Stop"), _("Stopping"), _("Stop again"))  # the same size in every state
         least = self._side() + 26 + max(paint.width_of(word, each) for each in said)
         if self._place != "runBar":
             least += paint.width_of(key, "F12") + 8

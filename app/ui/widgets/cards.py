@@ -1,6 +1,6 @@
-"""Surfaces: cards, the tile of an action or a block, and alerts in the colours of their severity.
+"""Surfaces: cards, the tile of an action or block, and alerts in the colours of their severity.
 
-The banner is such an alert, and so are the rows of alerts and findings.
+The banner and the rows of alerts and findings are such alerts.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info
 
 
 class Card(QFrame):
-    """A surface with a border and large corners."""
+    """Surface with a border and large corners."""
 
     def __init__(self, theme: Theme, *, radius: str = "card", fill: str = "panel") -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class Card(QFrame):
 
 
 class Tile(QWidget):
-    """A white icon on the colour of a block category."""
+    """White icon on the colour of a block category."""
 
     def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE) -> None:
         super().__init__()
@@ -55,13 +55,13 @@ class Tile(QWidget):
 
 
 class AlertBox(QWidget):
-    """Tint, border and icon of a status, words, and buttons beside them or, in narrow places, below."""
+    """Box with the tint, border and icon of a status, text, and buttons beside it or, when narrow, below."""
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
-    least_words = 220  # px at 100 % that the words have beside the buttons
+    least_words = 220  # minimum width of the text beside the buttons, px at 100 %
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
-        """What is not ``framed`` is well: only its icon says what it is."""
+        # Without a frame only the icon shows the status; for good ones.
         super().__init__()
         self._theme, self._framed = theme, framed
         self._status = "info"
@@ -75,7 +75,7 @@ class AlertBox(QWidget):
         self._whole.addLayout(self.button_row)
 
     def set_status(self, status: str) -> None:
-        """Show the colours and the icon of another status."""
+        """Set the status, which determines colours and icon."""
         self._status = status
         self.update()
 
@@ -89,7 +89,7 @@ class AlertBox(QWidget):
         return super().event(event)
 
     def _fit(self) -> None:
-        """Large or long words: the buttons go below them."""
+        # With large or long text the buttons move below it.
         room = self.width() - self.button_row.sizeHint().width()
         beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.least_words)
         wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
@@ -99,7 +99,7 @@ class AlertBox(QWidget):
             self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if beside else right)
 
     def icon_top(self) -> float:
-        """How far below its upper edge the icon is."""
+        """Return the distance of the icon from the upper edge."""
         return 11.0 if self._framed else 4.0
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -115,7 +115,7 @@ class AlertBox(QWidget):
 
 
 class AlertRow(AlertBox):
-    """One of several: what is wrong in bold, what it means, what to type, since when, and its next step."""
+    """Row of an alert: title in bold, detail, command, time, and next step."""
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
         super().__init__(theme, framed=framed)
@@ -135,7 +135,7 @@ class AlertRow(AlertBox):
     def say(
         self, status: str, title: str, detail: str, *, command: str = "", note: str = "", button: str = ""
     ) -> None:
-        """Show this, without what is empty; the button stays, also under a mouse that is pressed."""
+        """Show these texts, without empty ones; the button stays, so that a click in progress is not lost."""
         self.set_status(status)
         for line, text in zip(self._lines, (title, detail, command, note), strict=True):
             line.setText(text)

@@ -1,4 +1,4 @@
-"""What a panel says when it has nothing: what is missing, what will appear and how, and the next step."""
+"""Empty state of a panel: the missing content, how it will appear, and the next step."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ABOVE_ROW = 14
 
 @dataclass(frozen=True)
 class EmptyAction:
-    """A next step: its words, what it does, its icon, and whether it is the filled one."""
+    """Next step: label, function, icon, and whether it is the filled button."""
 
     text: str
     run: Callable[[], object]
@@ -50,7 +50,7 @@ class _Tile(QWidget):
 
 
 class EmptyState(QWidget):
-    """An icon in a tile, one line, one or two lines below, and one or two buttons; centred."""
+    """Icon in a tile, title, one or two lines of text, and one or two buttons; centred."""
 
     def __init__(
         self, theme: Theme, icon: str, title: str, text: str, actions: Sequence[EmptyAction] = ()
@@ -91,7 +91,7 @@ class EmptyState(QWidget):
         self.set_actions(actions)
 
     def say(self, title: str, text: str, icon: str | None = None) -> None:
-        """Other words in the same place."""
+        """Set other texts."""
         self._title.setText(title)
         self._text.setText(text)
         if icon is not None:
@@ -100,10 +100,10 @@ class EmptyState(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """In a low place the words go before the picture, and a next step before the smaller words."""
+        # In a low place the tile is hidden first, then the smaller text before the buttons.
         width = self.width() - 32
         text = self._text.heightForWidth(min(width, TEXT_WIDTH))
-        self._text.setMinimumHeight(max(0, text))  # else a low place takes some pixels of its last line
+        self._text.setMinimumHeight(max(0, text))  # otherwise a low place cuts off the last line
         high = self._title.heightForWidth(width) + text + 4
         high += ABOVE_ROW + self._buttons[0].sizeHint().height() if self._buttons else 0
         self._tile.setVisible(self.height() - 2 * MARGIN >= high + TILE + BELOW_TILE)
@@ -119,7 +119,7 @@ class EmptyState(QWidget):
         self._fit()
 
     def set_actions(self, actions: Sequence[EmptyAction]) -> None:
-        """Other next steps."""
+        """Set the buttons."""
         while (item := self._row.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()

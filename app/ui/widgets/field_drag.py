@@ -1,4 +1,4 @@
-"""A field of a message in the hand of a person: dragged from a tree, dropped on a plot."""
+"""Drag and drop of message fields: from a tree to a plot."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.ui.widgets.labels import label
 
 MIME = "application/x-nep-field"
 MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
-"""They choose what a drop means, and are no keys of commands."""
+"""Modifiers choose the drop action, and are not shortcuts of commands."""
 
 
 def field_in_hand(topic: str, path: str) -> QMimeData:
-    """The field ``path`` of a topic, by the name that it has among those of all networks; also as text."""
+    """Return the drag data of a field; ``topic`` is a key among all networks. Includes it as text."""
     data = QMimeData()
     data.setData(MIME, json.dumps([topic, path]).encode())
     data.setText(f"{topic}{'' if path.startswith('[') else '.'}{path}")
@@ -25,7 +25,7 @@ def field_in_hand(topic: str, path: str) -> QMimeData:
 
 
 def dropped_field(data: QMimeData) -> tuple[str, str] | None:
-    """(topic, path) of what is in the hand; None when it is something else."""
+    """Return (topic, path) of a dropped field; None for other data."""
     if not data.hasFormat(MIME):
         return None
     try:
@@ -38,24 +38,24 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
 
 
 class DragKeys(QObject):
-    """While something is dragged Qt takes all keys: any but Esc lets go of it, and does what it is for.
+    """Keyboard shortcuts during a drag, when Qt takes all keys: any but Esc cancels it and is executed.
 
-    So Stop works also with a field in the hand.
+    So Stop also works during a drag.
     """
 
     def __init__(self, press: Callable[[str], object]) -> None:
-        """``press`` does what the key of that name, such as "F12", is for."""
+        # `press` executes the shortcut with this name, such as "F12".
         super().__init__()
         self._press = press
 
     def begin(self) -> None:
-        """Look at keys before Qt's own drag does: call it when that has begun."""
+        """Start filtering keys. Call it after the drag has started, so that it precedes Qt's own filter."""
         application = QApplication.instance()
         if application is not None:
             application.installEventFilter(self)
 
     def end(self) -> None:
-        """Look at keys no more."""
+        """Stop filtering keys."""
         application = QApplication.instance()
         if application is not None:
             application.removeEventFilter(self)
@@ -67,14 +67,14 @@ class DragKeys(QObject):
             return False
         name = QKeySequence(event.keyCombination()).toString(QKeySequence.SequenceFormat.PortableText)
         QDrag.cancel()
-        QTimer.singleShot(0, lambda: self._press(name))  # when the drag has ended
+        QTimer.singleShot(0, lambda: self._press(name))  # after the end of the drag
         return True
 
 
 def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str], object]) -> None:
-    """Let a person drag a field away; returns when it is dropped. ``press``: see `DragKeys`."""
+    """Start dragging a field; returns after the drop. ``press`` is as in `DragKeys`."""
     keys = DragKeys(press)
-    QTimer.singleShot(0, keys.begin)  # in the drag's own loop, after its filter
+    QTimer.singleShot(0, keys.begin)  # in the drag's own event loop, after its filter
     drag = QDrag(source)
     data = field_in_hand(topic, path)
     drag.setMimeData(data)

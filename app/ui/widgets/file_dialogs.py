@@ -1,4 +1,4 @@
-"""Which file? The system's dialogs ask it where they are; Stop stays free meanwhile."""
+"""File dialogs: the system's own where available, non-modal so that Stop stays usable."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from nep.i18n import _, lazy
 
 @dataclass(frozen=True)
 class FileKind:
-    """As what something is saved: in words, which `lazy` marks, and by the ending of its name."""
+    """File type: label, marked with `lazy`, and suffix."""
 
     words: str
     ending: str
 
 
 def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
-    """The whole name, and as what: an ending that was typed counts for more than the kind that was chosen."""
+    """Return path and type with a suffix; a typed suffix takes precedence over the chosen type."""
     ending = chosen.suffix.lower()
     if ending != kind.ending:
         typed = next((each for each in kinds if each.ending == ending), None)
@@ -32,13 +32,13 @@ def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path
 
 
 class FileDialogs(Protocol):
-    """Asks a person for a file; ``take`` is called with the answer, never when the person gives up."""
+    """Asks the user for a file; ``take`` is called with the answer, never on cancel."""
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which file to open."""
+        """Ask for a file to open."""
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Where to save."""
+        """Ask where to save."""
 
     def save_as(
         self,
@@ -47,26 +47,26 @@ class FileDialogs(Protocol):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Where to save something that is no behaviour, and as which of these; the path has its ending."""
+        """Ask where to save something other than a behaviour, and its type; the path gets the suffix."""
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which picture; "" for the folder where this computer keeps pictures."""
+        """Ask for an image; "" starts in the picture folder."""
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which recording to play."""
+        """Ask for a recording."""
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which layout to show."""
+        """Ask for a layout."""
 
     def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Which folder."""
+        """Ask for a folder."""
 
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg")
 
 
 def pictures_folder() -> str:
-    """Where this computer keeps pictures; the person's own folder where it has no such place."""
+    """Return the system's picture folder, else the home folder."""
     place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
     return place if place and Path(place).is_dir() else str(Path.home())
 
@@ -74,14 +74,14 @@ def pictures_folder() -> str:
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
-PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
-"""What a dialog offers, in words, and the patterns of the names."""
+PICTURES = (lazy("Pictures"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
+"""Name filters of dialogs: label and patterns."""
 
 
 class SystemDialogs:
-    """The system's own file dialogs: of Windows, of macOS, of a Linux desktop by its portal.
+    """Native file dialogs: of Windows, macOS, or a Linux desktop through its portal.
 
-    The window can be used meanwhile: Stop is pressed there. Keys that are pressed in them never come to us.
+    The window stays usable, for example for Stop. Keys pressed in the dialogs don't reach Studio.
     """
 
     def __init__(self, window: QWidget) -> None:

@@ -1,4 +1,4 @@
-"""A row that becomes several rows where there is too little room, so that nobody scrolls sideways."""
+"""Layout of a row that wraps into several rows when narrow, so that nothing is scrolled sideways."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
 
 
 class Flow(QLayout):
-    """One row if all of it fits, else as many as are needed, each item in the middle of its row.
+    """One row if everything fits, else as many as necessary, each item vertically centred.
 
-    In one row the spare room stands where `push` was called, and what is elastic may be narrower than it asks
-    for. A label that wraps takes what is left of its row.
+    In one row the spare space is at the position of `push`, and elastic items may be narrower than their
+    hint. A wrapping label takes the rest of its row.
     """
 
     def __init__(self, parent: QWidget | None = None, *, gap: int = 10, row_gap: int = 6) -> None:
@@ -24,15 +24,16 @@ class Flow(QLayout):
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
-        """What is added from now on stands at the right end when all is in one row."""
+        """Align the following items to the right end when everything is in one row."""
         self._push = len(self._items)
 
     def add_elastic(self, widget: QWidget, *, greedy: bool = False) -> None:
-        """Add a widget that may be narrower than it asks for; a ``greedy`` one takes what is left."""
+        """Add a widget that may be narrower than its hint; a ``greedy`` one takes the remaining space."""
         self._elastic[widget] = greedy
         self.addWidget(widget)
 
-    # -- what Qt asks -------------------------------------------------------------------------------------
+    # -- overrides of QLayout
+    # ---------------------------------------------------------------------------------
 
     def addItem(self, item: QLayoutItem) -> None:
         self._items.append(item)
@@ -71,7 +72,8 @@ class Flow(QLayout):
         super().setGeometry(rect)
         self._arrange(rect, move=True)
 
-    # -- where things go ----------------------------------------------------------------------------------
+    # -- arrangement
+    # ------------------------------------------------------------------------------------------
 
     def _shown(self) -> Iterator[QLayoutItem]:
         return (item for item in self._items if not item.isEmpty())
@@ -100,7 +102,7 @@ class Flow(QLayout):
         return widget in self._elastic
 
     def _arrange(self, rect: QRect, *, move: bool) -> int:
-        """Place everything (with ``move``) and give the height that it takes."""
+        # Returns the height; places the items only with `move`.
         edge = self.contentsMargins()
         room = rect.marginsRemoved(edge)
         shown = [*self._shown()]
@@ -119,7 +121,7 @@ class Flow(QLayout):
         return used + edge.top() + edge.bottom()
 
     def _one_row(self, items: list[QLayoutItem], room: int) -> list[tuple[QLayoutItem, int, int]]:
-        """Everything in one row as (item, left, width); empty when it does not fit."""
+        # (item, left, width); empty when it does not fit.
         widths = [item.minimumSize().width() if self._bends(item) else self._wanted(item) for item in items]
         spare = room - sum(widths) - self._gap * (len(items) - 1)
         if spare < 0:
@@ -139,7 +141,7 @@ class Flow(QLayout):
         return row
 
     def _rows(self, items: list[QLayoutItem], room: int) -> list[list[tuple[QLayoutItem, int, int]]]:
-        """Several rows; what alone is wider than the room gets all of it."""
+        # An item wider than the space gets a whole row.
         rows: list[list[tuple[QLayoutItem, int, int]]] = []
         left = room + 1
         for item in items:

@@ -1,4 +1,4 @@
-"""What shows a state and is never a button: chips, facts of the status bar, curves and bars."""
+"""Status indicators that are not buttons: chips, items of the status bar, sparklines and bars."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from nep.i18n import _, lazy
 
 CHIP_HEIGHT, CHIP_PADDING, CHIP_GAP = 22, 8, 5
 ICON = 18
-# px at 100 % that a fact keeps where there is too little room for all; its tooltip has the whole
+# minimum width of an item when space is scarce, px at 100 %; its tooltip has the whole text
 LEAST_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
@@ -41,7 +41,7 @@ SPOKEN = {
     "running": lazy("running"),
     "off": lazy("off"),
 }
-# the status that a chip gives what `RobotLink.state` says
+# chip status by `RobotLink.state`
 ROBOT_STATUS = {
     "ready": "ok", "busy": "running", "stopping": "running", "silent": "warn", "not stopped": "error",
     "away": "off", "connecting": "off",
@@ -49,12 +49,12 @@ ROBOT_STATUS = {
 
 
 def spoken(status: str) -> str:
-    """What a screen reader says for a status."""
+    """Return a status for screen readers."""
     return _(SPOKEN.get(status, status))
 
 
 class Chip(QWidget):
-    """An icon and a word on the tint of a status; `set` changes it, empty words hide it."""
+    """Chip with an icon and text on the tint of a status; hidden while the text is empty."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class Chip(QWidget):
         large: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        """``icon`` "" shows none, None the status' own; ``large`` is the chip of the app bar (26 high)."""
+        # `icon` "" shows none, None that of the status; `large` is the chip of the app bar (26 px high).
         super().__init__(parent)
         self._theme = theme
         self._large = large
@@ -78,16 +78,16 @@ class Chip(QWidget):
 
     @property
     def text(self) -> str:
-        """The words shown now."""
+        """Current text."""
         return self._text
 
     @property
     def status(self) -> str:
-        """The status shown now."""
+        """Current status."""
         return self._status
 
     def set(self, text: str, status: str = "ok", icon: str | None = None) -> None:
-        """Show another state; the chip is hidden while it has no words."""
+        """Set text, status and icon; an empty text hides the chip."""
         if (text, status, icon) == (self._text, self._status, self._icon):
             if not text:
                 self.hide()
@@ -102,14 +102,14 @@ class Chip(QWidget):
         self.update()
 
     def set_bare(self, bare: bool) -> None:
-        """Where there is no room for words, only the icon is left; its tooltip has the words."""
+        """Show only the icon where space is scarce; the tooltip then has the text."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def full_width(self) -> int:
-        """The width with its words."""
+        """Return the width with the text."""
         width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
         return round(width + (self._side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
@@ -125,7 +125,7 @@ class Chip(QWidget):
         return font
 
     def bare_width(self) -> int:
-        """The width with its icon alone."""
+        """Return the width with the icon only."""
         return max(self._high(), round(self._side()) + CHIP_PADDING)
 
     def _high(self) -> int:
@@ -172,17 +172,17 @@ class Chip(QWidget):
 
 
 class StatusIcon(QWidget):
-    """The icon of a status beside words that say the same; its name is the status' word."""
+    """Icon of a status beside text with the same meaning; its accessible name is the status."""
 
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, ink: str = "") -> None:
-        """``height`` of the line of words beside it, 0 for the icon's own; ``ink`` instead of the status'."""
+        # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
         super().__init__()
         self._theme, self._status, self._height, self._ink = theme, "", height, ink
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.set(status)
 
     def set(self, status: str) -> None:
-        """Show another status."""
+        """Set the status."""
         if status != self._status:
             self._status = status
             self.setAccessibleName(spoken(status))
@@ -200,11 +200,11 @@ class StatusIcon(QWidget):
 
 
 class StatusItem(QWidget):
-    """One fact in the status bar: perhaps an icon, and a few words. One with a ``command`` can be pressed."""
+    """Item of the status bar: optional icon and short text. With a ``command`` it can be clicked."""
 
     ICON = 14
     pressed = Signal(str)
-    """The command of an item that was pressed, by the mouse or by Enter or Space."""
+    """Emitted with the item's command on a click, Enter or Space."""
 
     def __init__(self, theme: Theme, icon: str = "", text: str = "", status: str | None = None) -> None:
         super().__init__()
@@ -218,11 +218,11 @@ class StatusItem(QWidget):
 
     @property
     def text(self) -> str:
-        """What it says now."""
+        """Current text."""
         return self._text
 
     def set(self, icon: str, text: str, status: str | None = None) -> None:
-        """Show another fact; without words the item is hidden. A status colours it."""
+        """Set icon, text and status (colour); an empty text hides the item."""
         if (icon, text, status) == (self._icon, self._text, self._status):
             return
         before = self.sizeHint()
@@ -234,7 +234,7 @@ class StatusItem(QWidget):
         self.update()
 
     def set_command(self, command: str) -> None:
-        """Let a press run a command, or with "" none."""
+        """Set the command of a click, or "" for none."""
         if command != self.command:
             self.command = command
             self.setFocusPolicy(Qt.FocusPolicy.TabFocus if command else Qt.FocusPolicy.NoFocus)
@@ -258,7 +258,8 @@ class StatusItem(QWidget):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        # As wide for a 1 as for a 0: figures change many times a second, and each time all is laid out.
+        # The width treats all digits equally: values change many times a second, and each new width is a
+        # relayout.
         words = re.sub(r"\d", "0", self._text)
         width = paint.width_of(font, words) + (self._side() + 6 if self._icon else 0)
         return QSize(round(width) + 1, round(paint.height_of(font)))
@@ -289,7 +290,7 @@ class StatusItem(QWidget):
 
 
 class Sparkline(QWidget):
-    """A small curve of 56 x 16."""
+    """Small curve of 56 x 16 px."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -298,7 +299,7 @@ class Sparkline(QWidget):
         self.setFixedSize(SPARK)
 
     def set_values(self, values: Sequence[float]) -> None:
-        """What to draw, oldest first."""
+        """Set the values, oldest first."""
         if tuple(values) != self._values:
             self._values = tuple(values)
             self.update()
@@ -310,10 +311,10 @@ class Sparkline(QWidget):
 
 
 def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
-    """One stroke through the values, oldest left, no axes; fewer than two values paint nothing.
+    """Paint a line through the values, oldest left, without axes; fewer than two values paint nothing.
 
-    The lower edge is 0 (or the least, where that is below), the upper one the largest: a rate that changes
-    little is a level line, and one that stops falls to the ground. Values that are no numbers paint nothing.
+    The lower edge is 0 (or the minimum, if negative), the upper one the maximum: an almost constant rate is a
+    level line, and one that stops falls to the bottom. Values that include NaN or infinity paint nothing.
     """
     if len(values) < 2 or not isfinite(sum(values)):
         return
@@ -336,7 +337,7 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
 
 
 class ValueBar(QWidget):
-    """A sensor's value between its limits; None shows only the track."""
+    """Bar of a sensor's value between its limits; None shows only the track."""
 
     def __init__(self, theme: Theme, fraction: float | None = None) -> None:
         super().__init__()
@@ -349,11 +350,11 @@ class ValueBar(QWidget):
 
     @property
     def fraction(self) -> float | None:
-        """What is shown: 0 to 1, or None."""
+        """Displayed fraction, 0 to 1, or None."""
         return self._fraction
 
     def set_fraction(self, fraction: float | None) -> None:
-        """Show a share from 0 to 1 (outside values are cut), or None for "not known"."""
+        """Set the fraction (clamped to 0 to 1), or None if unknown."""
         value = None if fraction is None or fraction != fraction else min(max(fraction, 0.0), 1.0)  # noqa: PLR0124
         if value != self._fraction:
             self._fraction = value
@@ -366,7 +367,7 @@ class ValueBar(QWidget):
 
 
 def paint_bar(painter: QPainter, theme: Theme, rect: QRectF, fraction: float | None) -> None:
-    """A track with a share of it filled, from 0 to 1; None or 0 show only the track."""
+    """Paint a track with a filled fraction, 0 to 1; None or 0 only the track."""
     round_end = rect.height() / 2
     paint.box(painter, rect, round_end, theme.colour("sunken"))
     if fraction:

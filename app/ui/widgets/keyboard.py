@@ -1,10 +1,9 @@
-"""Keys that hold nothing else down, and the order in which Tab goes through widgets.
+"""Keyboard helpers: keys without modifiers, and the tab order of widgets.
 
-The order is asked so that asking changes nothing. PySide takes whatever a getter without arguments returns
-for a child of the object that was asked. Of the next widget in the focus chain, or a proxy, that is not
-true: when the widget that was asked is deleted, PySide calls the other one, and what Qt made in it, deleted
-too, while Qt goes on using it. So each gets its own parent back at once, and nothing else in `app.ui` may
-ask these questions (ADR 0018).
+Queries of the tab order must not have side effects. PySide makes the result of a getter without arguments a
+child of the queried object. For the next widget in the focus chain, or a focus proxy, that is wrong: when the
+queried widget is deleted, PySide deletes the other one too, while Qt still uses it. So each result gets its
+own parent back immediately, and no other module in `app.ui` may make these queries (ADR 0018).
 """
 
 from __future__ import annotations
@@ -20,48 +19,50 @@ _LEADS = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
-    """Whether nothing is held with a key: Cmd+Down goes to the end of a text on a Mac, Down into the list.
+    """Return whether a key has no modifiers.
 
-    Arrows of a Mac and keys of a number pad carry a mark of their own, which is nothing that is held.
+    On a Mac, Cmd+Down moves to the end of a text, Down into the list.
+
+    Arrow keys of a Mac and keys of a number pad have a modifier of their own, which is ignored.
     """
     return not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
 
 
 def is_pressed_key(key: int) -> bool:
-    """Whether a key presses what has the focus."""
+    """Return whether a key activates the focused widget."""
     return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
 
 
 def keyboard_leads() -> bool:
-    """Whether the keyboard led to where the focus is: only then it is ringed."""
+    """Return whether the focus was moved by the keyboard: only then it gets a ring."""
     application = QApplication.instance()
     return bool(application is not None and application.property(_LEADS))
 
 
 def set_keyboard_leads(leads: bool) -> None:
-    """A key that moves the focus was pressed, or a button of the mouse."""
+    """Record whether the last input was a key that moves the focus, or a mouse button."""
     application = QApplication.instance()
     if application is not None:
         application.setProperty(_LEADS, leads)
 
 
 def following(widget: QWidget, *, forward: bool = True) -> QWidget:
-    """The widget after this one in its window's focus chain, or the one before; itself when it is alone."""
+    """Return the next (or previous) widget in the window's focus chain; itself when it is alone."""
     found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
     return widget if found is None else _own_again(found)
 
 
 def proxy_of(widget: QWidget) -> QWidget | None:
-    """The widget that gets the keyboard in its place; None when it takes it itself."""
+    """Return the focus proxy of a widget, or None."""
     found = widget.focusProxy()
     return None if found is None else _own_again(found)
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
-    """What takes the keyboard by Tab inside a widget, in order, after (or before) ``begin``; each once.
+    """Yield the tab stops inside a widget, in order, after (or before) ``begin``; each once.
 
-    It ends early at a widget that PySide takes for one that was deleted at the same address: only Qt itself
-    knows what comes behind that.
+    It ends early at a widget that PySide confuses with a deleted one at the same address: only Qt knows the
+    next one.
     """
     step = following(begin, forward=forward)
     while step is not begin and isValid(step):
@@ -72,9 +73,9 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
 
 
 def stops_of(widget: QWidget) -> list[QWidget]:
-    """What takes the keyboard by Tab of a widget and in it, in the order in which it was made.
+    """Return the tab stops of a widget and its children, in order of creation.
 
-    The list that a combo box drops is its child, but a window of its own: Tab does not go there.
+    The popup of a combo box is a child but a separate window, which Tab does not reach.
     """
     return [
         each
@@ -84,7 +85,7 @@ def stops_of(widget: QWidget) -> list[QWidget]:
 
 
 def _own_again(found: QWidget) -> QWidget:
-    """Tell PySide whose child this is: Qt, which knows it, finds nothing to do."""
+    # Restores the ownership in PySide; a no-op for Qt.
     if not isValid(found):
         return found
     QObject.setParent(found, found.parentWidget())

@@ -1,4 +1,4 @@
-"""Words and lines: labels of one kind and colour, shortened where there is too little room."""
+"""Labels of a kind and colour, elided when narrow; separators."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.ui.widgets import paint
 
 
 def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool = False) -> QLabel:
-    """A line of text of one kind ("body", "small", "title", ...) in the colour of one role."""
+    """Return a label of one kind ("body", "small", "title", ...) in the colour of a role."""
     made = QLabel(text)
     made.setTextFormat(Qt.TextFormat.PlainText)
     made.setProperty("kind", kind)
@@ -22,7 +22,7 @@ def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool 
 
 
 def set_role(shown: QLabel, role: str) -> None:
-    """Give a label's words the colour of another role."""
+    """Set the colour role of a label."""
     if shown.property("role") != role:
         shown.setProperty("role", role)
         shown.style().unpolish(shown)
@@ -30,12 +30,12 @@ def set_role(shown: QLabel, role: str) -> None:
 
 
 class ElidedLabel(QLabel):
-    """A line that is shortened in its middle where there is too little room; the tooltip has the whole."""
+    """Label elided in the middle when narrow; the tooltip has the whole text."""
 
     mode = Qt.TextElideMode.ElideMiddle
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
-        """Ask for ``least`` pixels always."""
+        # `least` is the minimum width in pixels.
         super().__init__()
         self._least = least
         self.setTextFormat(Qt.TextFormat.PlainText)
@@ -58,15 +58,15 @@ class ElidedLabel(QLabel):
 
 
 class FixedWidthLabel(ElidedLabel):
-    """Words that change many times a second, in room that does not depend on them.
+    """Label with frequent changes, whose size does not depend on its text.
 
-    A label asks for its room anew with every word, and the whole window is then laid out again.
+    A normal label updates its size with every text, which triggers a relayout of the whole window.
     """
 
     def __init__(self, kind: str, role: str) -> None:
         self._words = ""
         super().__init__(kind, role)
-        super().setText("0")  # the room of one line
+        super().setText("0")  # space for one line
 
     def text(self) -> str:
         return self._words
@@ -79,7 +79,7 @@ class FixedWidthLabel(ElidedLabel):
 
 
 class SteadyLabel(ElidedLabel):
-    """Words that change about once a second, in room for the longest of them: seldom laid out anew."""
+    """Label with a change about every second, as wide as its longest text so far: rarely a relayout."""
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
         self._words = ""
@@ -101,7 +101,7 @@ class SteadyLabel(ElidedLabel):
 
 
 class BoldInLine(QWidget):
-    """``sentence`` with ``subject`` in bold where it stands in it."""
+    """Label with ``subject`` in bold within ``sentence``."""
 
     def __init__(self, theme: Theme, sentence: str, subject: str, kind: str = "bodyLarge") -> None:
         super().__init__()
@@ -129,7 +129,7 @@ class BoldInLine(QWidget):
 
 
 class Separator(QWidget):
-    """A line of 1 px: between groups of buttons (upright) or between parts of a panel."""
+    """Line of 1 px: vertical between groups of buttons, or horizontal between parts of a panel."""
 
     def __init__(self, theme: Theme, *, upright: bool = False, length: int = 0) -> None:
         super().__init__()

@@ -1,7 +1,6 @@
-"""The letters that choose entries of menus, found anew in whatever language the entries are.
+"""Mnemonics of menu entries, computed for the current language.
 
-A translator need not think of them: each entry gets a letter of its own words that none of its neighbours
-has, the first of a word where that is free.
+Translators need not define them: each entry gets a unique letter of its text, preferably the first of a word.
 """
 
 from __future__ import annotations
@@ -12,14 +11,14 @@ from collections.abc import Iterator, Sequence
 
 
 def plain_words(text: str) -> str:
-    """An entry's words as they are read: without the sign before a letter, and without its key."""
+    """Return an entry's text without mnemonic mark and shortcut."""
     return re.sub("&(.)", r"\1", text.partition("\t")[0])
 
 
 def letters_of(texts: Sequence[str]) -> list[int]:
-    """For each text the place of its letter, no letter twice; -1 for one that is left without any.
+    """Return the position of each text's letter, unique; -1 for none.
 
-    First come the beginnings of texts, then those of their other words, then any letter.
+    Beginnings of texts take precedence, then those of their other words, then any letter.
     """
     found, taken = [-1] * len(texts), set[str]()
     for places in (_beginning, _beginnings, _all):
@@ -33,13 +32,13 @@ def letters_of(texts: Sequence[str]) -> list[int]:
 
 
 def key_of(letter: str) -> str:
-    """The key that types a letter, or the one below its accent; "" for what no letter key types."""
+    """Return the key of a letter without its accent; "" if no letter key types it."""
     base = unicodedata.normalize("NFD", letter)[:1].upper()
     return base if base.isascii() and base.isalpha() else ""
 
 
 def marked(texts: Sequence[str]) -> list[str]:
-    """The texts with Qt's sign before their letter; an accent would need more than one key with Alt."""
+    """Return the texts with Qt's mnemonic mark; letters with accents can't be typed with Alt."""
     bare = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
     return [
         text if place < 0 else f"{text[:place]}&{text[place:]}"

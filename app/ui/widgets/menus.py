@@ -1,7 +1,7 @@
-"""Menus with round corners: of the menu bar, of panels, and the editing menus of fields.
+"""Menus with round corners: of the menu bar, panels, and text fields.
 
-Where the system mixes windows (Wayland, macOS, Windows) the corners are transparent. X11 may have nobody who
-does that, and would show them black: there the window itself is cut to its round shape.
+Where the system composites windows (Wayland, macOS, Windows) the corners are transparent. X11 may have no
+compositor, and would show them black: there a mask cuts the window.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from app.ui.widgets.paint import RIGHT, box, width_of, words
 
 CUT_ON = frozenset({"xcb"})
 MARK, LARGEST_MARK, TEXT_LEFT = 15, 22, 33
-SCROLLER = 22  # px, as the style sheet has it
+SCROLLER = 22  # px, as in the style sheet
 GUESSED = QAction.MenuRole.TextHeuristicRole
-LEAST_WIDTH = 160  # px; a narrower menu says too little, and rather covers Stop
+LEAST_WIDTH = 160  # px; a narrower menu is unreadable, and is better placed over Stop
 
 
 def make_round(widget: QWidget) -> None:
-    """Prepare a popup before its first show: no frame of the system, corners that may be seen through."""
+    """Prepare a popup before its first show: no system frame, translucent corners."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
     widget.setWindowFlag(Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in CUT_ON)
     if QGuiApplication.platformName() not in CUT_ON:
@@ -49,22 +49,22 @@ def make_round(widget: QWidget) -> None:
 
 
 def cut(widget: QWidget, radius: float) -> None:
-    """Cut a popup to its round corners where nobody mixes windows."""
+    """Mask a popup to its round corners on systems without a compositor."""
     if QGuiApplication.platformName() in CUT_ON:
         widget.setMask(round_region(widget.size(), radius))
 
 
 def round_region(size: QSize, radius: float) -> QRegion:
-    """The pixels of a box with round corners."""
+    """Return the region of a rounded rectangle."""
     path = QPainterPath()
     path.addRoundedRect(QRectF(0, 0, size.width(), size.height()), radius, radius)
     return QRegion(path.toFillPolygon().toPolygon())
 
 
 def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
-    """Where a menu covers no Stop: left of it, else below it, else left of it and narrower.
+    """Return a menu position that doesn't cover Stop: left of it, below it, or narrower.
 
-    It stays as it is when the screen has no such room.
+    Unchanged when the screen has no such space.
     """
     if not menu.intersects(stop):
         return menu
@@ -78,7 +78,7 @@ def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
 
 
 def stop_at(place: QPoint) -> QAbstractButton | None:
-    """The button that stops, all robots or one, at a place of the screen that nothing popped up over."""
+    """Return the stop button, of all robots or one, at a screen position that no popup covers."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
     if any(window.windowType() == Qt.WindowType.Popup for window in inside):
@@ -91,7 +91,7 @@ def stop_at(place: QPoint) -> QAbstractButton | None:
 
 
 def press_stop(place: QPoint) -> bool:
-    """Press the button that stops at this place, if there is one, and close every menu and list."""
+    """Click the stop button at this position, if any, and close all popups."""
     stop = stop_at(place)
     if stop is None:
         return False
@@ -102,11 +102,11 @@ def press_stop(place: QPoint) -> bool:
 
 
 class Menu(QMenu):
-    """A menu in the design's look: icons and checks in one column, shortcuts quiet at the right.
+    """Menu in Studio's style: icons and check marks in one column, shortcuts at the right.
 
-    Each entry is chosen by a letter, too. It is underlined for who opened the menu by keys.
+    Each entry has a mnemonic letter, underlined if the menu was opened by keyboard.
 
-    On a Mac every entry stays where it is, but for those that were given a role.
+    On a Mac entries stay in the menu unless they have an explicit role.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
@@ -117,10 +117,10 @@ class Menu(QMenu):
         make_round(self)
 
     def actionEvent(self, event: QActionEvent) -> None:
-        """Let no Mac guess by its words what an entry is for.
+        """Prevent macOS from guessing an entry's role by its text.
 
-        A file, a layout or a robot may be called "About us", "Quit" or "Setup", and would go to the menu
-        with the program's name.
+        A file, layout or robot may be called "About us", "Quit" or "Setup", and would move to the application
+        menu.
         """
         action = event.action()
         if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED:
@@ -128,13 +128,13 @@ class Menu(QMenu):
         super().actionEvent(event)
 
     def letters(self) -> dict[QAction, int]:
-        """The place in its words of the letter that chooses each entry; -1 for none."""
+        """Return the position of each entry's mnemonic letter; -1 for none."""
         entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
         places = letters_of([plain_words(action.text()) for action in entries])
         return dict(zip(entries, places, strict=True))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """A letter chooses its entry, as Enter does."""
+        """Activate an entry by its letter, as Enter does."""
         self._by_keys = True
         self.update()
         held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
@@ -156,7 +156,7 @@ class Menu(QMenu):
         self._leave_stop()
 
     def _leave_stop(self) -> None:
-        """Go aside where it would cover a Stop, as Qt may move it where a window is small."""
+        # Moves aside where it would cover a Stop, since Qt may move it in a small window.
         owner = self.parentWidget()
         while isinstance(owner, QMenu):
             owner = owner.parentWidget()
@@ -169,9 +169,10 @@ class Menu(QMenu):
                 self.setGeometry(beside(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """A press beside a menu only closes it, but for Stop.
+        """Close the menu on a click outside, which also activates Stop if it is there.
 
-        `app.ui.shell.stop_keys` hears the windows that get the keyboard first; a menu in a menu never does.
+        `app.ui.shell.stop_keys` receives the events of windows that get the keyboard first; a submenu never
+        does.
         """
         left = event.button() == Qt.MouseButton.LeftButton
         if not (left and press_stop(event.globalPosition().toPoint())):
@@ -205,7 +206,7 @@ class Menu(QMenu):
         painter.end()
 
     def _scrolled(self, shown: list[QAction]) -> tuple[bool, bool]:
-        """Whether a low screen hides entries above, and below; the mouse there brings them."""
+        # A low screen hides entries, to which the mouse at the edge scrolls.
         if not shown:
             return False, False
         first, last = self.actionGeometry(shown[0]), self.actionGeometry(shown[-1])
@@ -239,7 +240,7 @@ class Menu(QMenu):
         said = plain_words(action.text())
         whole = width_of(self.font(), said)
         if whole + 12 + width_of(self.font(), key) > inside.width():
-            key = ""  # in a menu made narrow the words come first; keys are in F1
+            key = ""  # in a narrowed menu the text takes precedence; shortcuts are listed on F1
         words(painter, inside, said, self.font(), ink)
         if self._by_keys and letter >= 0 and whole <= inside.width():
             self._underline(painter, inside, said, letter)
@@ -252,7 +253,7 @@ class Menu(QMenu):
 
 
 def drop_below(menu: Menu, anchor: QWidget) -> None:
-    """Open a menu below a button, at its right edge where it would leave the window."""
+    """Open a menu below a button, right-aligned where it would exceed the window."""
     place = anchor.rect().bottomLeft() + QPoint(0, 3)
     over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()
     if over > 0:
@@ -261,7 +262,7 @@ def drop_below(menu: Menu, anchor: QWidget) -> None:
 
 
 class EditMenu(QObject):
-    """Gives a field its editing menu in our look."""
+    """Gives a field its editing menu in Studio's style."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:
         super().__init__(field)
@@ -273,6 +274,6 @@ class EditMenu(QObject):
         standard = self._field.createStandardContextMenu()
         menu = Menu(self._theme, self._field)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.destroyed.connect(standard.deleteLater)  # whose actions they are
+        menu.destroyed.connect(standard.deleteLater)  # which owns the actions
         menu.addActions(standard.actions())
         menu.popup(self._field.mapToGlobal(at))

@@ -1,4 +1,4 @@
-"""Widgets that hold a value: fields, segments, choice, slider, switch.
+"""Input widgets: fields, segments, combo box, slider, switch.
 
-Robots' forms, settings and filters use them; what they mean is their user's.
+Used by forms of robots, settings and filters.
 """

@@ -1,4 +1,4 @@
-"""A combo box with our own arrow."""
+"""Combo box with a custom arrow."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SHOWN_AT_ONCE = 12
 
 
 class ComboBox(QComboBox):
-    """One of many words; the wheel turns it only with the focus."""
+    """Combo box for texts; the wheel changes it only with the focus."""
 
     def __init__(self, theme: Theme, options: Sequence[tuple[str, str]] = (), *, name: str = "") -> None:
-        """Options are (value, label)."""
+        # Options are (value, label).
         super().__init__()
         self._theme = theme
         self.setAccessibleName(name)
@@ -29,18 +29,18 @@ class ComboBox(QComboBox):
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         for value, words in options:
             self.addItem(words, value)
-        self.setItemDelegate(QStyledItemDelegate(self))  # which the style sheet can give room
+        self.setItemDelegate(QStyledItemDelegate(self))  # which the style sheet can give padding
         self.setMaxVisibleItems(SHOWN_AT_ONCE)
         make_round(self.view().window())
 
     @property
     def value(self) -> str:
-        """The chosen value, or "" when there is none."""
+        """Selected value, or ""."""
         data = self.currentData()
         return data if isinstance(data, str) else self.currentText()
 
     def set_value(self, value: str) -> None:
-        """Choose a value that is offered; another changes nothing."""
+        """Select an offered value; others are ignored."""
         index = self.findData(value)
         if index >= 0:
             self.setCurrentIndex(index)

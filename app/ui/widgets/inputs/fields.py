@@ -1,4 +1,4 @@
-"""Fields to type into: to find and filter, for numbers with their unit, for long texts."""
+"""Input fields: search and filter, numbers with units, long texts."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from nep.i18n import number as number_text
 
 MOST_LINES = 5
 LEAST_HEIGHT = 34
-SHEET_PADDING = 9  # what the style sheet gives texts above and below, and a pixel for rounding
+SHEET_PADDING = 9  # padding from the style sheet above and below, and a pixel for rounding
 
 
 class SearchField(QLineEdit):
-    """A field to filter or find, with its icon inside and the key that leads to it at the right."""
+    """Search field with an icon inside and its shortcut at the right."""
 
     icon_name = "search"
 
@@ -52,12 +52,12 @@ class SearchField(QLineEdit):
 
 
 class FilterField(SearchField):
-    """Filters a list: Down and Return go on into the list (`leave`), Esc clears it."""
+    """Filter of a list: Down and Return move on to the list (`leave`), Esc clears it."""
 
     leave = Signal()
 
     def __init__(self, theme: Theme, name: str) -> None:
-        """``name`` is what a screen reader says: "Filter topics"."""
+        # `name` is the accessible name: "Filter topics".
         super().__init__(theme, _("Filter"), "/")
         self.setAccessibleName(name)
         self.setMaximumWidth(190)
@@ -73,9 +73,9 @@ class FilterField(SearchField):
 
 
 class NumberEdit(QLineEdit):
-    """A number with its unit inside; a wrong one stays as it was typed and says what is wrong.
+    """Number field with its unit inside; invalid text stays, and its problem is reported.
 
-    Where it may be ``empty``, `emptied` says that it is.
+    If it may be ``empty``, `emptied` reports that.
     """
 
     number = Signal(float)
@@ -109,12 +109,12 @@ class NumberEdit(QLineEdit):
         self.setTextMargins(0, 0, round(unit) + (6 if self._unit else 0), 0)
 
     def show_number(self, value: float) -> None:
-        """Show a value that is known to be right."""
+        """Show a valid value."""
         self.setText(self.written(value))
         self._judge("")
 
     def written(self, value: float) -> str:
-        """How it writes a number."""
+        """Format a number as the field does."""
         return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
@@ -160,7 +160,7 @@ class NumberEdit(QLineEdit):
 
 
 class _Text(QPlainTextEdit):
-    """The text itself; Tab leaves it."""
+    """Text edit; Tab leaves it."""
 
     left = Signal()
     entered = Signal()
@@ -187,13 +187,13 @@ class _Text(QPlainTextEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and held:
-            event.ignore()  # the card's: try it
+            event.ignore()  # handled by the card: try the action
         else:
             super().keyPressEvent(event)
 
 
 class LongText(QWidget):
-    """Several lines of text in the frame of a field; `finished` when a person leaves it."""
+    """Multi-line text in the frame of a field; emits `finished` when it loses the focus."""
 
     changed = Signal()
     finished = Signal()
@@ -221,21 +221,21 @@ class LongText(QWidget):
         self._grow()
 
     def text(self) -> str:
-        """What stands in it."""
+        """Return the text."""
         return self.edit.toPlainText()
 
     def set_text(self, text: str) -> None:
-        """Put another text into it."""
+        """Set the text."""
         if text != self.text():
             self.edit.setPlainText(text)
 
     @property
     def wrong(self) -> bool:
-        """Whether it is marked as wrong."""
+        """True if it is marked as invalid."""
         return self._wrong
 
     def mark(self, *, wrong: bool) -> None:
-        """Give it the edge of a wrong value, or take it away."""
+        """Mark it as invalid or valid."""
         if wrong != self._wrong:
             self._wrong = wrong
             self.update()
@@ -263,7 +263,7 @@ class LongText(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._grow()  # other words may wrap now
+        self._grow()  # the wrapping may have changed
 
     def sizeHint(self) -> QSize:
         return QSize(240, self.height())

@@ -1,4 +1,4 @@
-"""JSON as it is typed: with the numbers of its lines, in colours, and with a mark where it is wrong."""
+"""JSON editor with line numbers, syntax colours, and a mark at an invalid line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.menus import EditMenu
 
 INDENT = 2
-# The first rule that fits a place colours it: texts before what stands inside of them, names before texts.
+# The first matching rule applies: strings before their content, keys before strings.
 _RULES: tuple[tuple[str, str], ...] = (
     ("textSecondary", r'"(?:\\.|[^"\\])*"(?=\s*:)'),
     ("ok", r'"(?:\\.|[^"\\])*"?'),
@@ -57,7 +57,7 @@ class _JsonColours(QSyntaxHighlighter):
 
 
 class _JsonLines(QWidget):
-    """The numbers at the left of the text."""
+    """Line numbers at the left."""
 
     def __init__(self, text: JsonLinesEdit) -> None:
         super().__init__(text)
@@ -68,7 +68,7 @@ class _JsonLines(QWidget):
 
 
 class JsonLinesEdit(QPlainTextEdit):
-    """The text itself. Enter goes on where the line began; Tab leaves; `sent` by Ctrl+Enter."""
+    """Text edit. Enter keeps the indentation; Tab leaves; Ctrl+Enter emits `sent`."""
 
     sent = Signal()
     focus_changed = Signal()
@@ -142,7 +142,7 @@ class JsonLinesEdit(QPlainTextEdit):
             self.ensureCursorVisible()
 
     def mark(self, line: int) -> None:
-        """Mark this line as wrong, from 1; 0 for none."""
+        """Mark a line as invalid, from 1; 0 for none."""
         self.wrong_line = line
         marks = []
         if line:
@@ -155,7 +155,7 @@ class JsonLinesEdit(QPlainTextEdit):
         self._numbers.update()
 
     def paint_numbers(self, place: QWidget, rect: QRect) -> None:
-        """Paint the numbers of the lines that can be seen."""
+        """Paint the visible line numbers."""
         theme, painter = self._theme, QPainter(place)
         block = self.firstVisibleBlock()
         while block.isValid():
@@ -179,13 +179,13 @@ class JsonLinesEdit(QPlainTextEdit):
 
 
 class JsonEdit(QWidget):
-    """The text in the frame of a field. `changed` with each letter, `sent` by Ctrl+Enter."""
+    """JSON editor in the frame of a field. Emits `changed` at each edit, `sent` on Ctrl+Enter."""
 
     changed = Signal()
     sent = Signal()
 
     def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
-        """``name`` is what a screen reader says; it is never lower than so many lines."""
+        # `name` is the accessible name; `least_lines` the minimum height.
         super().__init__()
         self._theme, self._least = theme, least_lines
         self._is_wrong = False
@@ -201,36 +201,36 @@ class JsonEdit(QWidget):
         self.edit.focus_changed.connect(self.update)
 
     def text(self) -> str:
-        """What stands in it."""
+        """Return the text."""
         return self.edit.toPlainText()
 
     def set_text(self, text: str) -> None:
-        """Show another text, of which nothing can be undone."""
+        """Set the text and clear the undo stack."""
         if text != self.text():
             self.edit.setPlainText(text)
 
     def replace(self, start: int, end: int, text: str) -> None:
-        """Put other letters in the place of some, as a person would: Undo takes them back."""
+        """Replace a range as an edit that can be undone."""
         cursor = QTextCursor(self.edit.document())
         cursor.setPosition(start)
         cursor.setPosition(end, QTextCursor.MoveMode.KeepAnchor)
         cursor.insertText(text)
 
     def go_to(self, line: int, column: int) -> None:
-        """Put the cursor there, both from 1."""
+        """Move the cursor, line and column from 1."""
         block = self.edit.document().findBlockByNumber(line - 1)
         cursor = QTextCursor(block)
         cursor.setPosition(block.position() + min(column - 1, max(0, block.length() - 1)))
         self.edit.setTextCursor(cursor)
 
     def set_coloured(self, is_json: bool) -> None:
-        """Whether the text is JSON: else it has no colours."""
+        """Set whether the text is JSON, which is coloured."""
         if self.edit.colours.is_on != is_json:
             self.edit.colours.is_on = is_json
             self.edit.colours.rehighlight()
 
     def mark(self, line: int) -> None:
-        """Mark this line as wrong, from 1; 0 for none."""
+        """Mark a line as invalid, from 1; 0 for none."""
         if line != self.edit.wrong_line or bool(line) != self._is_wrong:
             self._is_wrong = bool(line)
             self.edit.mark(line)
@@ -238,7 +238,7 @@ class JsonEdit(QWidget):
 
     @property
     def wrong_line(self) -> int:
-        """The line that is marked, 0 for none."""
+        """Marked line, 0 for none."""
         return self.edit.wrong_line
 
     def _high(self, lines: int) -> int:

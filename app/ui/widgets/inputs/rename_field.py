@@ -1,4 +1,4 @@
-"""A field that lies over a name while a person types another one."""
+"""Overlay field for renaming in place."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from app.ui.widgets.menus import EditMenu
 
 
 class RenameField(QLineEdit):
-    """The name of one thing, where it stands. ``take`` gets it and says whether it can be."""
+    """Rename field. ``take`` is called with the new name and returns whether it is accepted."""
 
     ended = Signal()
 
     def __init__(
         self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool], said: str
     ) -> None:
-        """``said`` is what it is called for people who hear it."""
+        # `said` is the accessible name.
         super().__init__(name, place)
         self._take, self._is_over = take, False
         self.setAccessibleName(said)
@@ -48,7 +48,7 @@ class RenameField(QLineEdit):
             self.leave()
 
     def leave(self) -> None:
-        """It goes; the name is as it was taken last."""
+        """Close the field; the name is the last accepted one."""
         if not self._is_over:
             self._is_over = True
             self.hide()

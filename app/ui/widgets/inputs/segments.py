@@ -1,4 +1,4 @@
-"""A choice of up to four: segments, of which one is chosen."""
+"""Segmented control for up to four options."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Segment(PaintedButton):
         self.setAutoExclusive(True)
 
     def set_bare(self, bare: bool) -> None:
-        """Show only the icon, with the word as its tooltip, or the word again."""
+        # With the text as its tooltip.
         self._bare = bare and self._icon is not None
         self.updateGeometry()
         self.update()
@@ -50,7 +50,6 @@ class _Segment(PaintedButton):
             self.update()
 
     def shown_word(self) -> str:
-        """The word that is painted."""
         return "" if self._bare else self.text()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -102,7 +101,7 @@ class _Segment(PaintedButton):
 
 
 class Segments(QWidget):
-    """Up to four words side by side, one chosen; `changed` tells its value when a person chooses."""
+    """Up to four segments, one selected; emits `changed` when the user selects one."""
 
     changed = Signal(str)
 
@@ -118,11 +117,8 @@ class Segments(QWidget):
         wraps: bool = False,
         dots: bool = False,
     ) -> None:
-        """Options are (value, label, icon or None); ``check`` puts a check mark before the chosen one.
-
-        With ``wraps`` they stand in several rows where there is too little room. With ``dots`` they have room
-        for the dots of `set_dot`.
-        """
+        # Options are (value, label, icon or None); `check` shows a check mark at the selected one; `wraps`
+        # uses several rows when narrow.
         super().__init__()
         self._theme = theme
         self.setAccessibleName(name)
@@ -145,7 +141,7 @@ class Segments(QWidget):
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
     def set_bare(self, bare: bool) -> None:
-        """Where there is no room for words, only the icons are left."""
+        """Show only the icons where space is scarce."""
         for segment in self._segments.values():
             segment.set_bare(bare)
 
@@ -155,20 +151,20 @@ class Segments(QWidget):
 
     @property
     def value(self) -> str:
-        """The chosen value, or "" when there are no options."""
+        """Selected value, or "" without options."""
         return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
 
     def chosen_button(self) -> QAbstractButton | None:
-        """The segment that is chosen, for the keyboard."""
+        """Return the selected segment, for the focus."""
         return self._segments.get(self.value)
 
     def set_value(self, value: str) -> None:
-        """Choose without telling; a value that is not offered changes nothing."""
+        """Select a value without emitting `changed`; an unknown one is ignored."""
         if value in self._segments:
             self._segments[value].setChecked(True)
 
     def choose_none(self) -> None:
-        """What is so is none of them; a person may choose one again."""
+        """Deselect all; the user can select one again."""
         for segment in self._segments.values():
             segment.setAutoExclusive(False)
             segment.setChecked(False)

@@ -1,4 +1,4 @@
-"""A slider with its number field, whose unit stands inside."""
+"""Slider with a number field that contains the unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PAGE_STEPS = 10
 
 
 class Track(QSlider):
-    """The slider itself: track 4, handle 20; it counts steps, and the wheel turns it only with the focus."""
+    """Slider track: 4 px, handle 20 px; counts steps, and the wheel changes it only with the focus."""
 
     reset = Signal()
 
@@ -41,7 +41,7 @@ class Track(QSlider):
         return QSize(80, self._theme.size("sliderHandle") + 4)
 
     def handle(self) -> QPointF:
-        """The middle of the handle."""
+        """Return the centre of the handle."""
         half = self._theme.size("sliderHandle") / 2
         span = max(1, self.maximum() - self.minimum())
         share = (self.sliderPosition() - self.minimum()) / span
@@ -95,12 +95,12 @@ class Track(QSlider):
 
 
 def decimals_of(step: float) -> int:
-    """How many decimals a step needs, at most 6."""
+    """Return the number of decimals of a step, at most 6."""
     return next((digits for digits in range(7) if math.isclose(round(step, digits), step, rel_tol=1e-9)), 6)
 
 
 class SliderWithUnit(QWidget):
-    """A value between two limits: slider and field; `changed` tells a value that a person chose."""
+    """Value between two limits, with slider and field; emits `changed` when the user sets a value."""
 
     changed = Signal(float)
 
@@ -116,7 +116,7 @@ class SliderWithUnit(QWidget):
         unit: str = "",
         name: str = "",
     ) -> None:
-        """ValueError if the limits or the step make no range."""
+        # Raises ValueError if the limits or the step are invalid.
         super().__init__()
         if not (maximum > minimum and step > 0):
             raise ValueError(f"no range from {minimum} to {maximum} by {step}")
@@ -152,11 +152,11 @@ class SliderWithUnit(QWidget):
 
     @property
     def value(self) -> float:
-        """The value now."""
+        """Current value."""
         return self._value
 
     def set_value(self, value: float) -> None:
-        """Show a value without telling."""
+        """Set the value without emitting `changed`."""
         self._value = value
         self.track.blockSignals(True)
         self.track.setValue(round((value - self._minimum) / self._step))

@@ -1,4 +1,4 @@
-"""Yes or no."""
+"""Boolean switch."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.ui.widgets.buttons import PaintedButton
 
 
 class Switch(PaintedButton):
-    """Yes or no: a switch with the word beside it."""
+    """Boolean switch with a label."""
 
     TRACK = QSize(36, 20)
 

@@ -1,4 +1,4 @@
-"""Lists: entries with matches in bold, the search behind them, what scrolls.
+"""Lists: entries with highlighted matches, fuzzy search, scroll areas.
 
-The command palette and the table of shortcuts are lists of entries.
+The command palette and the table of shortcuts use them.
 """

@@ -1,4 +1,4 @@
-"""The list in the palette and in the table of shortcuts: headings, and rows with matches in bold and keys."""
+"""List of the command palette and the shortcuts: headings, and rows with highlighted matches and keys."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Index = QModelIndex | QPersistentModelIndex
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """A group's name above its rows."""
+    """Heading of a group of rows."""
 
     words: str
 
@@ -34,20 +34,20 @@ Line = Heading | Match
 
 
 class EntryModel(QAbstractListModel):
-    """Lines as Qt asks for them; headings can't be chosen."""
+    """List model of the lines; headings can't be selected."""
 
     def __init__(self) -> None:
         super().__init__()
         self.lines: Sequence[Line] = ()
 
     def show_lines(self, lines: Sequence[Line]) -> None:
-        """Show other lines."""
+        """Set the lines."""
         self.beginResetModel()
         self.lines = lines
         self.endResetModel()
 
     def tell(self, id: str, note: str, reason: str) -> None:
-        """Say something else beside an entry; it stays where it is."""
+        """Update note and reason of an entry in place."""
         for row, line in enumerate(self.lines):
             if isinstance(line, Match) and line.entry.id == id:
                 told = replace(line, entry=replace(line.entry, note=note, reason=reason))
@@ -77,7 +77,7 @@ class EntryModel(QAbstractListModel):
 
 
 def spoken(entry: Entry) -> str:
-    """What a screen reader says about an entry."""
+    """Return an entry for screen readers."""
     key = _("key {key}").format(key=spoken_key(entry.key)) if entry.key else ""
     return ", ".join(part for part in (entry.words, entry.note, key, entry.reason) if part)
 
@@ -88,7 +88,7 @@ class EntryDelegate(QStyledItemDelegate):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.waiting = ""  # the id of the entry that waits for a new key
+        self.waiting = ""  # id of the entry that waits for a new shortcut
 
     def sizeHint(self, _option: QStyleOptionViewItem, index: Index) -> QSize:
         model = index.model()
@@ -131,7 +131,7 @@ class EntryDelegate(QStyledItemDelegate):
         self._words(painter, area, found, ink, marked)
 
     def _right(self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool) -> float:
-        """Note, key and the sign of Enter; where they begin."""
+        # Note, shortcut and Enter sign; returns their left edge.
         theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
         if entry.id == self.waiting:
             font = theme.font("body")
@@ -158,7 +158,7 @@ class EntryDelegate(QStyledItemDelegate):
         return right
 
     def _words(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
-        """The words, with the letters that fit in bold."""
+        # With matching letters in bold.
         theme = self._theme
         plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
         if found.entry.kind == "topic":
@@ -181,7 +181,7 @@ class EntryDelegate(QStyledItemDelegate):
 
 
 class EntryList(QListView):
-    """Rows of which one is chosen; `moved` when it is another one, `pressed_row` when it is to be done."""
+    """List with one selected row; emits `moved` when the selection changes, `pressed_row` on activation."""
 
     moved = Signal()
     pressed_row = Signal()
@@ -202,7 +202,7 @@ class EntryList(QListView):
         self.clicked.connect(self._clicked)
 
     def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
-        """Show other lines and choose the one with this id, else the first that is no heading."""
+        """Set the lines and select the one with this id, else the first row."""
         self.lines.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
@@ -211,23 +211,23 @@ class EntryList(QListView):
             self.scrollToTop()
 
     def tell(self, id: str, note: str, reason: str = "") -> None:
-        """Say something else beside an entry."""
+        """Update note and reason of an entry."""
         self.lines.tell(id, note, reason)
 
     @property
     def entry(self) -> Entry | None:
-        """The entry that is chosen."""
+        """Selected entry, or None."""
         row = self.currentIndex().row()
         line = self.lines.lines[row] if 0 <= row < len(self.lines.lines) else None
         return line.entry if isinstance(line, Match) else None
 
     def height_of_all(self) -> int:
-        """How high all lines are together."""
+        """Return the height of all lines."""
         heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
 
     def step(self, steps: int) -> None:
-        """Choose another row that many rows away; it stops at the ends."""
+        """Move the selection by a number of rows, limited to the ends."""
         rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
@@ -235,7 +235,7 @@ class EntryList(QListView):
             self._choose(rows[max(0, min(len(rows) - 1, place + steps))])
 
     def handle(self, key: int) -> bool:
-        """Up, Down, Page up, Page down, Home and End; False for other keys."""
+        """Handle Up, Down, Page up, Page down, Home and End; return False for other keys."""
         page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
         far = len(self.lines.lines)
         steps = {

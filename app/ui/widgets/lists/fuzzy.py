@@ -1,8 +1,8 @@
-"""Fuzzy search for the command palette: which words fit what was typed, how well, and by which letters.
+"""Fuzzy search of the command palette: whether and how well texts match a query, and at which letters.
 
-A whole piece of a word fits better than letters that are spread over it; the beginning of a word fits better
-than its middle. Letters that are only somewhere do not fit at all: a person would not know why. Who types the
-initials of a command means that command, whatever else has those letters.
+A contiguous match scores higher than spread letters; the start of a word higher than its middle. Letters in
+arbitrary places don't match at all, because the user would not understand why. Initials of a command match
+this command best.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from dataclasses import dataclass
 from operator import attrgetter
 
 WHOLE, WORD, INITIALS, INSIDE, SPREAD = 100.0, 80.0, 70.0, 55.0, 40.0
-LEAST_SPREAD = 0.8  # share of the letters that begin a word or follow the letter before
+LEAST_SPREAD = 0.8  # minimum share of letters that begin a word or follow the previous letter
 PER_LETTER = 0.05
-MANY = 400  # entries of a kind that are all looked at letter by letter
-LATER = 5.0  # what can't be done now stands below what fits as well
+MANY = 400  # maximum number of entries of a kind that are matched letter by letter
+LATER = 5.0  # penalty of entries that are unavailable now
 Span = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One thing that can be found and done.
+    """Searchable action.
 
     ``id`` is "command:file.save", "panel:topics", "topic:/faces", "robot:Pepper" or "file:/home/me/a.nepb".
-    ``note`` stands quietly at the right, ``key`` is its shortcut; ``reason`` says why it can't be done now.
+    ``note`` is shown at the right, ``key`` is its shortcut; ``reason`` is why it is unavailable now.
     """
 
     id: str
@@ -37,18 +37,18 @@ class Entry:
 
     @property
     def kind(self) -> str:
-        """What it is: "command", "panel", "topic", "robot", "file" or "example"."""
+        """Kind: "command", "panel", "topic", "robot", "file" or "example"."""
         return self.id.partition(":")[0]
 
     @property
     def name(self) -> str:
-        """The name that its kind knows it by."""
+        """Name within its kind."""
         return self.id.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """An entry that fits, how well (more is better), and the letters that fit: (from, to)."""
+    """Matching entry with its score (higher is better) and the matching letters as (from, to)."""
 
     entry: Entry
     score: float = 0.0
@@ -56,9 +56,12 @@ class Match:
 
 
 def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
-    """How well ``words`` fit a query of one or more pieces, in any order; None when they do not."""
+    """Return score and matches of ``words`` for a query of one or more pieces in any order.
+
+    None if no match.
+    """
     lower = words.lower()
-    if len(lower) != len(words):  # letters that grow when they are small: positions would be wrong
+    if len(lower) != len(words):  # lower case changes the length of some letters, which would shift positions
         lower = words
     score, spans = 0.0, []
     pieces = query.lower().split()
@@ -86,7 +89,7 @@ def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
 
 
 def _spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
-    """The letters of a piece in their order, each best as the next letter or at a word's beginning."""
+    # Letters in order, preferably contiguous or at the start of a word.
     places: list[int] = []
     good, at = 0, 0
     for letter in piece:
@@ -116,7 +119,7 @@ def _word_beginning(letter: str, text: str, start: int) -> int:
 
 
 def _joined(spans: Iterable[Span]) -> tuple[Span, ...]:
-    """The same letters in as few spans as possible, from the left."""
+    # Merges adjacent spans.
     made: list[Span] = []
     for begin, end in sorted(spans):
         if made and begin <= made[-1][1]:
@@ -127,17 +130,17 @@ def _joined(spans: Iterable[Span]) -> tuple[Span, ...]:
 
 
 class Finder:
-    """Searches entries. Of a kind that has very many only whole pieces fit: that is quick, and enough."""
+    """Searches entries. Large kinds match only contiguous pieces, which is fast."""
 
     def __init__(self, entries: Sequence[Entry]) -> None:
-        """Search ``entries``, in the order in which equals are to stand."""
+        # Entries of equal score keep their order.
         self.entries = entries
         self._kinds: dict[str, list[tuple[str, Entry]]] = {}
         for entry in entries:
             self._kinds.setdefault(entry.kind, []).append((entry.words.lower(), entry))
 
     def find(self, query: str, most: int) -> tuple[list[Match], int]:
-        """The best for each kind, at most ``most`` of a kind, best first; and how many fit altogether."""
+        """Return the best matches, at most ``most`` per kind, best first; and the number of all matches."""
         pieces = query.lower().split()
         best: list[list[Match]] = []
         count = 0
@@ -170,7 +173,7 @@ def _says_initials(query: str, found: Sequence[Match]) -> bool:
 
 
 def is_initials(query: str, words: str) -> bool:
-    """Whether these are the first letters of words, the first word's and others' in their order."""
+    """Return whether a query consists of initials of words, in order, including the first word."""
     wanted = query.lower().strip()
     firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in words.lower()).split()]
     if len(wanted) < 2 or not firsts or wanted[0] != firsts[0]:
@@ -180,6 +183,6 @@ def is_initials(query: str, words: str) -> bool:
 
 
 def _soonest(pieces: Sequence[str]) -> Callable[[tuple[str, Entry]], tuple[int, int]]:
-    """A first order, cheap: where the first piece stands, then how long the words are."""
+    # Cheap preliminary order: position of the first piece, then text length.
     first = pieces[0] if pieces else ""
     return lambda pair: (pair[0].find(first), len(pair[0]))

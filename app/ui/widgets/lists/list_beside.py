@@ -1,4 +1,4 @@
-"""A list with its filter beside what is chosen in it, or above that where there is little room."""
+"""List with a filter beside the details of the selected entry, or above them when narrow."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.ui.widgets.labels import Separator
 
 LIST_SHARE = 0.4
 NO_LIMIT = 16_777_215
-"""Qt's own measure of a widget that may be as large as it likes."""
+"""Qt's maximum widget size (QWIDGETSIZE_MAX)."""
 
 
 class ListBeside(QWidget):
-    """The list is ``list_px`` wide, two fifths at most; below ``narrow_px`` it is ``list_high_px`` high."""
+    """The list is ``list_px`` wide, at most two fifths; below ``narrow_px`` it is ``list_high_px`` high."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class ListBeside(QWidget):
         list_high_px: float,
         narrow_px: float,
     ) -> None:
-        """``parts`` are the filter, the list, and what shows what is chosen."""
+        # `parts` are filter, list, and details.
         super().__init__()
         self._theme, (find, listed, chosen) = theme, parts
         self._list_px, self._list_high_px, self._narrow_px = list_px, list_high_px, narrow_px
@@ -51,7 +51,7 @@ class ListBeside(QWidget):
         self.fit()
 
     def fit(self) -> None:
-        """Share the room out anew: also after the size of letters has changed."""
+        """Update the sizes, also after a change of the text size."""
         beside = self.width() >= self._theme.scaled(self._narrow_px)
         way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self._sides.setDirection(way)

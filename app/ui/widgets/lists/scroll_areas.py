@@ -1,4 +1,4 @@
-"""What can be scrolled: words where large text leaves too little room, and rows that fill a panel."""
+"""Scroll areas: for texts that don't fit, and for rows that fill a panel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from app.ui.widgets.keyboard import stops_of
 
 
 class Scrolled(QScrollArea):
-    """Something that asks for the height of all its lines, and scrolls when it gets less."""
+    """Scroll area whose size hint is the height of its content."""
 
     def __init__(self, inside: QWidget) -> None:
         super().__init__()
@@ -47,15 +47,15 @@ class Scrolled(QScrollArea):
 
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:
-            self.updateGeometry()  # what is inside wants another height, which a scroll area keeps to itself
+            self.updateGeometry()  # the content's height has changed, which a scroll area doesn't propagate
         return super().viewportEvent(event)
 
 
 class RowsLayout(QVBoxLayout):
-    """Rows in whose order Tab goes: Qt puts a row that comes later behind everything else in the window."""
+    """Rows in tab order: Qt appends a later row to the end of the window's order."""
 
     def __init__(self, inside: QWidget, before: QWidget) -> None:
-        """``before`` has the keyboard before the first row."""
+        # `before` precedes the first row in the tab order.
         super().__init__(inside)
         self._before = before
 
@@ -74,10 +74,10 @@ class RowsLayout(QVBoxLayout):
 
 
 class ScrollColumn(QScrollArea):
-    """Rows below each other, which scroll; put them into `column`, whose end is a stretch."""
+    """Scrolling column of rows; add them to `column`, which ends with a stretch."""
 
     def __init__(self, name: str, *, margins: tuple[int, int, int, int] = (0, 0, 0, 0), gap: int = 0) -> None:
-        """``name`` is what a screen reader calls the rows; ``margins`` left, top, right, bottom."""
+        # `name` is the accessible name; `margins` are left, top, right, bottom.
         super().__init__()
         inside = QWidget()
         inside.setProperty("bare", "true")
@@ -93,10 +93,10 @@ class ScrollColumn(QScrollArea):
 
 
 class PanelRows(QStackedWidget):
-    """Shows ``empty`` until it is told that there are rows."""
+    """Stack that shows ``empty`` until there are rows."""
 
     def __init__(self, empty: QWidget, name: str = "") -> None:
-        """``name`` is what a screen reader calls the rows."""
+        # `name` is the accessible name of the rows.
         super().__init__()
         scroll = ScrollColumn(name, margins=(8, 8, 8, 8), gap=6)
         self._column = scroll.column
@@ -104,21 +104,21 @@ class PanelRows(QStackedWidget):
         self.addWidget(scroll)
 
     def put(self, place: int, row: QWidget) -> None:
-        """Show a row at this place, also one that stands elsewhere."""
+        """Show a row at a position, moving it if necessary."""
         if self._column.indexOf(row) != place:
             self._column.insertWidget(place, row)
 
     def drop(self, row: QWidget) -> None:
-        """A row is not needed any more."""
+        """Remove and delete a row."""
         self._column.removeWidget(row)
         row.deleteLater()
 
     def show_rows(self, shown: bool) -> None:
-        """Show the rows, or what says that there are none."""
+        """Show the rows, or the empty state."""
         self.setCurrentIndex(1 if shown else 0)
 
     def fill(self, panel: QWidget) -> None:
-        """Take all of a panel's room."""
+        """Fill a panel with this widget."""
         column = QVBoxLayout(panel)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self)

@@ -1,4 +1,4 @@
-"""A virtual table: its model, its look, its cells, its columns.
+"""Virtual table: model, view, cells, columns.
 
-Panels describe `Column`s; no cell is a widget.
+Panels describe `Column`s; cells are not widgets.
 """

@@ -1,4 +1,4 @@
-"""How the cells and the head of a table are painted."""
+"""Painting of cells and headers of a table."""
 
 from __future__ import annotations
 
@@ -18,56 +18,56 @@ from app.ui.widgets.table.model import Cell, Column, Order
 
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
-REMEMBERED = 4000  # cells: some screens full, so that scrolling does not gather all there are
+REMEMBERED = 4000  # cells: some screens, so that scrolling does not accumulate all of them
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
 class TableAppearance(Protocol):
-    """What painting asks of the table's view; the rows may be of any type."""
+    """Part of the table view that painting needs; rows may have any type."""
 
     row_height: int
     hovered_row: int
-    last_shown: int  # the last column that is not hidden
+    last_shown: int  # the last visible column
 
     @property
     def shown_columns(self) -> Sequence[Column[Any]]:
-        """The columns."""
+        """All columns."""
 
     @property
     def shown_order(self) -> Order[Any]:
-        """How it is sorted."""
+        """Sort order."""
 
     def cell_font(self, cell: Cell) -> QFont:
-        """The font of a cell."""
+        """Return the font of a cell."""
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """What a cell shows now."""
+        """Return a cell's content."""
 
     def columnWidth(self, column: int) -> int:
-        """How wide a column is; 0 when it is hidden."""
+        """Return the width of a column; 0 when hidden."""
 
 
 def padded(rect: QRect, column: int, last: int) -> QRectF:
-    """The inside of a cell: the outer columns keep further from the edge."""
+    """Return the inside of a cell: the outer columns have more padding."""
     left = EDGE if column == 0 else PADDING
     right = EDGE if column == last else PADDING
     return QRectF(rect.adjusted(left, 0, -right, 0))
 
 
 def head_font(theme: Theme) -> QFont:
-    """The font of the words in the head."""
+    """Return the font of the header."""
     font = theme.font("small")
     font.setWeight(QFont.Weight.Medium)
     return font
 
 
 def head_width(theme: Theme, column: Column[Any]) -> int:
-    """The room that a column's head wants, at the outer edge too."""
+    """Return the width that a column's header needs, including the outer edge."""
     return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(column.head)) + EDGE + PADDING + 1
 
 
 class CellDelegate(QStyledItemDelegate):
-    """Paints a `Cell`, and knows what each place showed when it was painted last."""
+    """Paints a `Cell`, and caches what each position showed last."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(parent)
@@ -76,7 +76,7 @@ class CellDelegate(QStyledItemDelegate):
         self._painted: dict[tuple[int, int], Cell] = {}
 
     def changed(self, row: int, columns: Sequence[int]) -> list[int]:
-        """Those of the columns that this row would show otherwise than it was painted last."""
+        """Return the columns of a row whose content differs from the last painting."""
         if len(self._painted) > REMEMBERED:
             self._painted.clear()
         at = self._view.cell_at
@@ -108,7 +108,7 @@ class CellDelegate(QStyledItemDelegate):
         painter.restore()
 
     def _blank_before(self, row: int, column: int) -> int:
-        """The room of the blank cells at the left of a cell."""
+        # Total width of the blank cells at the left of a cell.
         room = 0
         while column > 0 and self._view.cell_at(row, column - 1).is_blank:
             column -= 1
@@ -170,7 +170,7 @@ class CellDelegate(QStyledItemDelegate):
 
 
 class TableHeader(QHeaderView):
-    """The head: small words, the sorted one in the text's colour with its arrow."""
+    """Header: small text, the sorted column in the text colour with an arrow."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal, parent)

@@ -1,4 +1,4 @@
-"""Which columns of a table are shown: a person's choice first, then what fits."""
+"""Visible columns of a table: the user's choice first, then what fits."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from nep.i18n import _
 
 
 class ColumnChoice:
-    """What a person chose to see of the columns; what was not chosen is as it is at first."""
+    """The user's choice of columns; others have their default."""
 
     def __init__(self, columns: Sequence[Column[Any]]) -> None:
-        """The first column is always shown: it names the row."""
+        # The first column is always shown, because it identifies the row.
         self._columns = tuple(columns)
         self._chosen: dict[str, bool] = {}
 
     def wanted(self, column: Column[Any]) -> bool:
-        """Whether the column is to be shown where there is room."""
+        """Return whether the column should be shown if there is space."""
         if column.when is not None and not column.when():
             return False
         return self._chosen.get(column.name, not column.off) or column is self._columns[0]
 
     def show(self, name: str, shown: bool) -> None:
-        """Show a column, or not."""
+        """Show or hide a column."""
         for column in self._columns[1:]:
             if column.name == name:
                 self._chosen.pop(name, None)
@@ -36,18 +36,18 @@ class ColumnChoice:
                     self._chosen[name] = shown
 
     def reset(self) -> None:
-        """Show the columns that are shown at first."""
+        """Restore the default columns."""
         self._chosen.clear()
 
     @property
     def changed(self) -> bool:
-        """Whether a person chose other columns than those at first."""
+        """True if the choice differs from the default."""
         return bool(self._chosen)
 
     def fit(self, widths: Sequence[int], room: int) -> set[int]:
-        """The places of the columns to show in ``room`` pixels: those that yield go first.
+        """Return the indexes of columns that fit into ``room`` pixels; those that yield are hidden first.
 
-        What a person asked for by name stays, also where it does not fit.
+        Columns that the user chose stay, even if they do not fit.
         """
         shown = {place for place, column in enumerate(self._columns) if self.wanted(column)}
         yielding = sorted(
@@ -60,13 +60,13 @@ class ColumnChoice:
         return shown
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
-        """A new menu as `fill` fills it."""
+        """Return a new menu filled by `fill`."""
         menu = Menu(theme, parent, _("Columns"))
         self.fill(menu, changed)
         return menu
 
     def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
-        """Every column but the first, checked when shown, in place of what was in the menu.
+        """Fill a menu with all columns but the first, checked when shown.
 
         ``changed`` is called after each choice.
         """
@@ -93,11 +93,11 @@ class ColumnChoice:
         again.triggered.connect(lambda _on=False: begin_anew())
 
     def saved(self) -> dict[str, bool]:
-        """The choices, for a layout."""
+        """Return the choices for a layout."""
         return dict(self._chosen)
 
     def restore(self, saved: object) -> None:
-        """Take over what `saved` gave; whatever does not fit is left out."""
+        """Restore the result of `saved`; invalid parts are ignored."""
         self._chosen.clear()
         if isinstance(saved, Mapping):
             for name, shown in saved.items():

@@ -1,7 +1,6 @@
-"""A virtual table made from `Column` descriptions: one signal a refresh, no widgets in cells.
+"""Virtual table model of `Column` descriptions: one signal per refresh, no widgets in cells.
 
-Rows are filtered and sorted in Python lists, never by a proxy; figures are asked for only while they
-are seen.
+Rows are filtered and sorted as Python lists, without a proxy model; values are read only for visible rows.
 """
 
 from __future__ import annotations
@@ -24,25 +23,25 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
 CELL_ROLE = int(Qt.ItemDataRole.UserRole)
-RUNS_AT_MOST = 40  # more removed runs than this, and a reset is cheaper than telling each
+RUNS_AT_MOST = 40  # with more removed runs a reset is cheaper than a signal for each
 _ROOT = QModelIndex()
 
 
 class CellMark(Protocol):
-    """Paints itself in a cell; equal ones look the same."""
+    """Custom painting of a cell; equal marks look the same."""
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint it in the inside of a cell."""
+        """Paint it inside a cell."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one cell shows; ``role`` is its colour's role, ``chip`` a state word behind the text.
+    """Content of a cell; ``role`` is its colour role, ``chip`` a state after the text.
 
-    Text that does not fit is shortened at its end, or in its ``middle``. ``curve`` are values to draw as a
-    sparkline in place of the text, ``indent`` pixels to stand further in, ``tint`` the role of a box behind
-    the text. Text that ``spills`` goes on over the blank cells at its left. A ``mark`` is painted in place of
-    the text; ``said`` is what a screen reader says for it or for an icon.
+    Text that does not fit is elided at its end, or in its ``middle``. ``curve`` are values of a sparkline
+    instead of the text, ``indent`` is in pixels, ``tint`` the role of a box behind the text. Text that
+    ``spills`` extends over blank cells at its left. A ``mark`` is painted instead of the text; ``said`` is
+    the accessible text for it or for an icon.
     """
 
     text: str = ""
@@ -62,20 +61,19 @@ class Cell:
 
     @property
     def is_blank(self) -> bool:
-        """Whether nothing is painted."""
+        """True if nothing is painted."""
         return not (self.text or self.icon or self.chip or self.curve or self.mark)
 
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[Row]):
-    """One column: its head, its width, and what it shows of a row.
+    """Column: title, width, and the content for a row.
 
-    ``title`` and ``words`` are marked with `lazy`. ``key`` gives what it is sorted by (None at the end,
-    whatever the direction); without it the column can't be sorted. ``stretch`` takes the width that is left.
-    ``tip`` is the tooltip's sentence. Where there is too little room (large text) columns that ``yield`` are
-    not shown, the largest number first. ``off`` ones are shown only when a person chooses them, those with
-    ``when`` only while that is so; ``words`` names one whose head is blank. A ``verbatim`` title is not
-    Studio's own word, and is not translated.
+    ``title`` and ``words`` are marked with `lazy`. ``key`` returns the sort key (None is last in both
+    directions); without it the column can't be sorted. ``stretch`` takes the remaining width. ``tip`` returns
+    the tooltip. When space is scarce, columns with ``yields`` are hidden, the largest number first. ``off``
+    columns are hidden by default, those with ``when`` shown only while it is true; ``words`` names one whose
+    title is empty. A ``verbatim`` title is not translated.
     """
 
     name: str
@@ -94,24 +92,24 @@ class Column(Generic[Row]):
 
     @property
     def head(self) -> str:
-        """Its head, in the person's language."""
+        """Translated title."""
         return self.title if self.verbatim else _(self.title) if self.title else ""
 
     @property
     def called(self) -> str:
-        """What it is called where a blank head says nothing."""
+        """Translated name, also where the title is empty."""
         return _(self.words) if self.words else self.head
 
 
 @dataclass(slots=True)
 class Order(Generic[Row]):
-    """How rows are sorted: by a column, rising or falling; None keeps the order in which they come."""
+    """Sort order: column and direction; None keeps the original order."""
 
     column: Column[Row] | None = None
     falling: bool = False
 
     def sort(self, rows: list[Row]) -> list[Row]:
-        """The rows in this order; equal ones and unknown values keep the order in which they came."""
+        """Return the sorted rows; equal and unknown values keep their order. Stable."""
         key = self.column.key if self.column is not None else None
         if key is None:
             return rows
@@ -128,16 +126,16 @@ class _Rows(Generic[Row]):
 
 
 class TableModel(QAbstractTableModel, Generic[Row]):
-    """The rows of a table as Qt wants them."""
+    """Qt model of the rows."""
 
     def __init__(self, columns: Sequence[Column[Row]], key: Callable[[Row], str]) -> None:
-        """``key`` names a row for ever, so that the chosen row stays chosen when others come and go."""
+        # `key` identifies a row permanently, so that the selection survives changes of other rows.
         super().__init__()
         self.columns = tuple(columns)
         self._key = key
         self._rows: _Rows[Row] = _Rows()
 
-    # -- Qt's questions ---------------------------------------------------------------------------------
+    # -- overrides of QAbstractTableModel -------------------------------------------------------------
 
     def rowCount(self, parent: Index = _ROOT) -> int:
         return 0 if parent.isValid() else len(self._rows.shown)
@@ -170,33 +168,33 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         column = self.columns[section]
         if role == Qt.ItemDataRole.DisplayRole:
             return column.head
-        if role == Qt.ItemDataRole.ToolTipRole:  # where there is no room for the whole
+        if role == Qt.ItemDataRole.ToolTipRole:  # where the title is cut off
             return plain.tip(column.called) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column.figures)
         return None
 
-    # -- what a panel asks and says ---------------------------------------------------------------------
+    # -- interface of panels --------------------------------------------------------------------------
 
     def row_at(self, index: Index) -> Row | None:
-        """The row of an index, or None."""
+        """Return the row of an index, or None."""
         return self._rows.shown[index.row()] if index.isValid() else None
 
     def key_of(self, row: Row) -> str:
-        """The key of a row."""
+        """Return the key of a row."""
         return self._key(row)
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """What a cell shows now, asked without the way through Qt."""
+        """Return a cell's content directly, without Qt's roles."""
         return self.columns[column].cell(self._rows.shown[row])
 
     def index_of(self, key: str) -> QModelIndex:
-        """The first cell of the row with this key; invalid when it is not shown."""
+        """Return the first cell of the row with this key; invalid when not shown."""
         keys = self._rows.keys
         return self.index(keys.index(key), 0) if key in keys else QModelIndex()
 
     def set_rows(self, rows: Sequence[Row]) -> None:
-        """Show exactly these rows, in this order. The chosen row stays chosen if it is still there."""
+        """Set the rows in this order. The selected row stays selected if it still exists."""
         keys = [self._key(row) for row in rows]
         if keys == self._rows.keys:
             self._rows.shown = list(rows)
@@ -218,7 +216,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         self._rows.shown = list(rows)
 
     def tell_changed(self, first: int, last: int) -> None:
-        """The figures of these rows changed: one signal for all of them."""
+        """Emit one signal that the values of these rows changed."""
         last = min(last, len(self._rows.shown) - 1)
         if 0 <= first <= last:
             corner = self.index(last, len(self.columns) - 1)
@@ -250,7 +248,7 @@ def _alignment(figures: bool) -> int:
 
 
 def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
-    """Neighbouring numbers as (first, last)."""
+    # Consecutive numbers as (first, last).
     runs: list[tuple[int, int]] = []
     for place in places:
         if runs and runs[-1][1] == place - 1:

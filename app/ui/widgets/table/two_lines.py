@@ -1,4 +1,4 @@
-"""A cell of a list with high rows: a name, and below it where it belongs."""
+"""Cell with two lines: a name, and its origin below."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ ROW_PX = 50
 
 @dataclass(frozen=True, slots=True)
 class TwoLines:
-    """The name is ``mono`` for topics and services; what stands below it is then a plain word."""
+    """Two-line cell; the name is ``mono`` for topics and services, whose second line is plain text."""
 
     name: str
     below: str
     mono: bool = False
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint it in the inside of a cell."""
+        """Paint it inside a cell."""
         name, below = (
             theme.font("code" if self.mono else "body"),
             theme.font("small" if self.mono else "mono"),

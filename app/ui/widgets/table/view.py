@@ -1,4 +1,4 @@
-"""How a table looks: rows without lines, a quiet head, the chosen row with its bar, figures at the right."""
+"""Table view: rows without grid, plain header, bar at the selected row, numbers right-aligned."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ KEYBOARD = frozenset(
 
 
 class TableView(QTableView, Generic[Row]):
-    """A table of `Column`s. `opened` with the key of a row that was clicked or entered.
+    """Table of `Column`s. Emits `opened` with the key of a clicked or entered row.
 
-    `menu_wanted` with the key of a row and the place on the screen where its menu is wanted.
+    Emits `menu_wanted` with the key and the screen position for a row's context menu.
     """
 
     opened = Signal(str)
@@ -66,7 +66,7 @@ class TableView(QTableView, Generic[Row]):
     order_changed = Signal()
 
     def __init__(self, theme: Theme, model: TableModel[Row], key: str = "") -> None:
-        """Show ``model``; ``key`` is the column sorted by at first."""
+        # `key` is the column sorted by default.
         super().__init__()
         self.theme = theme
         self.columns: tuple[Column[Row], ...] = model.columns
@@ -103,16 +103,16 @@ class TableView(QTableView, Generic[Row]):
 
     @property
     def shown_columns(self) -> Sequence[Column[Row]]:
-        """The columns."""
+        """All columns."""
         return self.columns
 
     @property
     def shown_order(self) -> Order[Row]:
-        """How it is sorted."""
+        """Sort order."""
         return self.order
 
     def set_row_height(self, height: int, *, large: bool) -> None:
-        """The height of all rows; ``large`` words for the comfortable density."""
+        """Set the height of all rows; ``large`` text is for the comfortable density."""
         self.row_height, self._large = height, large
         self._fonts.clear()
         rows = self.verticalHeader()
@@ -124,7 +124,7 @@ class TableView(QTableView, Generic[Row]):
         self.viewport().update()
 
     def cell_font(self, cell: Cell) -> QFont:
-        """The font of a cell."""
+        """Return the font of a cell."""
         key = (cell.mono, cell.bold, cell.struck)
         if key not in self._fonts:
             font = self.theme.font("bodyLarge" if self._large else "body")
@@ -139,11 +139,11 @@ class TableView(QTableView, Generic[Row]):
         return self._fonts[key]
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """What a cell shows now."""
+        """Return a cell's content."""
         return self._model.cell_at(row, column)
 
     def visible_rows(self) -> tuple[int, int]:
-        """First and last row that can be seen; the last is before the first when there is none."""
+        """Return the first and last visible row; the last is before the first when there is none."""
         first = self.rowAt(0)
         if first < 0:
             return 0, -1
@@ -151,12 +151,12 @@ class TableView(QTableView, Generic[Row]):
         return first, last if last >= 0 else self._model.rowCount() - 1
 
     def tell_visible_changed(self) -> None:
-        """Figures may have changed: repaint those that can be seen and did, with one signal."""
+        """Repaint the visible values that changed, with one signal."""
         first, last = self.visible_rows()
         self._model.tell_changed(first, last)
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
-        """Qt says which rows may have changed; it would paint all of them again."""
+        """Repaint changed cells only; Qt would repaint all rows."""
         top, bottom = self.visible_rows()
         columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
         dirty = QRegion()
@@ -182,12 +182,12 @@ class TableView(QTableView, Generic[Row]):
             QAccessible.updateAccessibility(event)
 
     def chosen_key(self) -> str | None:
-        """The key of the chosen row."""
+        """Return the key of the selected row."""
         row = self._model.row_at(self.currentIndex())
         return self._model.key_of(row) if row is not None else None
 
     def choose(self, key: str) -> None:
-        """Choose the row of this key without opening it; nothing when it is not shown."""
+        """Select the row with this key without opening it; no effect when it is not shown."""
         index = self._model.index_of(key)
         if index.isValid() and index.row() != self.currentIndex().row():
             self.setCurrentIndex(index)
@@ -235,12 +235,12 @@ class TableView(QTableView, Generic[Row]):
         self.fit_columns()
 
     def fit_columns(self) -> None:
-        """Give the stretching column what the others leave, at least its own width; columns may give way."""
+        """Give the stretch column the remaining width, at least its own; columns may be hidden."""
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
         shown = self.choice.fit(scaled, room)
         spare = room - sum(scaled[place] for place in shown)
-        for place in sorted(shown):  # words of other languages may be longer; they take room that is left
+        for place in sorted(shown):  # translations may be longer; they get remaining space
             more = head_width(self.theme, self.columns[place]) - scaled[place]
             if not self.columns[place].stretch and more > 0 and spare > 0:
                 scaled[place] += min(more, spare)
@@ -255,11 +255,11 @@ class TableView(QTableView, Generic[Row]):
         self.setHorizontalScrollBarPolicy(policy)
 
     def column_menu(self) -> Menu:
-        """The menu in which a person chooses the columns."""
+        """Return the menu of columns."""
         return self.choice.menu(self.theme, self, self.fit_columns)
 
     def fill_column_menu(self, menu: Menu) -> None:
-        """The same in a menu that stays."""
+        """Fill an existing menu of columns."""
         self.choice.fill(menu, self.fit_columns)
 
     def _show_columns(self, at: QPoint) -> None:
@@ -268,7 +268,7 @@ class TableView(QTableView, Generic[Row]):
         menu.popup(at)
 
     def saved_state(self) -> dict[str, object]:
-        """The order and the chosen columns, for a layout."""
+        """Return sort order and columns for a layout."""
         order = self.order
         return {
             "sort": order.column.name if order.column else "",
@@ -277,7 +277,7 @@ class TableView(QTableView, Generic[Row]):
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
-        """Take over what `saved_state` gave; whatever does not fit is as at first."""
+        """Restore the result of `saved_state`; invalid parts become defaults."""
         chosen = (column for column in self.columns if column.name == state.get("sort"))
         self.order.column = next(chosen, self.columns[0])
         self.order.falling = state.get("falling") is True
