@@ -1,4 +1,4 @@
-"""Pictures of a stream: how they are shown, zoomed, and marked with what was recognised.
+"""Image display: fitting, zoomed, and annotated with detections.
 
-The panels Image and Camera share them; pictures are decoded by `app.core.messages`.
+Used by the panels Image and Camera; images are decoded by `app.core.messages`.
 """

@@ -1,4 +1,4 @@
-"""Paints on pictures what messages say of them: points, lines, areas, circles and texts; the colour bar."""
+"""Painting of annotations on images: points, lines, areas, circles and texts; the colour bar."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ LEAST_BAR = 40
 def paint_drawn(
     painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Drawn]
 ) -> None:
-    """Paint them; ``shares`` leads from shares of the picture to the view, ``scale`` is a pixel's width."""
+    """Paint annotations.
+
+    ``shares`` maps image fractions to the view, ``scale`` is the width of an image pixel.
+    """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     for each in drawn:
@@ -61,7 +64,7 @@ def _paint_one(
 
 
 def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Drawn) -> None:
-    """Words whose lower left corner is there, upright however the picture is turned."""
+    # The lower left corner is `at`; upright whatever the image's rotation.
     font, words = theme.font("small"), drawn.words
     font.setPixelSize(round(min(max(high, LEAST_LETTERS), MOST_LETTERS)))
     metrics = QFontMetricsF(font)
@@ -89,12 +92,12 @@ def _colour(colour: Colour) -> QColor:
 
 
 def end_words(value: float) -> str:
-    """A number at the end of a colour bar."""
+    """Format the number at an end of a colour bar."""
     return number(value, ".4g")
 
 
 def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: ColourScale) -> None:
-    """What the colours mean, at the upper right of the view; nothing where there is too little room."""
+    """Paint the colour scale at the upper right of the view; nothing if the view is too low."""
     font = theme.font("small")
     line = paint.height_of(font)
     high = min(BAR.height(), view.height() - 2 * BAR_EDGE - 2 * line - 40)
@@ -113,6 +116,6 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
 
 
 def bar_image(scale: ColourScale) -> QImage:
-    """The 256 colours below each other, the last one on top."""
+    """Return the 256 colours as an image, the last one on top."""
     colours = scale.colours[::-1].copy()
     return QImage(colours.data, 1, 256, 3, QImage.Format.Format_RGB888).copy()

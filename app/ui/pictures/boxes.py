@@ -1,4 +1,4 @@
-"""What was recognised in a picture, how it is marked, and on which pictures it belongs."""
+"""Detections on images: their boxes, and the images that they belong to."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from app.core.session import Session
     from app.robots.description.description import Sensor
 
-# Boxes lie on pictures, whatever the theme: two bright colours with dark words.
+# Boxes are painted on images, independent of the theme: bright colours with dark text.
 BOX_COLOURS = ("#FFC53D", "#5FD4F4", "#7BE0A0", "#F79AC0")
 BOX_INK = "#1C1B19"
 
 
 @dataclass(frozen=True, slots=True)
 class DetectionBox:
-    """Something that was recognised: its words, its confidence (0 to 1 or None), its place as shares."""
+    """Detection: label, confidence (0 to 1 or None), rectangle in image fractions."""
 
     words: str
     confidence: float | None
@@ -35,7 +35,7 @@ class DetectionBox:
 
 
 def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
-    """The boxes in a detections sensor's value; whatever is none is left out."""
+    """Return the boxes in a detections value; malformed items are skipped."""
     if not isinstance(detections, Mapping):
         return ()
     width, height = _number(detections.get("width")), _number(detections.get("height"))
@@ -55,7 +55,7 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
 
 
 def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
-    """The boxes of all detections that were made in this camera's pictures; one colour for each sensor."""
+    """Return the boxes of all detections in this camera's images; one colour per sensor."""
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
     found: list[DetectionBox] = []
     detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
@@ -66,12 +66,12 @@ def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
 
 
 def camera_of(link: RobotLink) -> Sensor | None:
-    """The robot's first camera, or None."""
+    """Return the robot's first camera, or None."""
     return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
 
 
 def owner_of(session: Session, topic: str) -> RobotLink | None:
-    """The robot to which a topic's camera belongs, or None."""
+    """Return the robot that a topic's camera belongs to, or None."""
     for link in session.fleet.links:
         if any(sensor.is_image and sensor.topic == topic for sensor in link.robot.sensors):
             return link
@@ -79,7 +79,7 @@ def owner_of(session: Session, topic: str) -> RobotLink | None:
 
 
 def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
-    """A box around ``place`` (pixels of the view), with its words upright above it."""
+    """Paint a box around ``place`` (view pixels), with its label upright above it."""
     colour = QColor(BOX_COLOURS[box.kind % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -1,4 +1,4 @@
-"""A picture whose pixels can be clicked: neither a drag nor a double click is a click."""
+"""Image whose pixels can be clicked; drags and double clicks are not clicks."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ BUTTONS: dict[Qt.MouseButton, Button] = {
 
 
 class ClickablePicture(ZoomablePicture):
-    """`clicked` with a `PicturePoint` while it takes clicks, once it is sure that it is no double click.
+    """Image that emits `clicked` with a `PicturePoint`, once a double click is excluded.
 
-    The point is what was there when the button was pressed, and is told after the time that a double click
-    may take; a click elsewhere tells the one before at once. On the keyboard the arrow keys point at a pixel,
-    with Shift ten further, and Enter clicks it.
+    The point is that of the press, and is emitted after the double-click interval; a click
+    elsewhere emits the previous one immediately. On the keyboard the arrow keys move a cursor by a pixel,
+    with Shift by ten, and Enter clicks.
     """
 
     clicked = Signal(object)
@@ -43,16 +43,16 @@ class ClickablePicture(ZoomablePicture):
         self._sure.setSingleShot(True)
         self._sure.timeout.connect(self._tell)
         self.pointed: tuple[int, int] | None = None
-        """The pixel that the keys point at."""
+        """Pixel of the keyboard cursor."""
         self.marked: PicturePoint | None = None
-        """Where a mark stands."""
+        """Point of the mark."""
         self._fading = QTimer(self)
         self._fading.setSingleShot(True)
         self._fading.timeout.connect(self._unmark)
 
     @property
     def takes_clicks(self) -> bool:
-        """Whether a click is told; one before it was so, or that is not told yet when it ends, is not."""
+        """True if clicks are emitted; pending ones are discarded when it changes."""
         return self._takes_clicks
 
     @takes_clicks.setter
@@ -65,7 +65,7 @@ class ClickablePicture(ZoomablePicture):
                 announce(self, _(KEYS_WORDS))
 
     def mark(self, point: PicturePoint) -> None:
-        """Show for a moment where this is."""
+        """Show a mark at a point for a moment."""
         self.marked = point
         self._fading.start(MARK_MS)
         self.update()
@@ -75,7 +75,7 @@ class ClickablePicture(ZoomablePicture):
         self.update()
 
     def forget_click(self) -> None:
-        """Tell nothing of what was pressed so far, and point at nothing."""
+        """Discard a pending click and the keyboard cursor."""
         self._pressed = self._waiting = None
         self._sure.stop()
         self._point_nowhere()
@@ -97,10 +97,10 @@ class ClickablePicture(ZoomablePicture):
         else:
             self.unsetCursor()
 
-    # -- the mouse ----------------------------------------------------------------------------------------
+    # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._tell()  # this one is no second one of a double click
+        self._tell()  # this press is not the second of a double click
         super().mousePressEvent(event)
         point = self._point_at(event)
         alone = event.buttons() == event.button()
@@ -137,7 +137,7 @@ class ClickablePicture(ZoomablePicture):
         self.forget_click()
         super().mouseDoubleClickEvent(event)
 
-    # -- the keyboard -------------------------------------------------------------------------------------
+    # -- keyboard -----------------------------------------------------------------------------------------
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name, picture = key_name(event), self.picture
@@ -154,7 +154,7 @@ class ClickablePicture(ZoomablePicture):
             super().keyPressEvent(event)
 
     def _point(self, across: int, down: int, count: int) -> None:
-        """Point so many pixels further, as it is seen; at first in the middle of what is seen."""
+        # In displayed directions; starts at the centre of the visible part.
         if self.pointed is None:
             wanted = QRectF(self.rect()).center()
         else:
@@ -173,7 +173,7 @@ class ClickablePicture(ZoomablePicture):
         self.update()
 
     def _bring_into_sight(self) -> None:
-        """Move a picture that is enlarged, so that the pixel is not beside what is seen."""
+        # Scrolls a zoomed image so that the pixel is visible.
         if self.pointed is None or self.place.zoom is None:
             return
         at, seen = self._view_of(self.pointed), QRectF(self.rect()).adjusted(*BESIDE)
@@ -183,7 +183,7 @@ class ClickablePicture(ZoomablePicture):
             self.move_by(dx, dy)
 
     def _view_of(self, pixel: tuple[int, int]) -> QPointF:
-        """Where the middle of a pixel is in the view."""
+        # Centre of a pixel in the view.
         picture = self.picture
         if picture is None:
             return QPointF()
@@ -199,7 +199,7 @@ class ClickablePicture(ZoomablePicture):
     # -- painting -----------------------------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self.pointed is not None:  # its value is told wherever zoom, turn and size have put it
+        if self.pointed is not None:  # its value is shown wherever zoom, rotation and size have moved it
             self.mouse = self._view_of(self.pointed)
         super().paintEvent(event)
         if self.picture is None:
@@ -210,7 +210,7 @@ class ClickablePicture(ZoomablePicture):
             self._paint_cross(self._view_of(self.pointed), ring=False)
 
     def _paint_cross(self, at: QPointF, *, ring: bool = True) -> None:
-        """Dark below and light above: it is seen on every picture."""
+        # Dark below and light above, so that it is visible on every image.
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for ink, width in ((Qt.GlobalColor.black, 4.0), (Qt.GlobalColor.white, 1.6)):
@@ -224,5 +224,5 @@ class ClickablePicture(ZoomablePicture):
 
 
 def _inside(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
-    """The next pixel that the picture has: those that come can be smaller."""
+    # A later image can be smaller.
     return min(pixel[0], picture.width - 1), min(pixel[1], picture.height - 1)

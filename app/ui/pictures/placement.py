@@ -1,7 +1,7 @@
-"""Where a picture lies in its view: how far it is zoomed, moved, turned and flipped. No widgets, no pixels.
+"""Placement of an image in its view: zoom, position, rotation and mirroring. No widgets, no pixels.
 
-Places in the picture are shares of its width and height as it was received, 0 to 1 from its upper left
-corner; places in the view are logical pixels.
+Places in the image are fractions of its received width and height, 0 to 1 from its upper left corner; places
+in the view are logical pixels.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ FILL_LIMIT = 1.34
 
 @dataclass(slots=True)
 class PicturePlace:
-    """How a person looks at a picture.
+    """Placement of an image.
 
-    ``zoom`` is logical pixels for a pixel of the picture, None as large as fits; ``centre`` what is in the
-    middle of the view, as shares of the turned picture.
+    ``zoom`` is logical pixels per image pixel, None for fitting; ``centre`` is what is in the centre of the
+    view, as fractions of the rotated image.
     """
 
     zoom: float | None = None
@@ -30,14 +30,14 @@ class PicturePlace:
     flipped_across: bool = False
     flipped_down: bool = False
 
-    # -- where --------------------------------------------------------------------------------------------
+    # -- geometry -----------------------------------------------------------------------------------------
 
     def seen_size(self, picture: QSizeF) -> QSizeF:
-        """The size of the turned picture."""
+        """Return the size of the rotated image."""
         return picture.transposed() if self.turned % 180 else picture
 
     def fitting(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
-        """The zoom at which it fits; ``fill`` lets its edges be cut by a tenth."""
+        """Return the zoom that fits; ``fill`` allows cutting a tenth at the edges."""
         seen = self.seen_size(picture)
         across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
         scale = min(across, down)
@@ -46,7 +46,10 @@ class PicturePlace:
         return scale
 
     def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
-        """Where the turned picture lies; it may reach beyond the view, but leaves no needless gap."""
+        """Return the rectangle of the rotated image.
+
+        It may exceed the view, but leaves no unnecessary gap.
+        """
         scale = self.zoom if self.zoom is not None else self.fitting(view, picture, fill=fill)
         seen = self.seen_size(picture) * scale
         x, y = self.centre if self.zoom is not None else (0.5, 0.5)
@@ -55,7 +58,7 @@ class PicturePlace:
         return QRectF(left, top, seen.width(), seen.height())
 
     def orientation(self) -> QTransform:
-        """From a place in the picture to the place in the turned and flipped one, both as shares."""
+        """Return the transform from the image to the rotated and mirrored one, both as fractions."""
         made = QTransform()
         made.translate(0.5, 0.5)
         made.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
@@ -64,21 +67,24 @@ class PicturePlace:
         return made
 
     def to_view(self, area: QRectF) -> QTransform:
-        """From a place in the picture (shares) to the view."""
+        """Return the transform from the image (fractions) to the view."""
         made = QTransform()
         made.translate(area.x(), area.y())
         made.scale(area.width(), area.height())
         return self.orientation() * made
 
     def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
-        """What of the picture (shares) is at a point of the view; outside 0 to 1 beside the picture."""
+        """Return the place in the image (fractions) of a point in the view.
+
+        Outside 0 to 1 it is beside the image.
+        """
         back, _good = self.to_view(area).inverted()
         return back.map(at)
 
-    # -- what a person does -------------------------------------------------------------------------------
+    # -- commands of the user -----------------------------------------------------------------------------
 
     def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
-        """Zoom; what is at this point of the view stays there."""
+        """Zoom around a point of the view."""
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.seen_size(picture).width())
         smallest = min(SMALLEST, self.fitting(view, picture))
@@ -94,7 +100,7 @@ class PicturePlace:
         self._settle(view, picture)
 
     def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
-        """Move the picture by some pixels; one that fits stays where it is."""
+        """Move the image by some pixels; one that fits stays."""
         area = self.area(view, picture)
         if self.zoom is None:
             return
@@ -105,13 +111,13 @@ class PicturePlace:
         self._settle(view, picture)
 
     def set_zoom(self, zoom: float | None) -> None:
-        """So many pixels for one of the picture, or as large as fits."""
+        """Set the zoom in logical pixels per image pixel, or fit."""
         self.zoom = zoom if zoom is None else min(LARGEST, max(SMALLEST, zoom))
         if zoom is None:
             self.centre = (0.5, 0.5)
 
     def turn(self, degrees: int) -> None:
-        """Turn what is seen clockwise by a multiple of 90."""
+        """Rotate the display clockwise by a multiple of 90 degrees."""
         quarter = -degrees if self.flipped_across != self.flipped_down else degrees
         self.turned = (self.turned + quarter) % 360
         if degrees % 180:
@@ -121,7 +127,7 @@ class PicturePlace:
             self.centre = (1 - self.centre[0], 1 - self.centre[1])
 
     def flip(self, *, across: bool) -> None:
-        """Mirror what is seen, left and right or top and bottom."""
+        """Mirror the display horizontally or vertically."""
         x, y = self.centre
         if across:
             self.flipped_across, self.centre = not self.flipped_across, (1 - x, y)
@@ -129,17 +135,17 @@ class PicturePlace:
             self.flipped_down, self.centre = not self.flipped_down, (x, 1 - y)
 
     def _settle(self, view: QSizeF, picture: QSizeF) -> None:
-        """Forget a centre that can't be: the next step begins where the picture is seen."""
+        # Normalizes the centre, so that the next step begins where the image is displayed.
         area = self.area(view, picture)
         self.centre = (
             (view.width() / 2 - area.x()) / max(1e-9, area.width()),
             (view.height() / 2 - area.y()) / max(1e-9, area.height()),
         )
 
-    # -- kept with the layout -----------------------------------------------------------------------------
+    # -- saved with the layout ----------------------------------------------------------------------------
 
     def saved(self) -> dict[str, object]:
-        """For a layout."""
+        """Return the placement for a layout."""
         return {
             "zoom": self.zoom,
             "centre": list(self.centre),
@@ -149,7 +155,7 @@ class PicturePlace:
         }
 
     def restore(self, saved: object) -> None:
-        """Take over what `saved` gave; whatever does not fit is left out."""
+        """Restore the result of `saved`; invalid parts are ignored."""
         if not isinstance(saved, Mapping):
             return
         zoom, centre, turned = saved.get("zoom"), saved.get("centre"), saved.get("turned")
@@ -167,7 +173,7 @@ class PicturePlace:
 
 
 def _placed(room: float, length: float, centre: float) -> float:
-    """Where something of this length begins so that ``centre`` of it is in the middle, and no gap is left."""
+    # Offset of `length` so that `centre` of it is in the middle, without a gap.
     if length <= room:
         return (room - length) / 2
     return min(0.0, max(room - length, room / 2 - centre * length))

@@ -1,4 +1,4 @@
-"""Pictures of a stream: fitting or zoomed, turned, with boxes, and the value under the mouse."""
+"""Image view of a stream: fitting or zoomed, rotated, with boxes, and the value under the mouse."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 SILENT_AFTER_S = 2.0
 LABEL_EDGE = 8
-SHARP_FROM = 2.0  # so many pixels of the screen for one of the picture: then it has edges
-FIGURES_STAY_S = 1.0  # nobody reads a rate or an age that is another one with every picture
+SHARP_FROM = 2.0  # screen pixels per image pixel from which pixels are drawn with sharp edges
+FIGURES_STAY_S = 1.0  # a rate or age that changes with every image is unreadable
 OLDEST_S = 3600.0
 COARSE = QSize(16, 12)
 DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
@@ -36,7 +36,7 @@ ICON = 28.0
 
 
 def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
-    """``shown 30 of 60/s``; empty while neither is known."""
+    """Format rates: ``shown 30 of 60/s``; "" while both are unknown."""
     if arriving_hz is None:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
@@ -44,31 +44,29 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
 
 
 class RateWords:
-    """The rates of a stream in words, at most once a second in others.
+    """Formatted rates of a stream, changing at most once a second.
 
-    What jumps between two numbers with every picture can't be read, and the longer of the two moves what
-    stands beside it.
+    Values that alternate with every image are unreadable, and different lengths move adjacent text.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock`` tells seconds."""
         self._clock = clock
         self._words, self._since = "", 0.0
 
     def of(self, stream: ImageStream) -> str:
-        """What to say now."""
+        """Return the current text."""
         words, now = rate_sentence(stream.shown_hz, stream.arriving_hz), self._clock()
         if words != self._words and (not self._words or not words or now - self._since >= FIGURES_STAY_S):
             self._words, self._since = words, now
         return self._words
 
     def clear(self) -> None:
-        """Another stream is shown."""
+        """Clear the text for another stream."""
         self._words = ""
 
 
 def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
-    """``(16, 8)  196 198 190  #C4C6BE``; of grey and depth the number."""
+    """Format a pixel: ``(16, 8)  196 198 190  #C4C6BE``; with one channel its number."""
     if pixel is None:
         return f"({x}, {y})"
     if isinstance(pixel, int | float):
@@ -78,7 +76,7 @@ def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
 
 
 class PictureView(QWidget):
-    """The newest picture of a stream; `take` is called at each refresh and paints only what is new."""
+    """Shows the newest image of a stream; `take` is called at each refresh and repaints only changes."""
 
     def __init__(
         self,
@@ -88,11 +86,8 @@ class PictureView(QWidget):
         labelled: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``fill`` lets the picture fill the view where its edges may be cut by a tenth; no black is by it.
-
-        Without a label (``labelled``) a person reads in its middle that no new picture comes. ``clock`` tells
-        seconds.
-        """
+        # `fill`: the image fills the view if at most a tenth is cut off; no black borders. Without `labelled`
+        # a missing stream is announced in the centre.
         super().__init__()
         self._clock = clock
         self._theme = theme
@@ -100,23 +95,23 @@ class PictureView(QWidget):
         self.place = PicturePlace()
         self._picture: Picture | None = None
         self._image: QImage | None = None
-        self._grey: QImage | None = None  # of the last picture, when no new one comes
+        self._grey: QImage | None = None  # grey version of the last image, when the stream is silent
         self._boxes: tuple[DetectionBox, ...] = ()
         self._drawn: tuple[Drawn, ...] = ()
         self._rate = self._state = self._age = ""
         self._rates = RateWords(clock)
-        self._silent = False  # the last picture is shown, and no new one comes
-        self.mouse: QPointF | None = None  # where a person points, when it matters
-        self._aged_s = -FIGURES_STAY_S  # when its age was told
+        self._silent = False  # the last image is shown, and no new one arrives
+        self.mouse: QPointF | None = None  # mouse position while it is relevant
+        self._aged_s = -FIGURES_STAY_S  # when the age was updated
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(80, 60)
 
-    # -- what it shows ------------------------------------------------------------------------------------
+    # -- content ------------------------------------------------------------------------------------------
 
     @property
     def words(self) -> str:
-        """The label at the lower left."""
+        """Label at the lower left."""
         picture = self._picture
         if picture is None:
             return ""
@@ -128,21 +123,21 @@ class PictureView(QWidget):
 
     @property
     def boxes(self) -> tuple[DetectionBox, ...]:
-        """What is marked now."""
+        """Current detection boxes."""
         return self._boxes
 
     @property
     def drawn(self) -> tuple[Drawn, ...]:
-        """What messages draw on it now."""
+        """Current annotations."""
         return self._drawn
 
     @property
     def picture(self) -> Picture | None:
-        """What is shown."""
+        """Current image."""
         return self._picture
 
     def clear(self) -> None:
-        """Show nothing."""
+        """Clear the view."""
         self._picture = self._image = self._grey = None
         self._boxes, self._drawn = (), ()
         self._rate = self._state = self._age = ""
@@ -156,7 +151,7 @@ class PictureView(QWidget):
         boxes: tuple[DetectionBox, ...] = (),
         drawn: Callable[[int, int], tuple[Drawn, ...]] | None = None,
     ) -> None:
-        """Show what the stream has now; ``drawn`` is asked what lies on a picture of so many pixels."""
+        """Show the stream's current image; ``drawn`` returns the annotations for an image of a given size."""
         words, before = self.words, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.of(stream)
@@ -172,9 +167,9 @@ class PictureView(QWidget):
             self._state = ""
         if picture is not self._picture and picture is not None:
             self._picture = picture
-            if shown is None or picture.bgra is not shown.bgra:  # else a camera that sees the same still
+            if shown is None or picture.bgra is not shown.bgra:  # unless a camera repeats the same image
                 rows, columns = picture.bgra.shape[:2]
-                # QImage does not copy the bytes: self._picture keeps them.
+                # QImage does not copy the bytes: self._picture keeps them alive.
                 self._grey = None
                 self._image = QImage(
                     picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32
@@ -183,7 +178,7 @@ class PictureView(QWidget):
             if not stream.held:
                 stream.shown()
         if not stream.held or picture is not shown:
-            self._boxes = boxes  # those on a frozen picture are frozen, too
+            self._boxes = boxes  # boxes on a frozen image are frozen too
             shown = self._picture
             self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
         stream.want(self._wish())
@@ -200,7 +195,7 @@ class PictureView(QWidget):
                 self.update(0, top, self.width(), self.height() - top)
 
     def _wish(self) -> tuple[int, int] | None:
-        """How many pixels the picture has on the screen; None when each of its own is wanted."""
+        # Size of the image in screen pixels; None when each image pixel is needed.
         if self.mouse is not None:
             return None
         ratio = self.devicePixelRatioF()
@@ -213,23 +208,23 @@ class PictureView(QWidget):
         return QSize(320, 240)
 
     def picture_size(self) -> QSizeF:
-        """The whole picture's size in its own pixels."""
+        """Return the image size in its own pixels."""
         picture = self._picture
         return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
 
     def area(self) -> QRectF:
-        """Where the turned picture is painted; it may reach beyond the view."""
+        """Return the rectangle of the rotated image; it may exceed the view."""
         if self._picture is None:
             return QRectF(self.rect())
         return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
 
     def scale(self) -> float:
-        """Pixels of the screen for one of the picture."""
+        """Return screen pixels per image pixel."""
         seen = self.place.seen_size(self.picture_size()).width()
         return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Which pixel of the picture, as it was received, is at a point of the view; None beside it."""
+        """Return the image pixel at a point of the view; None beside the image."""
         picture = self._picture
         if picture is None:
             return None
@@ -285,7 +280,7 @@ class PictureView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
         place = self.place
         if not place.turned and not place.flipped_across and not place.flipped_down:
-            painter.drawImage(area, image)  # Qt's fast way
+            painter.drawImage(area, image)  # Qt's fast path
             return
         painter.save()
         painter.setTransform(place.to_view(area), True)
@@ -311,7 +306,7 @@ class PictureView(QWidget):
 
 
 def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
-    """Fill the view with the picture's own colours, blurred and dark: beside it there is no black."""
+    """Fill the view with the image's colours, blurred and darkened, instead of black borders."""
     ignore, smooth = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
@@ -321,12 +316,12 @@ def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
 
 
 def grey(image: QImage) -> QImage:
-    """The same picture without colours."""
+    """Return the image without colours."""
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
 def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
-    """Over a grey picture: a camera, and how old the picture is."""
+    """Paint a camera icon and the image's age over a grey image."""
     painter.fillRect(view, SILENT)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)
@@ -343,5 +338,5 @@ def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> N
 
 
 def _age_words(age_s: float | None) -> str:
-    """How long ago a picture was taken; blank when nobody tells, or a clock is wrong."""
+    # "" without a time stamp, or with a wrong clock.
     return age_words(age_s) if age_s is not None and 0 <= age_s < OLDEST_S else ""

@@ -1,4 +1,4 @@
-"""A picture that can be zoomed, moved and asked for its values, with mouse, touch pad and keyboard."""
+"""Image with zoom, movement and pixel values, by mouse, touch pad and keyboard."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ WAYS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 
 
 class ZoomablePicture(PictureView):
-    """Wheel, pinch and double click zoom where the mouse is, dragging and the arrow keys move the picture.
+    """Wheel, pinch and double click zoom at the mouse; dragging and the arrow keys move the image.
 
-    `place_changed` when a person did so; `key_pressed` with the name of each of ``keys`` ("Ctrl+C"), which
-    go before the window's shortcuts while the picture has the keyboard.
+    Emits `place_changed` after user input, and `key_pressed` with the name of a key in ``keys`` ("Ctrl+C"),
+    which take precedence over the window's shortcuts while the image has the focus.
     """
 
     place_changed = Signal()
@@ -33,27 +33,27 @@ class ZoomablePicture(PictureView):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
-        """Zoom; what is under ``at`` (default: the middle) stays there."""
+        """Zoom around ``at`` (default: the centre)."""
         middle = QPointF(self.width() / 2, self.height() / 2)
         self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
         self.told()
 
     def show_whole(self) -> None:
-        """As large as fits."""
+        """Fit the image into the view."""
         self.place.set_zoom(None)
         self.told()
 
     def show_exact(self, at: QPointF | None = None) -> None:
-        """One pixel of the screen for each of the picture."""
+        """Show one screen pixel per image pixel."""
         self.zoom_by(1 / max(1e-9, self.scale()), at)
 
     def move_by(self, dx: float, dy: float) -> None:
-        """Move the picture."""
+        """Move the image."""
         self.place.move(dx, dy, QSizeF(self.size()), self.picture_size())
         self.told()
 
     def told(self) -> None:
-        """A person changed the place: paint, and tell."""
+        """Repaint and emit `place_changed`."""
         self.update()
         self.place_changed.emit()
 
@@ -70,7 +70,7 @@ class ZoomablePicture(PictureView):
                 self.zoom_by(1.0 + event.value(), event.position())
                 return True
         elif _is_key(event) and key_name(event) in self.keys:
-            event.accept()  # ours goes before the window's
+            event.accept()  # takes precedence over the window's shortcut
             return True
         return super().event(event)
 
@@ -123,7 +123,7 @@ def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
 
 
 def key_name(event: QKeyEvent) -> str:
-    """A key with what is held, as a shortcut is written: Ctrl+C, R, +."""
+    """Return a key with modifiers as a shortcut: Ctrl+C, R, +."""
     held = event.modifiers()
     text = event.text()
     if text and text in "+-":  # on some keyboards they need Shift, or are on the number pad
