@@ -1,4 +1,4 @@
-"""A virtual robot in its room, painted from its state.
+"""Drawing of a virtual robot in its room from its state.
 
-`scene` puts together the room, its objects and the robot: `pepper` or `turtle`.
+`scene` composes the room, its objects and the robot: `pepper` or `turtle`.
 """

@@ -1,4 +1,4 @@
-"""The speech bubble of a robot: all of its words, wrapped; long ones scroll along with the speech."""
+"""Speech bubble of a robot: the whole text, wrapped; long text scrolls with the speech."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SHORT_LINES, MOST_LINES, MOST_NARROW = 4, 6, 8
 LARGE, SMALL = 14, 12
 INSIDE, EDGE = 14.0, 8.0
 READ_AHEAD = 2
-"""So many lines before the one that is spoken stay in view."""
+"""Number of lines before the spoken one that stay visible."""
 
 
 @dataclass(frozen=True, slots=True)
 class BubbleText:
-    """Words in lines; ``first`` is the line at the top, ``shown`` are so many."""
+    """Wrapped text; ``first`` is the top line, ``shown`` the number of visible lines."""
 
     lines: Sequence[str]
     first: int
@@ -29,12 +29,12 @@ class BubbleText:
 
     @property
     def visible(self) -> Sequence[str]:
-        """The lines that are seen now."""
+        """Visible lines."""
         return self.lines[self.first : self.first + self.shown]
 
 
 def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
-    """All of the words in lines of this width; a word that is longer goes on in the next line."""
+    """Wrap a text to a width; a longer word continues in the next line."""
     lines = [""]
     for word in words.split():
         tried = f"{lines[-1]} {word}".strip()
@@ -59,7 +59,7 @@ def _pieces(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
 
 
 def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
-    """As many lines as fit, moved on so that the word that is spoken can be read (``spoken`` from 0 to 1)."""
+    """Return as many lines as fit, scrolled so that the spoken word is visible (``spoken`` from 0 to 1)."""
     shown = max(1, min(most, len(lines)))
     letters = sum(len(line) for line in lines)
     said, line = spoken * letters, 0
@@ -78,10 +78,9 @@ def paint_bubble(
     font: QFont,
     taken: Sequence[QRectF] = (),
 ) -> QRectF:
-    """Paint what a robot says beside its ``head``, inside ``bounds``; ``p`` is in units of the stage.
+    """Paint a robot's speech beside its ``head`` within ``bounds``; ``p`` is in stage units.
 
-    ``taken`` are the bubbles of others, over which it goes only where there is no other place; its own is
-    returned.
+    ``taken`` are other bubbles, which are covered only without another place. Return the bubble's rectangle.
     """
     near, words = 31.0 * head.scale, state.caption
     room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
@@ -92,7 +91,7 @@ def paint_bubble(
     lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
     if len(lines) > SHORT_LINES:
         face.setPixelSize(SMALL)
-        beside = max(room_right, room_left)  # narrower and higher rather than over the face
+        beside = max(room_right, room_left)  # narrower and higher, rather than over the face
         width = min(max(LEAST_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
         lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
     metrics = QFontMetricsF(face)
@@ -124,8 +123,7 @@ def paint_bubble(
 def _free_place(
     places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
 ) -> tuple[float, QRectF]:
-    """The first place that covers no other bubble, else below the others; else that which covers least."""
-
+    # The first place without overlap, else below other bubbles; else the one with the smallest overlap.
     def covered(place: tuple[float, QRectF]) -> float:
         common = [place[1].intersected(other) for other in taken]
         return sum(each.width() * each.height() for each in common)
@@ -137,7 +135,7 @@ def _free_place(
 
 
 def paint_heard(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
-    """Paint what is heard though its bubble has gone, in one line at the foot of ``area`` (pixels)."""
+    """Paint speech that is audible after its bubble closed, in a line at the bottom of ``area`` (pixels)."""
     metrics = QFontMetricsF(font)
     most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
     line = metrics.elidedText(words, Qt.TextElideMode.ElideRight, most)
@@ -165,7 +163,7 @@ def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:
 
 
 def _paint_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
-    """How far the words have scrolled."""
+    # Scroll position.
     track = QRectF(box.right() - 7, box.top() + 10, 3, box.height() - 20)
     count = len(text.lines)
     thumb = QRectF(

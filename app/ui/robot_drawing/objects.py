@@ -1,6 +1,6 @@
-"""What stands and lies in the virtual robot's room: ball, table, shelf, cards, and places of people.
+"""Objects in the virtual robot's room: ball, table, shelf, cards, and positions of people.
 
-All lengths are in units of the stage (`app.ui.robot_drawing.room`).
+All lengths are in stage units (`app.ui.robot_drawing.room`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TABLE = Spot(315.0, 239.0, (239.0 - HORIZON) / START)
 
 
 def _table(p: QPainter, spot: Spot) -> None:
-    """A table with a plant on it, drawn where the design has it and moved from there."""
+    # Painted at the position of the design and translated from there.
     p.save()
     p.translate(spot.u, spot.v)
     p.scale(spot.scale / TABLE.scale, spot.scale / TABLE.scale)
@@ -45,7 +45,7 @@ def _table(p: QPainter, spot: Spot) -> None:
 
 
 def _shelf(p: QPainter, area: QRectF) -> None:
-    """Two boards with books, lower than it is, so that the window stays in view."""
+    # Lower than a real one, so that the window stays visible.
     p.fillRect(area, QColor("#8B6644"))
     edge = area.width() * 0.07
     inside = area.adjusted(edge, edge, -edge, -edge * 0.6)
@@ -62,7 +62,7 @@ def _shelf(p: QPainter, area: QRectF) -> None:
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
-    """Where a thing is seen, in stage units."""
+    """Return the rectangle of a thing, in stage units."""
     if thing.kind == "place":
         return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
     if thing.kind == "shelf":
@@ -79,7 +79,7 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
 
 
 def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
-    """A ball, a table, a place with its name, or a card on a stand (a face, a marker, a shelf)."""
+    """Paint a ball, a table, a named position, or a card on a stand (a face, a marker, a shelf)."""
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":
@@ -122,7 +122,7 @@ def _ball(p: QPainter, area: QRectF, colour: QColor) -> None:
 
 
 def _place(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
-    """Somebody who stands between the robot and the person at the screen: only a mark on the floor."""
+    # A person between the robot and the viewer: only a mark on the floor.
     p.setPen(QPen(QColor(63, 124, 179, 210), 1.4))
     p.setBrush(QColor(63, 124, 179, 70))
     p.drawEllipse(area)

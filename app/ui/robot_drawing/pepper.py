@@ -1,8 +1,8 @@
-"""The virtual robot's figure, seen from the direction in which it stands, by `QPainter`.
+"""Figure of the virtual Pepper at any heading, painted by `QPainter`.
 
-Everything sits on the body by its azimuth: what the robot has at its left is at ``sin(azimuth + heading)`` of
-the radius, narrower by the cosine, and hidden behind. So it turns smoothly and needs no view by view drawing.
-Units are those of the stage; (0, 0) is the middle of its foot, y grows downwards, it is 187 high.
+Each part is on the body at an azimuth: its horizontal position is ``sin(azimuth + heading)`` of the radius,
+its width is scaled by the cosine, and parts behind are hidden. So it turns smoothly without separate views.
+Units are stage units; (0, 0) is the centre of its foot, y is down, its height is 187.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from app.ui.robot_drawing.state import RobotState
 HEAD = QPointF(0.0, -152.2)
 SHOULDER_X, SHOULDER_Y = 26.2, -102.5
 ARM, ARM_WIDTH, HAND = 46.5, 14.4, 7.7
-REST_DEG, UP_DEG = 20.0, 160.0  # the limits stay beside the body and the head
+REST_DEG, UP_DEG = 20.0, 160.0  # limits that keep the arms beside body and head
 ARM_PLANE = math.radians(25.0)
 WHITE, LIMB, LIMB_EDGE, HAND_WHITE = "#FFFFFF", "#E2E7F0", "#CFD6E3", "#F3F5FA"
 JOINT, NECK, BAND = "#D3DAE7", "#C5CAD7", "#C8CCD8"
@@ -29,7 +29,7 @@ DARK = "#15181F"
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """One arm as it is seen: shoulder and hand, and how far its shoulder is in front (-1 to 1)."""
+    """Arm as displayed: shoulder, hand, and how far the shoulder is in front (-1 to 1)."""
 
     side: str
     shoulder: QPointF
@@ -39,7 +39,7 @@ class Limb:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A face: how wide the eyes open, brows (0 none, 1 raised inside, -1 lowered inside), mouth."""
+    """Facial expression: eye opening, brows (0 none, 1 inner ends up, -1 inner ends down), mouth."""
 
     lid: float = 0.0
     brow: float = 0.0
@@ -70,7 +70,7 @@ EMOTIONS = tuple(_EXPRESSIONS)
 
 
 def limbs(state: RobotState) -> tuple[Limb, Limb]:
-    """Left and right arm."""
+    """Return the left and the right arm."""
     heading = math.radians(state.theta_deg)
     return (
         _limb("left", 1, state.arm_left_deg, heading),
@@ -88,7 +88,7 @@ def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
 
 
 def paint_figure(p: QPainter, state: RobotState) -> None:
-    """Draw the robot; the painter's origin is the middle of its foot."""
+    """Paint the robot; the painter's origin is the centre of its foot."""
     heading = math.radians(state.theta_deg)
     arms = limbs(state)
     p.setPen(Qt.PenStyle.NoPen)
@@ -195,7 +195,7 @@ def _arm(p: QPainter, arm: Limb, state: RobotState) -> None:
     if arm.front > -0.5:
         p.setBrush(QColor(JOINT))
         p.drawEllipse(arm.shoulder, 8.4, 8.4)
-        # From the front the light sits where the shoulder looks at the person, so it never hides.
+        # From the front the light is where the shoulder faces the viewer, so that it is never hidden.
         p.setBrush(QColor(state.shoulders))
         p.drawEllipse(arm.shoulder, 4.0, 4.0)
     if f"{arm.side}_hand" in state.touched:
@@ -242,7 +242,7 @@ def _ear(p: QPainter, azimuth: float) -> None:
 
 
 def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> None:
-    """Draw the face around the middle of the head; ``heading`` in rad, ``nod`` moves it up or down."""
+    """Paint the face around the centre of the head; ``heading`` in rad, ``nod`` shifts it vertically."""
     look = _EXPRESSIONS.get(state.emotion, _EXPRESSIONS["neutral"])
     dot = QPointF(HEAD_RX * 0.5 * math.sin(heading), -20.8 + nod)
     if math.cos(heading) > 0.0:
@@ -280,7 +280,7 @@ def _eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
         p.fillPath(lid.intersected(eye), QColor("#DCE2EC"))
     if look.brow:
         p.setPen(QPen(QColor("#4E5566"), 2.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-        # The inner end (towards the nose) goes up for a positive brow.
+        # The inner end (towards the nose) is up for a positive brow.
         tilt = 3.0 * look.brow * sign
         p.drawLine(QLineF(-7, -13.4 - tilt, 7, -13.4 + tilt))
         p.setPen(Qt.PenStyle.NoPen)

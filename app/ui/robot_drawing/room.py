@@ -1,7 +1,7 @@
-"""The virtual robot's room: the stage that turns metres into pixels, the wall, the floor, what stands there.
+"""Room of the virtual robot: the projection from metres to pixels, wall, floor and objects.
 
-The colours are those of an illustration and belong to the drawing, not to the theme; a dark theme dims it.
-All lengths are in units of a stage of 382 x 286, the panel of the design at 1440 x 900.
+The colours belong to the illustration, not to the theme; a dark theme dims it. All lengths are in units of a
+stage of 382 x 286, the panel of the design at 1440 x 900.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from app.ui.robot_drawing.state import RoomBounds
 
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
-BACK, FRONT = 178.0, 280.0  # where things stand at the far wall and nearest to the person
-START = 250.6 - HORIZON  # where the robot of the design stands: scale 1
+BACK, FRONT = 178.0, 280.0  # position of things at the far wall and nearest to the viewer
+START = 250.6 - HORIZON  # position of the robot in the design: scale 1
 
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A place on the floor in stage units, and how large things are there."""
+    """Position on the floor in stage units, and the scale of things there."""
 
     u: float
     v: float
@@ -30,7 +30,7 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """How a room fills a rectangle: uniform scale, centred; wall and floor go on to the edges."""
+    """Fits a room into a rectangle: uniform scale, centred; wall and floor extend to the edges."""
 
     area: QRectF
     room: RoomBounds
@@ -42,25 +42,25 @@ class Stage:
 
     @property
     def origin(self) -> QPointF:
-        """The stage's upper left corner in pixels."""
+        """Upper left corner of the stage in pixels."""
         return QPointF(
             self.area.center().x() - WIDTH / 2 * self.scale, self.area.center().y() - HEIGHT / 2 * self.scale
         )
 
     def bounds(self) -> QRectF:
-        """The whole area in stage units; it may begin above and left of 0."""
+        """Return the whole area in stage units; it may start above and left of 0."""
         s, o = self.scale, self.origin
         a = self.area
         return QRectF((a.x() - o.x()) / s, (a.y() - o.y()) / s, a.width() / s, a.height() / s)
 
     def unit(self, point: QPointF) -> QPointF:
-        """A pixel in stage units."""
+        """Convert a pixel to stage units."""
         return (point - self.origin) / self.scale
 
     def spot(self, x: float, y: float) -> Spot:
-        """Where the floor point (m) is seen; points outside the room are drawn at its edge.
+        """Return the position of a floor point (m), limited to the room.
 
-        No camera sees like this: what is far is drawn nearer than it would be, so the robot stays large.
+        Not a real perspective: distant things are drawn closer, so that the robot stays large.
         """
         room = self.room
         depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
@@ -70,7 +70,7 @@ class Stage:
         return Spot(WIDTH / 2 + side * _reach(scale), v, scale)
 
     def floor(self, point: QPointF) -> tuple[float, float]:
-        """The floor point (m) seen at a pixel; always inside the room."""
+        """Return the floor point (m) at a pixel, limited to the room."""
         unit = self.unit(point)
         room = self.room
         share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
@@ -83,7 +83,7 @@ class Stage:
 
 
 def _reach(scale: float) -> float:
-    """How far from the middle the side walls are, in units, where things have this scale."""
+    # Distance of the side walls from the centre, at this scale.
     return 70.0 + 96.0 * scale
 
 
@@ -92,7 +92,7 @@ def _clamp(value: float, low: float, high: float) -> float:
 
 
 def paint_room(p: QPainter, bounds: QRectF) -> None:
-    """Wall, window, floor; ``p`` is in stage units and ``bounds`` is all that is to be filled."""
+    """Paint wall, window and floor; ``p`` is in stage units, ``bounds`` is the area to fill."""
     wall = QLinearGradient(0, bounds.top(), 0, WALL_FOOT)
     wall.setColorAt(0, QColor("#E8E4DA"))
     wall.setColorAt(1, QColor("#DCD4C8"))

@@ -1,4 +1,4 @@
-"""A picture of a virtual robot in its room, drawn from its state; where its parts are, to touch them."""
+"""Drawing of virtual robots in their room, and hit testing of their parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.ui.robot_drawing.turtle import TOP, paint_turtle, side_at
 TURTLE = "turtle"
 Others: TypeAlias = Sequence[tuple[str, RobotState]]
 
-# What a preview shows while no robot has told its state.
+# Preview before any robot has reported its state.
 PREVIEW = RobotState(
     x=0.05,
     arm_left_deg=124.0,
@@ -29,7 +29,7 @@ PREVIEW = RobotState(
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What is under the mouse, and what the keyboard has chosen; both as `RobotDrawing.part_at` says."""
+    """Parts under the mouse and selected by the keyboard, as returned by `RobotDrawing.part_at`."""
 
     hovered: str | None = None
     chosen: str | None = None
@@ -40,13 +40,13 @@ NO_MARKS = Marks()
 
 
 class RobotDrawing:
-    """Paints `RobotState`s; keeps the room's picture of the last size, so a moment costs little.
+    """Paints `RobotState`s; caches the room's pixmap of the last size, so that frames are cheap.
 
-    The first robot is what the picture is about; ``others`` are in the same room, each with its name.
+    The first robot is the main one; ``others`` are in the same room, each with its name.
     """
 
     def __init__(self, font: QFont | None = None) -> None:
-        """``font`` is the speech bubble's."""
+        # `font` is that of the speech bubble.
         self._font = QFont(font) if font is not None else QFont()
         self._room: QPixmap | None = None
         self._room_key: tuple[float, float, float, bool] | None = None
@@ -61,7 +61,7 @@ class RobotDrawing:
         marks: Marks = NO_MARKS,
         dark: bool = False,
     ) -> None:
-        """Fill ``area`` with the robots of this moment."""
+        """Paint the robots into ``area``."""
         stage = Stage(area, state.room)
         painter.save()
         painter.setClipRect(area)
@@ -91,9 +91,11 @@ class RobotDrawing:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
     def part_at(self, point: QPointF, area: QRectF, state: RobotState, others: Others = ()) -> str | None:
-        """What is at a pixel: ``head``, ``left_hand``, ``body``, an object's name, ``Turtle/body``, or None.
+        """Return the part at a pixel.
 
-        What can be touched goes before things, and things before what stands behind them.
+        ``head``, ``left_hand``, ``body``, an object's name, ``Turtle/body``, or None.
+
+        Touchable parts precede things, and things precede others behind them.
         """
         stage = Stage(area, state.room)
         unit = stage.unit(point)
@@ -110,9 +112,9 @@ class RobotDrawing:
     def side_at(
         self, point: QPointF, area: QRectF, part: str, state: RobotState, others: Others = ()
     ) -> str | None:
-        """The side on which a hand at a pixel presses the bumper of the robot whose body `part` is.
+        """Return the bumper side pressed at a pixel, of the robot whose body is ``part``.
 
-        None when it has none that can be pressed.
+        None for a robot without a bumper.
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
@@ -121,17 +123,17 @@ class RobotDrawing:
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
-        """The place of the floor (m) that is seen at a pixel."""
+        """Return the floor point (m) at a pixel."""
         return Stage(area, state.room).floor(point)
 
     def pixel_of(self, x: float, y: float, area: QRectF, state: RobotState) -> QPointF:
-        """The pixel at which a place of the floor (m) is seen."""
+        """Return the pixel of a floor point (m)."""
         stage = Stage(area, state.room)
         spot = stage.spot(x, y)
         return stage.origin + QPointF(spot.u, spot.v) * stage.scale
 
     def place_of(self, part: str, area: QRectF, state: RobotState, others: Others = ()) -> QPointF | None:
-        """The pixel in the middle of a part, as `part_at` names it; None when there is none."""
+        """Return the pixel at the centre of a part (see `part_at`), or None."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE
@@ -147,7 +149,7 @@ class RobotDrawing:
         return None
 
     def _mark(self, p: QPainter, stage: Stage, state: RobotState, others: Others, marks: Marks) -> None:
-        """Draw a line around what the mouse is on, and a stronger one around what the keyboard chose."""
+        # A line around the hovered part, a stronger one around the selected part.
         areas = {figure.named("body"): figure.area for figure in _figures(stage, state, others)}
         for spot, thing in _placed(stage, state):
             areas[thing.name or thing.kind] = thing_area(thing, spot)
@@ -167,7 +169,7 @@ class RobotDrawing:
             size = QSize(max(1, round(area.width() * ratio)), max(1, round(area.height() * ratio)))
             self._room = QPixmap(size)
             self._room.setDevicePixelRatio(ratio)
-            self._room.fill(QColor("#C4AA87"))  # edges between pixels are mixed with what is below
+            self._room.fill(QColor("#C4AA87"))  # the colour below antialiased edges
             room = QPainter(self._room)
             room.setRenderHint(QPainter.RenderHint.Antialiasing)
             room.translate(stage.origin - area.topLeft())
@@ -179,37 +181,37 @@ class RobotDrawing:
 
 
 def _placed(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
-    """All objects with their places, what is far first; people before the robot as marks on the floor."""
+    # Farthest first; people in front of the robot as marks on the floor.
     placed = []
     for thing in state.objects:
         before = thing.kind in {"person", "face"} and thing.x > state.x
         shown = replace(thing, kind="place") if before else thing
         spot = stage.spot(thing.x, thing.y)
         half = thing_area(shown, spot).width() / 2
-        inside = min(max(spot.u, half + 4), WIDTH - half - 4)  # what stands at a side wall is seen whole
+        inside = min(max(spot.u, half + 4), WIDTH - half - 4)  # things at a side wall are entirely visible
         placed.append((replace(spot, u=inside), shown))
     return sorted(placed, key=lambda pair: pair[0].v)
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A robot where it stands; ``name`` is empty for the one that the picture is about."""
+    """Robot with its position; ``name`` is empty for the main one."""
 
     name: str
     state: RobotState
     spot: Spot
 
     def named(self, part: str) -> str:
-        """A part of this robot, as `RobotDrawing.part_at` names it."""
+        """Return the name of a part as in `RobotDrawing.part_at`."""
         return f"{self.name}/{part}" if self.name else part
 
     def own(self, unit: QPointF) -> QPointF:
-        """A point of the stage in the figure's own units."""
+        """Convert a stage point to the figure's own units."""
         return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
 
     @property
     def area(self) -> QRectF:
-        """What it covers, in units of the stage."""
+        """Bounding rectangle in stage units."""
         large = QRectF(-42, -187, 84, 195) if self.state.figure != TURTLE else QRectF(-42, -62, 84, 78)
         scale = self.spot.scale
         return QRectF(
@@ -248,7 +250,7 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
 
 
 def _part_at(own: QPointF, state: RobotState) -> str | None:
-    """The part of the large figure at a point of its own; the small one has none to touch."""
+    # Only the large figure has touchable parts.
     if state.figure == TURTLE:
         return None
     for limb in limbs(state):

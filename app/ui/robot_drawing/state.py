@@ -1,4 +1,4 @@
-"""What the virtual robot tells about itself, parsed once from its ``state`` topic for the drawing."""
+"""State of a virtual robot, parsed from its ``state`` topic for the drawing."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_HEARD = 200  # letters
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """Something that stands or lies in the room: ``kind`` ball, face, marker, ..., its place in m."""
+    """Thing in the room: ``kind`` (ball, face, marker, ...) and position in m."""
 
     kind: str
     x: float
@@ -28,7 +28,7 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class RoomBounds:
-    """The floor in m; the person looks from ``x_max`` towards ``x_min``, and has ``y_max`` at the right."""
+    """Floor in m; the viewer looks from ``x_max`` to ``x_min``, with ``y_max`` at the right."""
 
     x_min: float = -3.0
     x_max: float = 3.0
@@ -38,14 +38,13 @@ class RoomBounds:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """One drawable moment of a robot.
+    """State of a robot for drawing.
 
-    ``x``, ``y`` in m, ``theta_deg`` 0 looks along x, at the person, and grows to the robot's left. Head yaw
-    grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 stretched out, 180 straight up.
-    ``figure`` is how it looks, ``pepper`` or ``turtle``; ``bumped`` is the side that touches something,
-    ``spoken`` how much of its words it has said (0 to 1), ``sound`` what it plays ("bell", "440 Hz"),
-    ``heard`` what a person said to it a moment ago.
-    ``held`` says that a person holds it up, ``shared`` that its room is the one that all robots share.
+    ``x``, ``y`` in m; ``theta_deg`` 0 faces along x, towards the viewer, and grows to the robot's left. Head
+    yaw grows to the robot's left, pitch grows downwards. Arms are 0 hanging, 90 horizontal, 180 straight up.
+    ``figure`` is ``pepper`` or ``turtle``; ``bumped`` is the touching side, ``spoken`` the spoken fraction of
+    its text (0 to 1), ``sound`` what it plays ("bell", "440 Hz"), ``heard`` what the user recently said to
+    it. ``held`` is whether the user holds it up, ``shared`` whether its room is shared by all robots.
     """
 
     x: float = 0.0
@@ -73,13 +72,13 @@ class RobotState:
 
     @property
     def caption(self) -> str:
-        """What it says or plays, as its bubble has it: "♪ bell"."""
+        """Text of its bubble, for speech and sounds: "♪ bell"."""
         played = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
         return " ".join(each for each in (self.speech or "", played) if each)
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
-        """The state in a message; whatever is missing or of a wrong type keeps its default."""
+        """Parse a message; missing and malformed values keep their defaults."""
         speech = data.get("speech")
         return cls(
             x=_number(data.get("x")),

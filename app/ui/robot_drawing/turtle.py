@@ -1,7 +1,7 @@
-"""The small robot on two wheels, seen a little from above from the direction in which it stands.
+"""Figure of the small wheeled robot at any heading, seen slightly from above.
 
-Everything sits on its round body by its azimuth, as on the large figure (`app.ui.robot_drawing.pepper`): 0
-is towards the person, its left at +90°. Units are those of the stage; (0, 0) is its middle on the floor.
+Each part is on its round body at an azimuth, as on the large figure (`app.ui.robot_drawing.pepper`): 0 faces
+the viewer, its left is +90°. Units are stage units; (0, 0) is its centre on the floor.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPat
 
 from app.ui.robot_drawing.state import RobotState
 
-RADIUS, FLAT = 37.0, 0.36  # of the body, and how flat a circle on the floor is seen
+RADIUS, FLAT = 37.0, 0.36  # of the body, and the flattening of a circle on the floor
 LOW, HIGH = -9.0, -31.0  # its lower and upper deck
-MAST = -52.0  # the top of the camera's mast
+MAST = -52.0  # top of the camera's mast
 WHEEL = 14.0
 TOP = QPointF(0.0, -36.0)
-ABOVE = 0.6  # the share of its radius in which a hand comes from above
+ABOVE = 0.6  # fraction of its radius that is touched from above
 FRONT_DEG, BACK_DEG = 40.0, 130.0
 
 SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D33", "#C8CCD8"
 
 
 def paint_turtle(p: QPainter, state: RobotState) -> None:
-    """Draw the robot; the painter's origin is its middle on the floor."""
+    """Paint the robot; the painter's origin is its centre on the floor."""
     heading = math.radians(state.theta_deg)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(50, 42, 40, 110))
@@ -44,16 +44,16 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
 
 
 def on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
-    """The point at this azimuth (radians, 0 towards the person), at a share of the radius, so high."""
+    """Return the point at an azimuth (rad, 0 faces the viewer), a fraction of the radius, and a height."""
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
 
 def side_at(own: QPointF, theta_deg: float) -> str:
-    """The side of its bumper that a hand at a point of its own presses; from above it is the front."""
+    """Return the bumper side pressed at a point in the figure's units; a touch from above is the front."""
     across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
     if math.hypot(across, along) < ABOVE or along < -1.0:
         return "front"
-    if along > 0:  # the deck's near edge and the drum below it: all of it is the side towards the person
+    if along > 0:  # the deck's near edge and the drum below it: all of it is the side towards the viewer
         along = math.sqrt(max(0.0, 1.0 - across * across))
     aside = math.degrees(math.atan2(across, along)) - theta_deg
     aside = (aside + 180.0) % 360.0 - 180.0
@@ -63,7 +63,7 @@ def side_at(own: QPointF, theta_deg: float) -> str:
 
 
 def _wheel(p: QPainter, azimuth: float) -> None:
-    """A wheel stands at the side, its face looks along its azimuth."""
+    # At the side, facing along its azimuth.
     wide = max(2.6, WHEEL * abs(math.cos(azimuth)))
     middle = on_body(azimuth, 0.98, -WHEEL + 1.5)
     p.setPen(Qt.PenStyle.NoPen)
@@ -77,7 +77,6 @@ def _wheel(p: QPainter, azimuth: float) -> None:
 
 
 def _body(p: QPainter, state: RobotState) -> None:
-    """The shell: a low drum, lighter at the left."""
     flat = RADIUS * FLAT
     drum = QPainterPath(QPointF(-RADIUS, HIGH))
     drum.lineTo(-RADIUS, LOW)
@@ -99,7 +98,7 @@ def _body(p: QPainter, state: RobotState) -> None:
 
 
 def _bumper(p: QPainter, heading: float, bumped: str) -> None:
-    """A bow around the front, as far as it is seen; the side that touches something is amber."""
+    # A bow around the visible front; the touching side is amber.
     sides = {"left": (18.0, 70.0), "front": (-18.0, 18.0), "right": (-70.0, -18.0)}
     for side, (first, last) in sides.items():
         shape = QPainterPath()
@@ -123,7 +122,6 @@ def _bumper(p: QPainter, heading: float, bumped: str) -> None:
 
 
 def _deck(p: QPainter, heading: float, light: str) -> None:
-    """The upper deck with an arrow to its front and the light in the middle."""
     flat = RADIUS * FLAT
     p.setPen(QPen(QColor(SHELL_DARK), 1.0))
     p.setBrush(QColor(DECK))
@@ -149,7 +147,7 @@ def _deck(p: QPainter, heading: float, light: str) -> None:
 
 
 def _mast(p: QPainter, heading: float) -> None:
-    """A short mast with the camera; its lens is seen when it looks this way."""
+    # The lens is visible when it faces the viewer.
     foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST + 6)
     p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     p.drawLine(foot, top)
