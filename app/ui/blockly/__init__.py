@@ -1,4 +1,4 @@
-"""The block editor's web page as a widget, and what window and page say to each other.
+"""Block editor's web page as a widget, and the messages between window and page.
 
-`view` is the widget, `bridge` the calls both ways; the page itself is `app/blocks/editor/`.
+`view` is the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
 """

@@ -1,6 +1,6 @@
-"""What the window and the page of the block editor say to each other, over one QWebChannel.
+"""Messages between the window and the page of the block editor over one QWebChannel.
 
-One pipe in each direction, so that what was said first arrives first.
+One ordered channel in each direction.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from app.core.storage import deep_json
 
 Json = dict[str, object]
 COPIED = '{"nepStudio":'
-"""How copied blocks begin (`clipboard.ts`)."""
+"""Prefix of copied blocks (`clipboard.ts`)."""
 MOST_COPIED = 5_000_000
 
 
 class BlocklyBridge(QObject):
-    """The object ``bridge`` of the page. Slots are called by the page, signals tell the view."""
+    """Object ``bridge`` of the page. The page calls slots; signals notify the view."""
 
     told = Signal(str, str)  # to the page: a command and its JSON
     came_up = Signal()
@@ -28,35 +28,35 @@ class BlocklyBridge(QObject):
     block_chosen = Signal(str)
     answered = Signal(int, str)  # token of a flush, workspace as JSON
     went_wrong = Signal(str)
-    field_opened = Signal()  # the field that was asked for has the keys
-    try_asked = Signal(str)  # a stack to be tried, as JSON
-    block_focused = Signal(bool)  # whether the keys go to a block
-    command_wanted = Signal(str)  # a command of the window about variables or the picture of the blocks
+    field_opened = Signal()  # the requested field has the focus
+    try_asked = Signal(str)  # a stack to try, as JSON
+    block_focused = Signal(bool)  # whether a block has the focus
+    command_wanted = Signal(str)  # a window command about variables or the picture of the blocks
     drawn = Signal(int, str)  # token of a picture, the picture; "" for none
-    values_watched = Signal(str)  # the variables whose values the page shows, as JSON: [id, …]
-    sensors_offered = Signal(str)  # the sensors in the open toolbox as JSON: [[robot, sensor], …]
-    wanted = Signal(str)  # what a button of the empty canvas is for: "robot", "examples"
-    pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
-    removed = Signal(int)  # a person has deleted so many blocks at once
-    # something of that tab is outside of the page, at x, y; False: not any more
+    values_watched = Signal(str)  # variables whose values the page shows, as JSON: [id, …]
+    sensors_offered = Signal(str)  # sensors in the open toolbox as JSON: [[robot, sensor], …]
+    wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
+    pinned = Signal(bool)  # whether the flyout should stay open
+    removed = Signal(int)  # number of blocks that the user deleted at once
+    # blocks of that tab are dragged outside the page, at x, y; False: no longer
     carried_out = Signal(int, int, bool, str)
-    carried_seen = Signal(str, float)  # how that looks: a PNG as `data:`, so many pixels in one of the page
-    let_go_outside = Signal(int, int)  # and was let go there
-    # so many blocks are in this tab now: "moved", "copied", "added"; from which tab
+    carried_seen = Signal(str, float)  # their image: a PNG as `data:`, and its pixels per page pixel
+    let_go_outside = Signal(int, int)  # they were dropped there
+    # number of blocks brought into this tab: "moved", "copied", "added"; from which tab
     carried_over = Signal(int, str, str)
-    backpack_asked = Signal(str)  # what is to be done with the backpack, as JSON (`backpack.ts`)
+    backpack_asked = Signal(str)  # backpack operation as JSON (`backpack.ts`)
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._begin = begin
 
     def tell(self, command: str, payload: object) -> None:
-        """Send one command; the page answers nothing by itself."""
+        """Send a command to the page, which doesn't reply."""
         self.told.emit(command, deep_json.dumps(payload, ascii=True))
 
     @Slot(result=str)
     def beginning(self) -> str:
-        """What the page needs before its first picture: theme, language, motion."""
+        """Return what the page needs before its first painting: theme, language, motion."""
         return deep_json.dumps(self._begin(), ascii=True)
 
     @Slot()
@@ -129,12 +129,15 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def copy(self, blocks: str) -> None:
-        """Put copied blocks on the computer's clipboard, as text."""
+        """Put copied blocks on the system clipboard as text."""
         QGuiApplication.clipboard().setText(blocks)
 
     @Slot(result=str)
     def copied(self) -> str:
-        """The copied blocks on the computer's clipboard; "" for all else, which is not the page's to read."""
+        """Return copied blocks on the system clipboard.
+
+        "" for anything else, which the page must not read.
+        """
         text = QGuiApplication.clipboard().text()
         return text if text.startswith(COPIED) and len(text) <= MOST_COPIED else ""
 

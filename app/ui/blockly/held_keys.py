@@ -1,4 +1,4 @@
-"""Keys that a person presses before the page is ready for them, kept until it is."""
+"""Keys pressed before the page is ready for them, held until it is."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ _ELSEWHERE = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
 
 
 class HeldKeys:
-    """Keeps the keys from the page between a command that gives a field the keyboard and the page's answer.
+    """Holds keys between a command that focuses a field and the page's reply.
 
-    Commands and keys go to the page by different ways, and the keys are faster: letters that are typed right
-    after *Find a block* would arrive while the page still makes a new behaviour, and go to its canvas.
+    Commands and keys take different ways to the page, and keys are faster: letters typed immediately after
+    *Find a block* would arrive while the page is still busy, and go to its canvas.
     """
 
     def __init__(self, keyboard: Callable[[], QObject | None]) -> None:
-        """``keyboard`` is the widget that gets the keys of the page now."""
+        # `keyboard` returns the widget that currently receives the page's keys.
         self._keyboard = keyboard
         self._kept: list[QEvent] | None = None
 
     def hold(self) -> None:
-        """Keep all keys from now on."""
+        """Hold all keys from now on."""
         if self._kept is None:
             self._kept = []
 
     def keeps(self, event: QEvent) -> bool:
-        """Whether this event of the page's keyboard is kept. Who goes elsewhere lets go what was."""
+        """Return whether this event is held. A click or loss of focus releases the held keys."""
         if self._kept is None:
             return False
         if event.type() in _KEYS:
@@ -39,7 +39,7 @@ class HeldKeys:
         return False
 
     def let_go(self) -> None:
-        """Give the page what was kept, in its order."""
+        """Send the held keys to the page, in order."""
         kept, self._kept = self._kept or [], None
         for event in kept:
             keyboard = self._keyboard()
@@ -47,5 +47,5 @@ class HeldKeys:
                 QCoreApplication.sendEvent(keyboard, event)
 
     def forget(self) -> None:
-        """The page is gone: what was typed for it meant what is gone with it."""
+        """Discard the held keys: the page they were typed for is gone."""
         self._kept = None

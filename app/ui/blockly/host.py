@@ -1,6 +1,6 @@
-"""The web page of the block editor in a widget: off the record, fenced in, nothing remote.
+"""Host of the block editor's web page: off the record, isolated, without remote content.
 
-The host makes it, dresses it, starts it again when its process dies, and takes its function keys.
+The host creates and styles the page, restarts it when its process dies, and receives its function keys.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _OFF = (
 
 
 class BlocklyPage(QWebEnginePage):
-    """Shows nothing but the editor; what its scripts complain about goes to the log."""
+    """Page that loads only the editor; errors of its scripts are logged."""
 
     def acceptNavigationRequest(
         self, url: QUrl | str, _kind: QWebEnginePage.NavigationType, _is_main: bool
@@ -60,7 +60,7 @@ class BlocklyPage(QWebEnginePage):
 
 
 class BlocklyWeb:
-    """A web view with its page, profile, channel and fence, all owned by one widget."""
+    """Web view with its page, profile, channel and request filter, all owned by one widget."""
 
     def __init__(self, bridge: BlocklyBridge, background: QColor, owner: QWidget) -> None:
         register_scheme()
@@ -88,21 +88,21 @@ class BlocklyWeb:
         self.page.load(QUrl(PAGE))
 
     def close(self) -> None:
-        """Delete the view and its page, then the profile, when control returns to the event loop."""
+        """Delete the view and its page, then the profile, in the event loop."""
         self.view.deleteLater()
         self._profile.deleteLater()
 
     def keyboard(self) -> QObject | None:
-        """The widget that receives the keys while the page has the focus."""
+        """Return the widget that receives the keys while the page has the focus."""
         return proxy_of(self.view)
 
 
 class BlocklyHost(QWidget):
-    """Holds the page, which comes with the first show and is started again whenever its process dies."""
+    """Widget of the page, which is created at the first show and restarted whenever its process dies."""
 
-    ready = Signal()  # the page is there (again, after its process died)
-    recovered = Signal()  # its process had died: every behaviour is back, without its undo
-    key_pressed = Signal(str)  # a function key pressed in the page that no shortcut of the window took
+    ready = Signal()  # the page is loaded (again, after its process died)
+    recovered = Signal()  # its process had died: every behaviour is restored, without undo
+    key_pressed = Signal(str)  # a function key pressed in the page that isn't a shortcut of the window
 
     def __init__(self, parent: QWidget | None, language: str) -> None:
         super().__init__(parent)
@@ -118,7 +118,7 @@ class BlocklyHost(QWidget):
         self._bridge = BlocklyBridge(self._beginning, self)
         self._bridge.came_up.connect(self._came_up)
         self._keys = HeldKeys(lambda: self._web.keyboard() if self._web is not None else None)
-        self._asked_for = ""  # the field that gets the keys: "find" or "search"; "" when it has them
+        self._asked_for = ""  # requested field: "find" or "search"; "" when it has the focus
         self._bridge.field_opened.connect(self._field_opened)
         self._on_block = False
         self._bridge.block_focused.connect(self._block_focused)
@@ -128,16 +128,16 @@ class BlocklyHost(QWidget):
 
     @property
     def is_ready(self) -> bool:
-        """Whether the page is there now."""
+        """True if the page is loaded."""
         return self._up
 
     @property
     def web(self) -> BlocklyWeb | None:
-        """The page's view, None until the first show. For tools and tests; panels have no need of it."""
+        """Page's view, None until the first show. For tools and tests."""
         return self._web
 
     def set_theme(self, tokens: Mapping[str, object], dark: bool) -> None:
-        """Use the design tokens: the whole file, or `Theme.blockly_tokens()`. Keeps program and undo."""
+        """Set the design tokens: the whole file, or `Theme.blockly_tokens()`. Keeps program and undo."""
         self._theme = {"tokens": dict(tokens), "dark": dark}
         if isinstance(tokens.get("reducedMotion"), bool):
             self.set_reduced_motion(bool(tokens["reducedMotion"]))
@@ -146,7 +146,7 @@ class BlocklyHost(QWidget):
         self._tell("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
-        """Steady glow instead of a breathing one."""
+        """Set a steady glow instead of an animated one."""
         if reduced != self._reduced_motion:
             self._reduced_motion = reduced
             self._tell("motion", {"reduced": reduced})
@@ -154,18 +154,20 @@ class BlocklyHost(QWidget):
     # -- for the view -----------------------------------------------------------------------------
 
     def _page_came(self) -> None:
-        """The page is there and knows nothing yet."""
+        # Overridden: the page is loaded and has no state yet.
+        ...
 
     def _page_went(self) -> None:
-        """The page is gone with everything in it."""
+        # Overridden: the page and its state are lost.
+        ...
 
     def _tell(self, command: str, payload: object) -> None:
-        """Say it to the page if there is one; a page that comes later is told by `_page_came`."""
+        # Without a page nothing is sent; `_page_came` sends everything to a later one.
         if self._up:
             self._bridge.tell(command, payload)
 
     def _ask_for(self, field: str) -> None:
-        """Let the keys go to a field of the page, also those that are pressed before it is there."""
+        # Holds keys that are pressed before the field has the focus.
         if self._web is None:
             return
         self._asked_for = field
@@ -173,12 +175,12 @@ class BlocklyHost(QWidget):
         self._keys.hold()
         self._tell(field, None)
 
-    # -- the page ---------------------------------------------------------------------------------
+    # -- page -------------------------------------------------------------------------------------
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self._web is None:
-            QTimer.singleShot(0, self, self._make_page)  # whoever pressed something sees the window first
+            QTimer.singleShot(0, self, self._make_page)  # the window responds to the user first
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
@@ -189,11 +191,11 @@ class BlocklyHost(QWidget):
             self._tell("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
         if overrides and _is_help(cast("QKeyEvent", event)):
-            event.accept()  # on a block, F1 is for the block: the window's own F1 does not get it then
+            event.accept()  # on a block, F1 is the block's help: the window's F1 doesn't get it
             return True
         if event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event)
-            # A shortcut of the window has had its turn before a key press arrives here.
+            # A shortcut of the window was handled before a key press arrives here.
             if key.key() in _FUNCTION_KEYS and key.modifiers() == Qt.KeyboardModifier.NoModifier:
                 if self._on_block and _is_help(key):
                     self._tell("help", None)
@@ -217,30 +219,30 @@ class BlocklyHost(QWidget):
         self._web.start()
 
     def _close_page(self) -> None:
-        """Let the page go before its profile, whatever order the interpreter ends things in."""
+        # Deletes the page before its profile, whatever the interpreter's order at exit.
         web, self._web, self._up = self._web, None, False
         if web is not None:
             web.close()
 
     def _dress(self, web: BlocklyWeb) -> None:
-        """What the theme decides outside the page: the colour before the first picture, the size of text."""
+        # Styles outside the page: background before the first painting, text size.
         web.page.setBackgroundColor(self._background())
         tokens = cast("Mapping[str, object]", self._theme["tokens"])
         percent = tokens.get("textPercent")
         web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
     def _watch_keys(self) -> None:
-        """The widget that gets the keys is made by the web engine, and made again with a new process."""
+        # The web engine creates the widget that receives the keys, again with each process.
         keyboard = self._web.keyboard() if self._web is not None else None
         if self._web is not None:
             self._web.view.setAcceptDrops(False)
         if keyboard is not None:
             if isinstance(keyboard, QWidget):
-                keyboard.setAcceptDrops(False)  # files that are dropped here are the window's
+                keyboard.setAcceptDrops(False)  # the window handles dropped files
             keyboard.removeEventFilter(self)
             keyboard.installEventFilter(self)
             if isinstance(keyboard, QWidget):
-                keyboard.setAcceptDrops(False)  # a dropped file is for the window, which opens it
+                keyboard.setAcceptDrops(False)  # the window handles dropped files
 
     def _beginning(self) -> Json:
         if not self._theme:

@@ -1,4 +1,4 @@
-"""Values in the JSON that the page of the block editor sends. What is malformed gives an empty value."""
+"""Parsing of JSON from the block editor's page. Malformed input gives an empty value."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from nep.text import bounded_str
 
 
 def texts(text: str) -> tuple[str, ...]:
-    """Return the texts of a list."""
+    """Return the strings of a list."""
     return tuple(map(bounded_str, _list(text)))
 
 
 def pairs(text: str) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of texts, such as robot and sensor, of a list of lists."""
+    """Return pairs of strings, such as robot and sensor, of a list of lists."""
     found = (each for each in _list(text) if isinstance(each, list) and len(each) == 2)
     return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
 
 
 def data_url(text: str) -> bytes:
-    """Return the bytes of a ``data:`` URL in base64."""
+    """Return the bytes of a base64 ``data:`` URL."""
     try:
         return b64decode(text.partition(",")[2].encode("ascii", "replace"))
     except binascii.Error:

@@ -1,6 +1,6 @@
-"""What the page of the block editor may read: ``app://blocks/…`` from the resources, and nothing else.
+"""URL scheme of the block editor's page: ``app://blocks/…`` from the resources, and nothing else.
 
-`register_scheme` has to run before the first view or profile is made. Qt says "in general" before the
+`register_scheme` must run before the first view or profile is created. Qt recommends to call it before the
 QApplication; this module is not imported so early, because Qt WebEngine takes long to load.
 """
 
@@ -34,7 +34,7 @@ _WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
 
 
 def register_scheme() -> None:
-    """Make ``app:`` a secure scheme of our own. Call before the first view; calling it again does nothing."""
+    """Register ``app:`` as a secure scheme. Call it before the first view. Idempotent."""
     if QWebEngineUrlScheme.schemeByName(QByteArray(SCHEME)).name() == SCHEME:
         return
     scheme = QWebEngineUrlScheme(QByteArray(SCHEME))
@@ -48,9 +48,9 @@ def register_scheme() -> None:
 
 
 def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
-    """The media type and bytes for a path such as ``/editor.js``; None if there is no such file.
+    """Return media type and bytes of a path such as ``/editor.js``; None if it does not exist.
 
-    The path cannot leave the folder of the editor, except to the bundled fonts under ``/fonts/``.
+    Paths can't leave the editor's folder, except to the bundled fonts under ``/fonts/``.
     """
     root = resources.folder() if folder is None else folder
     if path == "/fonts.css":
@@ -66,7 +66,7 @@ def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
 
 
 def _font_faces(folder: Path) -> str:
-    """One ``@font-face`` for each bundled weight of Inter; empty when no font is there."""
+    # One `@font-face` for each bundled weight of Inter; empty without fonts.
     faces = []
     for file in sorted(folder.glob("Inter*.[ot]tf")):
         weight = _WEIGHTS.get(file.stem.partition("-")[2])
@@ -87,7 +87,7 @@ def _qwebchannel() -> bytes:
 
 
 class SchemeHandler(QWebEngineUrlSchemeHandler):
-    """Answers ``app://blocks/…``; any other host, method or path is refused."""
+    """Serves ``app://blocks/…``; rejects any other host, method or path."""
 
     def requestStarted(self, job: QWebEngineUrlRequestJob) -> None:
         url = job.requestUrl()
@@ -106,14 +106,14 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
 
 
 class RequestBlocker(QWebEngineUrlRequestInterceptor):
-    """Blocks every request that is not for our own files. What was blocked is kept for tests."""
+    """Blocks all requests except for local content. Blocked ones are recorded for tests."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.blocked: list[str] = []
 
     def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
-        info.block(True)  # first: what fails here must not let it through
+        info.block(True)  # first, so that an exception here can't let it through
         if info.requestUrl().scheme() in ALLOWED:
             info.block(False)
             return

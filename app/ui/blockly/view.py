@@ -1,7 +1,7 @@
-"""The block editor as a widget.
+"""Block editor widget.
 
-The view knows the newest program at any time. The page in it may come late (it is made when the view is first
-shown) or die (its process can be killed): it is given everything again and the person goes on.
+The view always knows the newest program. Its page may be loaded late (at the first show) or die (its process
+can be killed): its state is then sent again.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
 from nep import i18n
 
-_PIXELS_PER_INCH = 96.0  # a page's own pixels
+_PIXELS_PER_INCH = 96.0  # CSS pixels
 _EDGE_INCH = 0.45
 PAGE_EDITS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
-"""What a page's own fields do, as `QWebEnginePage.WebAction` names it."""
+"""Edit commands of the page's fields, by `QWebEnginePage.WebAction` name."""
 TYPES = "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
-"""Whether a field of the page has the keys."""
+"""Script: whether a field of the page has the focus."""
 
 
 class BlocklyView(BlocklyHost):
@@ -39,19 +39,20 @@ class BlocklyView(BlocklyHost):
     history_changed = Signal(bool, bool)  # can undo, can redo: of the shown tab
     block_selected = Signal(str)  # a block's id; "" when nothing is selected
     wanted = Signal(str)  # a button of the empty canvas was pressed: "robot", "examples"
-    try_asked = Signal(str)  # a stack to be tried at once, as JSON (`app.blocks.compiler.stack`)
-    sensors_offered = Signal(tuple)  # (robot, sensor) of each one that the open toolbox shows
-    command_wanted = Signal(str)  # a command of the window: "variable.rename:ID"
-    values_watched = Signal(tuple)  # the variables (ids) whose values the page shows
-    toolbox_pinned = Signal(bool)  # a person wants the blocks of a category to stay open, or not
-    blocks_deleted = Signal(int)  # a person has deleted so many blocks at once in the shown tab
-    # outside of the page, at this place of the screen (QPoint), from that tab; None: no more
+    try_asked = Signal(str)  # a stack to try, as JSON (`app.blocks.compiler.stack`)
+    sensors_offered = Signal(tuple)  # (robot, sensor) of each one in the open toolbox
+    command_wanted = Signal(str)  # a window command: "variable.rename:ID"
+    values_watched = Signal(tuple)  # variables (ids) whose values the page shows
+    toolbox_pinned = Signal(bool)  # whether the flyout should stay open
+    blocks_deleted = Signal(int)  # number of blocks deleted at once in the shown tab
+    # blocks are dragged outside the page, at a screen position (QPoint), from that tab; None: no longer
     block_carried = Signal(object, str)
-    carried_seen = Signal(bytes, float)  # how that looks: a PNG, and its pixels in one of the screen
-    block_dropped = Signal(QPoint)  # it was let go there; unless `bring_blocks` follows it is where it was
-    # so many are in the shown tab now: "moved", "copied" or "added"; from which tab
+    carried_seen = Signal(bytes, float)  # their image: a PNG, and its pixels per screen pixel
+    # they were dropped there; without `bring_blocks` they stay where they were
+    block_dropped = Signal(QPoint)
+    # number of blocks brought into the shown tab: "moved", "copied" or "added"; from which tab
     blocks_brought = Signal(int, str, str)
-    backpack_asked = Signal(str)  # what a person wants done with the backpack, as JSON: `BackpackKeeper`
+    backpack_asked = Signal(str)  # backpack operation as JSON: `BackpackKeeper`
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -62,7 +63,7 @@ class BlocklyView(BlocklyHost):
         self._values: Json = {}
         self._first_step: Json | None = None
         self._backpack: list[Json] = []
-        self._pointed: Json | None = None  # what a page that is not there yet is to point at
+        self._pointed: Json | None = None  # pending highlight for a page that is not loaded yet
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._pictures: dict[int, Callable[[bytes], None]] = {}
         self._tokens = 0
@@ -86,22 +87,22 @@ class BlocklyView(BlocklyHost):
         self._bridge.backpack_asked.connect(self.backpack_asked)
         self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(pairs(text)))
 
-    # -- the program ------------------------------------------------------------------------------
+    # -- program ----------------------------------------------------------------------------------
 
     @property
     def workspace(self) -> Mapping[str, object]:
-        """The newest program of the shown tab; call `flush` for one without the last 150 ms missing."""
+        """Newest program of the shown tab; use `flush` to include the last 150 ms."""
         return self._tabs.shown.program.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
-        """The newest program of a tab; None when there is no such tab."""
+        """Return the newest program of a tab; None when it doesn't exist."""
         tab = self._tabs[key]
         return tab.program.blocks if tab is not None else None
 
     def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
-        """Show the behaviour kept under this key, with its own undo, zoom and scroll position.
+        """Show the behaviour with this key, with its own undo, zoom and scroll position.
 
-        The first time it is ``workspace``; afterwards what became of it.
+        ``workspace`` is used the first time; later the tab's own state.
         """
         gone = self._tabs.show(key, WorkspaceJson.of(workspace))
         self._send_tab()
@@ -109,7 +110,7 @@ class BlocklyView(BlocklyHost):
             self._tell("close", gone)
 
     def close_tab(self, key: str) -> None:
-        """Forget a behaviour and its undo. In the place of the shown one there is an empty one then."""
+        """Close a behaviour and discard its undo. If it was shown, an empty one replaces it."""
         was_shown = key == self._tabs.shown.key
         if self._tabs.close(key):
             if was_shown:
@@ -117,24 +118,24 @@ class BlocklyView(BlocklyHost):
             self._tell("close", key)
 
     def load(self, workspace: Mapping[str, object]) -> None:
-        """Show another program in the shown tab.
+        """Load another program into the shown tab.
 
-        Forgets its undo; edits of the old one that are still under way are dropped.
+        Clears its undo; pending edits of the old program are discarded.
         """
         self._tabs.replace(WorkspaceJson.of(workspace))
         self._tabs.shown.in_page = False
         self._send_tab()
 
     def change(self, workspace: Mapping[str, object]) -> None:
-        """Change the shown tab's program as one edit, which undo takes back; `changed` does not tell it."""
+        """Change the shown tab's program as one edit that can be undone; `changed` is not emitted."""
         self._tabs.shown.program = WorkspaceJson.of(workspace)
         self._tell("change", workspace)
 
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
-        """Ask for the newest program of the shown tab now.
+        """Request the newest program of the shown tab.
 
-        `done` is called once, also if the page is absent or dies. The other tabs have told their newest when
-        they were left.
+        `done` is called once, also if the page is missing or dies. Other tabs were flushed when they were
+        left.
         """
         if not self._up:
             done(self._tabs.shown.program)
@@ -144,9 +145,9 @@ class BlocklyView(BlocklyHost):
         self._bridge.tell("flush", self._tokens)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Make a "png" or "svg" of all blocks of the shown tab, on white or on nothing.
+        """Create a "png" or "svg" of all blocks of the shown tab, with a white or transparent background.
 
-        `done` is called once, with b"" when there is nothing to be seen or no page.
+        `done` is called once, with b"" without blocks or page.
         """
         if not self._up:
             done(b"")
@@ -156,9 +157,9 @@ class BlocklyView(BlocklyHost):
         self._bridge.tell("picture", {"token": self._tokens, "kind": kind, "white": white})
 
     def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Make a PDF of all blocks of the shown tab on paper of this layout, each page with the title above.
+        """Create a PDF of all blocks of the shown tab, with the title on each page.
 
-        `done` is called once, with b"" when there is nothing to be seen or no page.
+        `done` is called once, with b"" without blocks or page.
         """
         if not self._up:
             done(b"")
@@ -176,7 +177,7 @@ class BlocklyView(BlocklyHost):
             if not count or self.web is None:
                 done(b"")
                 return
-            self._pictures[token] = done  # until the PDF is made: the page may die meanwhile
+            self._pictures[token] = done  # kept until the PDF is created, as the page may die meanwhile
             bare = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
             self.web.page.printToPdf(made, bare)
 
@@ -188,12 +189,12 @@ class BlocklyView(BlocklyHost):
         self._bridge.tell("pages", {"token": token, "title": title, "date": date, **told})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
-        """Let the blocks of a category stay open, or close after each use; None: as the room allows."""
+        """Set whether the flyout stays open, or closes after each use; None: depending on the space."""
         self._pinned = pinned
         self._tell("pin", pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
-        """Give what `app.blocks.editor_definitions` made. Equal definitions cost nothing.
+        """Set the result of `app.blocks.editor_definitions`. Equal definitions cost nothing.
 
         Keeps the program, its undo and an open category; waits while a block is being dragged.
         """
@@ -202,10 +203,10 @@ class BlocklyView(BlocklyHost):
         self._definitions = dict(definitions)
         self._tell("definitions", self._definitions)
 
-    # -- what the blocks of the shown tab say -----------------------------------------------------
+    # -- state of the shown tab's blocks ----------------------------------------------------------
 
     def highlight(self, ids: Sequence[str]) -> None:
-        """Let exactly these blocks glow; 30 calls a second are fine."""
+        """Highlight exactly these blocks; may be called 30 times a second."""
         self._show("highlight", list(ids))
 
     def mark_stopped(self, ids: Sequence[str]) -> None:
@@ -213,15 +214,15 @@ class BlocklyView(BlocklyHost):
         self._show("stopped", list(ids))
 
     def set_errors(self, errors: Mapping[str, str]) -> None:
-        """Outline these blocks and put a sentence beside each: id -> sentence."""
+        """Outline these blocks with an error each: id -> sentence."""
         self._show("errors", dict(errors))
 
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
-        """Put a sentence beside each of these blocks that warns, and is no error: id -> sentence."""
+        """Show a warning at each of these blocks: id -> sentence."""
         self._show("warnings", dict(warnings))
 
     def show_value(self, id: str, words: str) -> None:
-        """Say beside a block, also one of the open toolbox, what its value is, until the next press."""
+        """Show a value at a block, also in the open toolbox, until the next click."""
         self._tell("value", [id, words])
 
     def set_absent(self, ids: Sequence[str]) -> None:
@@ -229,9 +230,9 @@ class BlocklyView(BlocklyHost):
         self._show("absent", list(ids))
 
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
-        """Set the words of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
+        """Set the values of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
 
-        No undo, no change. Those whose key is among ``old`` are faint: the robot has not told them lately.
+        Not an edit. Values whose key is in ``old`` are stale and shown faint.
         """
         live: Json = {"values": dict(values), "old": sorted(old)}
         if live != self._live:
@@ -239,19 +240,19 @@ class BlocklyView(BlocklyHost):
             self._tell("live", self._live)
 
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
-        """Say what the variables hold that the page shows: by id, as `VariableValue.to_json`."""
+        """Set the values of the variables that the page shows: by id, as `VariableValue.to_json`."""
         if values != self._values:
             self._values = dict(values)
             self._tell("values", self._values)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Do something with a variable: ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``."""
+        """Edit a variable: ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``."""
         self._tell("variable", dict(edit))
 
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
-        """Say in the toolbox what is wrong with robots: name -> status of its dot, words.
+        """Set problems of robots in the toolbox: name -> status of its dot, sentence.
 
-        All others have the dot of a robot that is connected or not.
+        Other robots have the dot for connected or not.
         """
         told: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
         if told != self._alarms:
@@ -259,22 +260,22 @@ class BlocklyView(BlocklyHost):
             self._tell("alarms", told)
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
-        """Say what is in the backpack, the newest first: ``{"id", "at", "block"}`` of each."""
+        """Set the content of the backpack, newest first: ``{"id", "at", "block"}`` of each."""
         self._backpack = [dict(item) for item in items]
         self._tell("backpack", self._backpack)
 
     def set_first_step(self, first: str, robot: bool) -> None:
-        """Say on an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
+        """Set the hint of an empty canvas to drag the block ``first`` there; ``robot``: one is connected."""
         told: Json = {"first": first, "robot": robot}
         if told != self._first_step:
             self._first_step = told
             self._tell("begin", told)
 
     def point_at(self, block: str, name: str = "", then: str = "") -> None:
-        """Put a ring round the category that has this type of block, then round the block; "" ends that.
+        """Highlight the category of a block type, then the block; "" ends that.
 
-        ``name`` is what people call it, ``then`` the words that say where to put it. It ends by itself when
-        there is one more of them.
+        ``name`` is its label, ``then`` the hint where to put it. It ends automatically when such a block is
+        added.
         """
         wanted: Json | None = {"block": block, "name": name, "then": then} if block else None
         self._pointed = None if self._up else wanted
@@ -283,36 +284,36 @@ class BlocklyView(BlocklyHost):
     # -- commands ---------------------------------------------------------------------------------
 
     def undo(self) -> None:
-        """Take back the last edit."""
+        """Undo the last edit."""
         self._tell("undo", None)
 
     def undo_deletion(self) -> None:
-        """Bring back what was deleted last, whatever was done since."""
+        """Restore the last deleted blocks, whatever was done since."""
         self._tell("undelete", None)
 
     def bring_blocks(self) -> None:
-        """Let the shown tab have what was carried out of the page last, and take it from its own tab."""
+        """Move the last dragged blocks from their tab into the shown one."""
         self._tell("bring", None)
 
     def give_blocks_back(self) -> None:
-        """Undo the last `bring_blocks`, in both tabs."""
+        """Undo the last `bring_blocks` in both tabs."""
         self._tell("giveBack", None)
 
     def redo(self) -> None:
-        """Do it again."""
+        """Redo."""
         self._tell("redo", None)
 
     def edit(self, what: str) -> None:
-        """Do "copy", "cut", "paste" or "duplicate" with the chosen block, and give the page the keys.
+        """Apply "copy", "cut", "paste" or "duplicate" to the selected block, and focus the page.
 
-        Does nothing when the page has the keys: it has had its turn.
+        No effect when the page has the focus, because it has handled the key.
         """
         if self.web is not None and not self._has_keys():
             self.setFocus()
             self._tell("edit", what)
 
     def edit_from_menu(self, what: str) -> None:
-        """Do "cut", "copy", "paste" or "selectAll" in the page's field with the keys, else with blocks."""
+        """Apply "cut", "copy", "paste" or "selectAll" in the page's focused field, else to blocks."""
         if self.web is None:
             return
         page = self.web.page
@@ -331,11 +332,11 @@ class BlocklyView(BlocklyHost):
         return focus is not None and self.isAncestorOf(focus)
 
     def zoom_in(self) -> None:
-        """One step larger."""
+        """Zoom in by one step."""
         self._tell("zoom", 1)
 
     def zoom_out(self) -> None:
-        """One step smaller."""
+        """Zoom out by one step."""
         self._tell("zoom", -1)
 
     def zoom_to_fit(self) -> None:
@@ -343,29 +344,29 @@ class BlocklyView(BlocklyHost):
         self._tell("fit", None)
 
     def open_find(self) -> None:
-        """Open the bar that finds blocks in the shown program."""
+        """Open the bar for finding blocks in the shown program."""
         self._ask_for("find")
 
     def open_search(self) -> None:
-        """Let the keys go to the field that finds blocks in the toolbox."""
+        """Focus the search field of the toolbox."""
         self._ask_for("search")
 
     def show_help(self) -> None:
-        """Show the help of the block that the keys go to, if there is one."""
+        """Show the help of the focused block, if any."""
         self._tell("help", None)
 
     def show_block(self, id: str) -> None:
-        """Bring the block to the middle and select it."""
+        """Scroll to a block and select it."""
         self._tell("show", id)
 
-    # -- the page ---------------------------------------------------------------------------------
+    # -- page -------------------------------------------------------------------------------------
 
     def _toolbox_pinned(self, keeps: bool) -> None:
         self._pinned = keeps
         self.toolbox_pinned.emit(keeps)
 
     def _on_screen(self, x: int, y: int) -> QPoint:
-        """A place of the page, or beside it."""
+        # The position may be outside the page.
         zoom = self.web.view.zoomFactor() if self.web is not None else 1.0
         view = self.web.view if self.web is not None else self
         return view.mapToGlobal(QPoint(round(x * zoom), round(y * zoom)))
@@ -393,7 +394,7 @@ class BlocklyView(BlocklyHost):
         self.values_watched.emit(())
 
     def _send_tab(self) -> None:
-        """Let the page show this tab: its program when the page does not hold it, and what its blocks say."""
+        # Sends the program if the page doesn't have it, and the state of its blocks.
         if not self._up:
             return
         tab = self._tabs.shown
@@ -431,6 +432,6 @@ class BlocklyView(BlocklyHost):
 
 
 def _margins(layout: QPageLayout) -> tuple[float, float, float, float]:
-    """What the printer leaves empty, in inches."""
+    # Printer margins in inches.
     margins = layout.margins(QPageLayout.Unit.Inch)
     return margins.left(), margins.top(), margins.right(), margins.bottom()
