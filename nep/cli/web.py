@@ -183,7 +183,7 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
         out.print(words.format(file=token_file), style="dim")
     if not server.settings.access.origins:
         out.print(
-            _("  only programs and pages of this computer can connect; --origin allows other pages"),
+            _("  pages from web servers of other computers need --origin"),
             style="dim",
         )
     address = master_address(server.settings.master)

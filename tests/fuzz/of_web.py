@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
+from http import HTTPStatus
+from urllib.parse import unquote
 
 from nep.errors import NepError
 from nep.messages.encoded import Encoded
@@ -16,6 +19,7 @@ from nep.programs.web.limits import MAX_MESSAGE_BYTES
 from nep.programs.web.outgoing import EncodingOptions, publish_frames
 from nep.programs.web.payloads import from_ros, nep_type_of, ros_type_of
 from nep.programs.web.png import text_as_png, text_in_png
+from nep.programs.web.served_pages import PageRequest, answer
 from nep.programs.web.server import node_name
 from nep.programs.web.visitors import MAX_SHOWN_LENGTH, client_name, page_title
 from nep.protocol.wire import check_node_name
@@ -89,6 +93,23 @@ def origins_of_pages(data: bytes) -> None:
         assert not control_in(name)
     if not refusal:
         check_node_name(node_name(text, "127.0.0.1:5"))
+
+
+@TARGETS.add(
+    seeds=lambda: [b"/?token=a-long-token localhost:9090", b"/starter.html 192.168.1.5:9090", b"/ [::1]"],
+    words=(b"?token=", b"localhost", b"192.168.1.5:9090", b"/starter.html", b" "),
+)
+def requests_of_browsers(data: bytes) -> None:
+    path, _space, host = text_of(data).partition(" ")
+    found = answer(PageRequest("GET", path, (host,), "http://192.168.1.5:9090"), Access(token="a-long-token"))
+    given = unquote(re.sub("[\t\r\n]", "", path))  # as urllib reads a URL
+    assert b"a-long-token" not in found.body or "a-long-token" in given
+    for header in found.headers.values():
+        assert header.isascii()
+        assert header.isprintable()
+    policy = found.headers["Content-Security-Policy"]
+    assert found.status != HTTPStatus.OK or policy.count(";") == 7 - ("starter" in path)
+    check_sentence(NepError(found.body.decode() if "html" not in found.headers["Content-Type"] else "page"))
 
 
 @TARGETS.add(
