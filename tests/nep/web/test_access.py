@@ -42,6 +42,14 @@ def test_page_connects_only_from_an_allowed_origin(origin: str | None, is_allowe
     assert refusal.isprintable()
 
 
+def test_pages_of_the_server_itself_are_allowed_at_its_own_address_only() -> None:
+    own = "http://192.168.1.5:9090"
+    assert Access().origin_refusal(own, own) == ""
+    for other in ("http://192.168.1.5:8000", "https://192.168.1.5:9090", "http://192.168.1.6:9090"):
+        assert Access().origin_refusal(other, own)
+    assert Access().origin_refusal("", "")
+
+
 def test_origin_is_normalized_as_by_browsers() -> None:
     assert checked_origin("HTTP://Example.ORG:80/") == "http://example.org"
     for origin in ("null", "file://"):
