@@ -174,7 +174,7 @@ class NanomsgSubSocket(UnbatchedReader):
         if greeter is not None:
             greeter.send(str(pipe.local_address).encode() + b" " + self._hello, block=False)
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Do nothing: this back end works on one computer only."""
 
     def reconnect(self, publisher: int) -> None:

@@ -158,8 +158,8 @@ class ZenohServer:
 
 @dataclass(eq=False)
 class _Call:
-    # Call in flight at the server `key`; "" while there is none. `finished_at` is the deadline for the removal
-    # of the server's token after zenoh has finished the query.
+    # Call in flight at the server `key`; "" while there is none. `finished_at` is the deadline for the
+    # removal of the server's token after zenoh has finished the query.
     number: int
     data: bytes | memoryview
     timeout_s: float | None

@@ -110,7 +110,7 @@ class SessionSubscriber(Protocol):
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Process the newest sequence numbers known to the master."""
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to other computers, after the address of this one has changed."""
 
 
@@ -385,7 +385,7 @@ class MasterSession:
         self._calls.reconnect()
         self._was_connected = False
         for _record, subscriber in self._all_subscribers():
-            subscriber.reconnect()
+            subscriber.reconnect_remote()
 
     def _select_endpoints(self, remotes: Iterable[RemotePublisher]) -> tuple[RemotePublisher, ...]:
         return tuple(select_endpoint(remote, self._name.known or self.address) for remote in remotes)

@@ -223,10 +223,10 @@ class PatternSubscriber(WakingSubscriber):
                     self._removed_totals.add(member)
                 member.close()
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers."""
         for member in list(self._members.values()):
-            member.reconnect()
+            member.reconnect_remote()
 
     # ---- closing
 

@@ -298,7 +298,7 @@ class SubSocket:
         else:
             source.endpoint = endpoint
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
         for source in self.sources.by_id.values():
             if is_far(source.endpoint):

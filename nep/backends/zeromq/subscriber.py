@@ -131,11 +131,11 @@ class NativeReadable(Readable, Protocol):
     def leave(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers. Unread messages of theirs are dropped."""
 
     def reconnect(self, publisher: int) -> None:
-        """Connect anew to a publisher that was connected to."""
+        """Disconnect from a connected publisher and connect again."""
 
 
 R = TypeVar("R", bound=Readable)
@@ -529,13 +529,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.connect(remote)
             self._after_use_locked()
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers, after the address of this one has changed."""
         with self._requested_lock():
             if not self.is_closed:
                 self._fill_locked()
                 self._wake_waiters_locked()
-                self._readable.reconnect()
+                self._readable.reconnect_remote()
                 self._after_use_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:

@@ -138,7 +138,7 @@ def number_in(value: object) -> int | float:
 
 
 def _written(value: object) -> int | float | None:
-    # “12”, “−3.5”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
+    # “12”, “-3.5”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
     match = _NUMBER.search(text(value))
     if match is None or len(match[0]) > _MOST_DIGITS:
         return None

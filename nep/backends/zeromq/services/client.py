@@ -267,7 +267,7 @@ class SocketClient:
                 self._unlisted = server
         self._serve_soon(self)
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to a server on another computer, after the address of this one has changed."""
         with self._lock:
             if is_far(self._connected_endpoint):

@@ -132,11 +132,11 @@ class SurveyClient:
             client.gone(0, 0, is_closed=True)
             self._leaving.append(client)
 
-    def reconnect(self) -> None:
+    def reconnect_remote(self) -> None:
         """Reconnect to respondents on other computers, after the address of this one has changed."""
         with self._lock:
             for client in self._clients.values():
-                client.reconnect()
+                client.reconnect_remote()
 
     def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
         """Process the removal of a respondent."""
