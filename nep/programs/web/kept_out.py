@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, NamedTuple
 
+from nep.programs.web.handshake import host_of
+
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request
@@ -46,7 +48,5 @@ class KeptOut:
 
 
 def _visitor(connection: ServerConnection, request: Request | None) -> _Visitor:
-    address = connection.remote_address
     headers = {} if request is None else request.headers
-    host = str(address[0]) if isinstance(address, tuple) else str(address)
-    return _Visitor(host, headers.get("Origin", ""), headers.get("User-Agent", ""))
+    return _Visitor(host_of(connection), headers.get("Origin", ""), headers.get("User-Agent", ""))

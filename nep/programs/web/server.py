@@ -25,6 +25,7 @@ from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
 from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
 from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
+from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, own_origin
 from nep.programs.web.kept_out import KeptOut
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.page import Page, authenticate
@@ -374,7 +375,7 @@ class WebServer:
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a handshake that is refused, and other HTTP requests; None lets a handshake go on."""
-        if not _is_handshake(request):
+        if not is_handshake(request):
             return self._page_response(connection, request)
         access = self.settings.access
         origins = request.headers.get_all("Origin")
@@ -384,7 +385,7 @@ class WebServer:
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("a connection has one Origin"))
         elif len(self._pages) + self._locked >= MAX_PAGES:
             refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("there are too many connections"))
-        elif said := access.origin_refusal(origin, _own_origin(connection)):
+        elif said := access.origin_refusal(origin, own_origin(connection)):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
         elif self._kept_out.refuses(connection, request):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
@@ -410,7 +411,7 @@ class WebServer:
             method,
             request.path,
             tuple(request.headers.get_all("Host")),
-            _own_origin(connection),
+            own_origin(connection),
             authorizations[0] if len(authorizations) == 1 else None,
         )
         found = answer(asked, self.settings.access)
@@ -450,15 +451,15 @@ class WebServer:
     def _turn_away(
         self, connection: ServerConnection, kind: RefusalKind, said: str, origin: str = ""
     ) -> None:
-        who = escaped((origin or _host_of(connection))[:200])
+        who = escaped((origin or host_of(connection))[:200])
         self._list_refusal(Refusal(time.time(), who, said, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
-            where = _address_of(connection)
+            where = address_of(connection)
             _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
 
     def _report_robot(self, connection: ServerConnection, robot: str, said: str) -> None:
-        who = escaped((_origin_of(connection) or _host_of(connection))[:200])
+        who = escaped((origin_of(connection) or host_of(connection))[:200])
         self._list_refusal(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
 
     def _list_refusal(self, refusal: Refusal) -> None:
@@ -492,7 +493,7 @@ class WebServer:
                 self._pages.pop(page, None)
 
     def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
-        name = node_name(_origin_of(connection), _address_of(connection))
+        name = node_name(origin_of(connection), address_of(connection))
         channels = self.settings.foxglove
         report = partial(self._report_robot, connection)
         if channels is not None and connection.subprotocol in SUBPROTOCOLS:
@@ -512,7 +513,7 @@ class WebServer:
         access = self.settings.access
         if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
             return False
-        is_refused = access.origin_refusal(_origin_of(connection), _own_origin(connection))
+        is_refused = access.origin_refusal(origin_of(connection), own_origin(connection))
         return not is_refused and (not access.token or access.token == known.token)
 
     async def _is_authenticated(self, connection: ServerConnection, auth: AuthCheck) -> bool:
@@ -568,33 +569,6 @@ def node_name(origin: str | None, address: str) -> str:
     host = urlsplit(origin).netloc if origin else ""
     port = address.rpartition(":")[2]
     return escaped(f"web_{host}_{port}" if host else f"web_{address}")[:150]
-
-
-def _is_handshake(request: Request) -> bool:
-    return any("websocket" in each.lower() for each in request.headers.get_all("Upgrade"))
-
-
-def _own_origin(connection: ServerConnection) -> str:
-    """The origin of pages that this server serves itself, at the address that the client chose.
-
-    Never a host name: a page of another site can let its own name point to this computer.
-    """
-    address = connection.local_address
-    return f"http://{address[0]}:{address[1]}" if isinstance(address, tuple) else ""
-
-
-def _host_of(connection: ServerConnection) -> str:
-    return _address_of(connection).rpartition(":")[0]
-
-
-def _origin_of(connection: ServerConnection) -> str | None:
-    request = connection.request
-    return None if request is None else request.headers.get("Origin")
-
-
-def _address_of(connection: ServerConnection) -> str:
-    address = connection.remote_address
-    return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else str(address)
 
 
 def _quiet_logger() -> logging.Logger:
