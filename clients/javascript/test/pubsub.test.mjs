@@ -180,13 +180,13 @@ test("the form of messages depends on the subscribers", () => {
   assert.ok(!subscriptions.isHeard);
 });
 
-test("queued messages are batched and reach every subscriber", async (t) => {
-  const spec = { id: ID, topic: "t", codecNumber: 1, latched: false, history: 0, batch: true };
-  let greeted = 0;
+/** Returns a publisher's transport, and a ZeroMQ socket that it has greeted. */
+async function connected(t, codecNumber) {
+  const spec = { id: ID, topic: "t", codecNumber, latched: false, history: 0, batch: true };
   const transport = new XpubTransport(
     spec,
     () => "brief",
-    () => greeted++,
+    () => undefined,
     assert.fail,
   );
   t.after(() => transport.close());
@@ -198,6 +198,22 @@ test("queued messages are batched and reach every subscriber", async (t) => {
   socket.connect(endpoint);
   const [, echo] = await socket.receive();
   assert.equal(echo.length, 32);
+  return { transport, socket };
+}
+
+test("texts have the same bytes in every form", async (t) => {
+  const { transport, socket } = await connected(t, 2);
+  const { encode, decode } = codecFor("string");
+  for (const text of ["", "short", "é".repeat(100), "\0 and 😀".repeat(50), `lone \ud800${"x".repeat(200)}`, "x".repeat(20_000)]) {
+    transport.send(encode(text));
+    const [{ header, payload }] = readParts(await socket.receive()).messages;
+    assert.equal(header.size, payload.length);
+    assert.equal(decode(payload, {}), text.replace("\ud800", "\ufffd"));
+  }
+});
+
+test("queued messages are batched and reach every subscriber", async (t) => {
+  const { transport, socket } = await connected(t, 1);
   const count = 3000;
   for (let n = 1; n <= count; n++) transport.send({ data: Buffer.from(String(n)) });
   const received = [];

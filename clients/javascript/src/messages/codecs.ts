@@ -11,6 +11,8 @@ import { pack, unpack, withWideIntegers } from "./packing.js";
 /** A payload as bytes. */
 export interface Encoded {
   readonly data: Buffer;
+  /** The same as a string, if it was made from one. */
+  readonly text?: string;
   readonly extension?: Extension;
   /** NaN and infinite numbers that became `null`. */
   readonly nonFinite?: number;
@@ -32,17 +34,18 @@ const json: Codec = {
   name: "json",
   number: 1,
   encode(payload) {
-    let data: Buffer | undefined;
+    let encoded: Encoded | undefined;
     try {
-      data = encodeJson(payload);
+      encoded = encodeJson(payload);
     } catch (error) {
       throw new EncodeError(`The payload has no form in JSON: ${(error as Error).message}`);
     }
-    if (!data) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
+    if (!encoded) throw new EncodeError(`"${typeof payload}" has no form in JSON.`);
+    const { data } = encoded;
     if (data.length > 2 * MAX_LEVELS && isTooDeep(payload))
       throw new EncodeError(`The payload can't be sent: ${TOO_DEEP}.`);
     const nonFinite = data.includes(NULL) ? countNonFinite(payload) : 0;
-    return { data, nonFinite };
+    return { ...encoded, nonFinite };
   },
   decode(data) {
     let value: unknown;
@@ -62,7 +65,7 @@ const string: Codec = {
   encode(payload) {
     if (typeof payload !== "string")
       throw new EncodeError(`A topic of type "string" takes strings, not "${typeof payload}".`);
-    return { data: Buffer.from(payload, "utf8") };
+    return { data: Buffer.from(payload, "utf8"), text: payload };
   },
   decode(data) {
     try {

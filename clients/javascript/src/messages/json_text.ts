@@ -23,12 +23,12 @@ for (let number = 0; number < 1000; number++) {
 }
 let scratch = Buffer.alloc(0);
 
-/** Return what `JSON.stringify` writes of a payload, as UTF-8; undefined if it has no JSON. Throws what that throws. */
-export function encodeJson(payload: unknown): Buffer | undefined {
+/** Return what `JSON.stringify` writes of a payload; undefined if it has no JSON. Throws what that throws. */
+export function encodeJson(payload: unknown): { data: Buffer; text?: string } | undefined {
   const quick = encodeLists(payload);
-  if (quick) return quick;
+  if (quick) return { data: quick };
   const text = JSON.stringify(payload) as string | undefined;
-  return text === undefined ? undefined : Buffer.from(text, "utf8");
+  return text === undefined ? undefined : { data: Buffer.from(text, "utf8"), text };
 }
 
 /** The JSON of a long list of numbers, or of a plain object with such lists; undefined for everything else. */

@@ -20,6 +20,9 @@ const immediate = (): Promise<void> => new Promise((resolve) => setImmediate(res
 type ReadableSocket = Dealer | Router | Subscriber | XPublisher;
 type WritableSocket = Dealer | Router | XPublisher;
 
+/** A part of a message to send; a string is sent as UTF-8. */
+export type Part = Buffer | string;
+
 /** How long a {@link Reader} may keep the process alive: not at all, for a moment, or until it is closed. */
 export type Hold = "none" | "brief" | "long";
 
@@ -91,7 +94,7 @@ class Reader {
 class Sender<T> {
   private readonly queue: T[] = [];
   /** Parts that zeromq.js refused because another send is under way. */
-  private unsent: Buffer[] | undefined;
+  private unsent: Part[] | undefined;
   private last: Promise<void> = Promise.resolve();
   private isInFlight = false;
   private readonly onSent = (): void => {
@@ -102,7 +105,7 @@ class Sender<T> {
   constructor(
     private readonly socket: WritableSocket,
     /** Takes entries from the queue, oldest first, and returns the parts of the next message. */
-    private readonly take: (queue: T[]) => Buffer[],
+    private readonly take: (queue: T[]) => Part[],
     /** Whether input must be read before the next message is taken. */
     private readonly mustRead: () => boolean = () => false,
   ) {}
@@ -146,7 +149,7 @@ class Sender<T> {
     });
   }
 
-  private trySend(parts: Buffer[]): boolean {
+  private trySend(parts: Part[]): boolean {
     try {
       // A ROUTER's EHOSTUNREACH, and a socket that is being closed: there is no peer any more.
       this.isInFlight = true;
@@ -316,7 +319,7 @@ export class XpubSocket<T> {
   constructor(
     sendMark: number,
     maxSubscriptionBytes: number,
-    take: (queue: T[]) => Buffer[],
+    take: (queue: T[]) => Part[],
     verbosity: "allSubs" | "allSubsUnsubs" = "allSubs",
   ) {
     this.socket = new XPublisher({ linger: 0, sendHighWaterMark: sendMark, maxMessageSize: maxSubscriptionBytes });
