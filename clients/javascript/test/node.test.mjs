@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { once } from "node:events";
 import { test } from "node:test";
+import { Publisher, Pull } from "zeromq";
 import * as nep from "../dist/index.mjs";
 import { hasMaster } from "./support/master.mjs";
 
@@ -123,6 +124,25 @@ test("without a master, calls time out and a warning is emitted", async (t) => {
   await node.close();
   assert.throws(() => new Node("x", { master: "no address" }), nep.NepError);
   assert.throws(() => new Node("a\nb"), nep.BadNameError);
+});
+
+test("a direct subscriber hears a publisher whose port another program's socket had before", async (t) => {
+  const pull = new Pull();
+  await pull.bind("tcp://127.0.0.1:*");
+  const endpoint = pull.lastEndpoint;
+  const isRejected = new Promise((resolve) => pull.events.on("disconnect", resolve));
+  const node = opened(t, "direct");
+  const received = new Promise((resolve) => {
+    node.new_sub("t", "string", resolve, node.direct("127.0.0.1", endpoint.split(":").at(-1)));
+  });
+  await isRejected;
+  pull.close();
+  const publisher = new Publisher();
+  t.after(() => publisher.close());
+  while (publisher.lastEndpoint !== endpoint) await publisher.bind(endpoint).catch(() => undefined);
+  const sending = setInterval(() => void publisher.send("t hello").catch(() => undefined), 20);
+  t.after(() => clearInterval(sending));
+  assert.equal(await received, "hello");
 });
 
 test("both module kinds have the same classes", async () => {

@@ -138,7 +138,7 @@ export class OriginalReader {
 
   async attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
     if (how === "bind") await this.socket.bind(endpoint);
-    else this.socket.connect(endpoint);
+    else this.socket.connectWatched(endpoint);
   }
 
   private read(parts: Buffer[]): void {

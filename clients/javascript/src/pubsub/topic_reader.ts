@@ -79,7 +79,7 @@ export class TopicReader {
   /** Bind or connect without a master. */
   async attach(endpoint: string, how: "bind" | "connect"): Promise<void> {
     if (how === "bind") await this.socket.bind(endpoint);
-    else this.socket.connect(endpoint);
+    else this.socket.connectWatched(endpoint);
   }
 
   /** These are all publishers of the topic: connect to new ones; others are silent. */

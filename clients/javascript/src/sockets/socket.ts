@@ -13,6 +13,7 @@ const BRIEF_RECEIVE_MS = 20;
 const POLL_MS = 10;
 const MAX_UNREAD_CALLS = 100; // of each client, in libzmq; more wait there
 const LOOK_INTERVAL_MS = 0.5;
+const RECONNECT_MS = 2000;
 const MAX_TURN_MS = 10; // then timers run: renewals of the lease above all
 
 const immediate = (): Promise<void> => new Promise((resolve) => setImmediate(resolve));
@@ -283,6 +284,23 @@ export class SubSocket {
 
   connect(endpoint: string): void {
     this.socket.connect(endpoint);
+  }
+
+  /** Connect to a program that no master lists, also after its address had a socket of another kind. */
+  connectWatched(endpoint: string): void {
+    let timer: NodeJS.Timeout | undefined;
+    const reconnect = (): void => {
+      if (this.socket.closed) return;
+      this.disconnect(endpoint);
+      this.connect(endpoint);
+    };
+    // libzmq connects again after every end, unless the handshake has failed.
+    this.socket.events.on("disconnect", () => {
+      clearTimeout(timer);
+      timer = setTimeout(reconnect, RECONNECT_MS).unref();
+    });
+    this.socket.events.on("connect:retry", () => clearTimeout(timer));
+    this.connect(endpoint);
   }
 
   bind(endpoint: string): Promise<string> {
