@@ -11,7 +11,7 @@ from nep.protocol.graph_view import Alert
 from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
 
-__all__ = ["BadRequests", "who_sends"]
+__all__ = ["BadRequests", "describe_sender"]
 
 _logger = logging.getLogger("nep.master")
 _LOG_BURST, _LOG_RATE_HZ = 10.0, 0.2
@@ -88,7 +88,7 @@ class BadRequests:
         return tuple(sorted(alerts, key=lambda each: each.id))
 
 
-def who_sends(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
+def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     """Return the key to count a sender by, and its name for messages.
 
     Connections that speak for a node (`node_id`) are counted by node. Others are counted by computer

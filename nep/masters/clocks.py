@@ -47,7 +47,7 @@ class Clocks:
         if own is None:
             return {}
         found: Differences = {}
-        for other in self._registry.far_from(member):
+        for other in self._registry.remote_nodes_of(member):
             if other.clock is not None:
                 uncertainty_ns = _uncertainty_ns(own, now) + _uncertainty_ns(other.clock, now)
                 found[other.node.id] = other.clock.offset_ns - own.offset_ns, uncertainty_ns

@@ -23,7 +23,7 @@ from nep.masters.leases import LEASE_S, Leases, RawRenewal
 from nep.masters.pattern_index import ALL_PATTERNS_MAX, PATTERNS_MAX
 from nep.masters.registry import (
     ALL_RECORDS_MAX,
-    ALWAYS_ROOM,
+    GUARANTEED_RECORDS,
     RECORDS_MAX,
     RegisteredNode,
     Registry,
@@ -171,9 +171,9 @@ class Graph:
             waiting, self._waiting = self._waiting, []
             for request, call, sender, is_foreign in waiting:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
-        out.extend(self.drop(self._leases.lapsed(now)))
+        out.extend(self.drop(self._leases.expired(now)))
         self._registry.departed.tick(now)
-        self._leases.set_pace(now)
+        self._leases.set_renew_interval(now)
         return tuple(out)
 
     @property
@@ -186,7 +186,7 @@ class Graph:
 
         A probe that can't be sent proves that its node is dead.
         """
-        return self.probes(self._leases.late(now))
+        return self.probes(self._leases.overdue(now))
 
     def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Return probes for the registered nodes among these."""
@@ -206,7 +206,7 @@ class Graph:
         """Return a snapshot of the graph."""
         return self._viewer.view(self.epoch)
 
-    def renew_quickly(self, said: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
+    def renew_fast(self, said: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
         """Handle a usual renewal of `sender` and return the newest message by publisher id.
 
         Return None if it must be handled by `apply`; it may have been handled in part.
@@ -302,7 +302,7 @@ class Graph:
             )
         self._check_pattern_limits(request)
         all_ = len(registry.publisher_owners) + len(registry.subscriber_owners)
-        if mine > max(own, ALWAYS_ROOM) and all_ + mine - own > ALL_RECORDS_MAX:
+        if mine > max(own, GUARANTEED_RECORDS) and all_ + mine - own > ALL_RECORDS_MAX:
             raise WireError(
                 _("the graph has {ALL_RECORDS_MAX} publishers and subscribers, which is the most").format(
                     ALL_RECORDS_MAX=ALL_RECORDS_MAX
@@ -417,7 +417,7 @@ class Graph:
             self._registry.add_subscriber(member, subscriber)
         for publisher in request.publishers:
             self._register_publisher(member, publisher, out, is_new=False)
-        topics = self._registry.topics_heard_by(member)
+        topics = self._registry.topics_received_by(member)
         found = [remote for topic in sorted(topics) for remote in self._registry.publishers_of(topic)]
         return Found(self.epoch, self.revision, tuple(found))
 
@@ -455,7 +455,7 @@ class Graph:
             return Renewed(self.epoch, self.revision, again=True)
         topics: Iterable[str] = ()
         if self._registry.publishers_revision > request.revision:
-            topics = sorted(self._registry.topics_heard_by(member))
+            topics = sorted(self._registry.topics_received_by(member))
         changed = tuple(
             TopicPublishers(topic, self._registry.publishers_of(topic))
             for topic in topics

@@ -13,7 +13,7 @@ from nep.masters.registry import Counts, RegisteredNode, Registry
 from nep.messages.packing import pack_saturated, unpack, unpack_bounded
 from nep.protocol.requests import RENEW_S
 
-__all__ = ["LEASE_S", "Leases", "RawRenewal", "is_renewal", "read_renewal", "renewed_body"]
+__all__ = ["LEASE_S", "Leases", "RawRenewal", "encode_renewed", "is_renewal", "read_renewal"]
 
 LEASE_S = 3.0
 """Lease of a node that renews every second; nodes with longer intervals have as much more."""
@@ -44,7 +44,7 @@ class Leases:
         self._slots: dict[int, int] = {}
         """Number of nodes per future slot."""
 
-    def set_pace(self, now: float) -> None:
+    def set_renew_interval(self, now: float) -> None:
         """Compute the renewal interval; each node gets it with its next renewal."""
         self._slots = {slot: count for slot, count in self._slots.items() if slot * _SLOT_S > now}
         if self._paced_revision == self._registry.revision:
@@ -76,11 +76,11 @@ class Leases:
         """Return True if the node missed a renewal."""
         return not member.is_managed and member.renewed_at + member.renew_s <= now - _LATE_AFTER_S
 
-    def late(self, now: float) -> list[str]:
+    def overdue(self, now: float) -> list[str]:
         """Return the nodes that missed a renewal."""
         return self._overdue(now, _LATE_AFTER_S)
 
-    def lapsed(self, now: float) -> list[str]:
+    def expired(self, now: float) -> list[str]:
         """Return the nodes whose lease has expired."""
         return self._overdue(now, self._grace_s)
 
@@ -150,7 +150,7 @@ def _parse_clock(value: Any) -> tuple[int, ...] | None:  # noqa: ANN401 - untrus
     return tuple(value)
 
 
-def renewed_body(
+def encode_renewed(
     call: int,
     epoch: int,
     revision: int,

@@ -91,7 +91,7 @@ class ListenAddresses:
         for host in self._bound - self._available_hosts(chosen, here):
             self._unbind(host)
 
-    def follow(self) -> tuple[Alert, ...]:
+    def refresh(self) -> tuple[Alert, ...]:
         """Update the bindings to this computer's current addresses. Return alerts for lost addresses."""
         if not self.hosts:
             return ()

@@ -56,7 +56,7 @@ class PatternIndex(Generic[T]):
             for topic in self._topics.pop(pattern):
                 self._discard(topic, pattern)
 
-    def topic_came(self, topic: str) -> None:
+    def add_topic(self, topic: str) -> None:
         """Add a newly published topic."""
         if topic in self._patterns:
             return
@@ -66,7 +66,7 @@ class PatternIndex(Generic[T]):
             for pattern in found:
                 self._topics[pattern].add(topic)
 
-    def topic_went(self, topic: str) -> None:
+    def remove_topic(self, topic: str) -> None:
         """Remove a topic without publishers."""
         for pattern in self._patterns.pop(topic, ()):
             self._topics[pattern].discard(topic)

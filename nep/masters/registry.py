@@ -34,7 +34,7 @@ from nep.text import control_in, escaped, shortened
 
 __all__ = [
     "ALL_RECORDS_MAX",
-    "ALWAYS_ROOM",
+    "GUARANTEED_RECORDS",
     "RECORDS_MAX",
     "Counts",
     "NodeClock",
@@ -52,7 +52,7 @@ RECORDS_MAX = 5_000
 """Maximum number of publishers and subscribers of one node."""
 ALL_RECORDS_MAX = 20_000
 """Maximum number of publishers and subscribers of all nodes."""
-ALWAYS_ROOM = 100
+GUARANTEED_RECORDS = 100
 """Number of publishers and subscribers that every node may have in any case, so that none is locked out."""
 _ENDPOINTS_MAX = 32
 _PID_MAX = 2**32 - 1
@@ -67,7 +67,7 @@ _MAX_HUNG = 100
 _MAX_CORES = 100_000.0
 _MAX_PROBLEM_LENGTH = 500
 """Maximum length of a problem reported by a node."""
-FADES_S = 12.0
+RATE_DECAY_S = 12.0
 """Time after its last message in which a publisher's rate may still fall."""
 Counts = Sequence[Mapping[str, Any]]
 """Received statistics, with the fields of `PublisherCount` or `SubscriberCount`."""
@@ -123,8 +123,8 @@ class RegisteredNode:
         subscribers: Subscribers by id.
         hung: Ids of nodes whose publishers it did not answer.
         cpu_ratio: CPU usage of its process.
-        heard: Publishers that it receives, cached by `Registry.heard_by`.
-        heard_at: Version of the cache.
+        heard: Publishers that it receives, cached by `Registry.sources_of`.
+        sources_version: Version of the cache.
         far: Their nodes that are not known to be on the same computer.
         clock: Its clock, or None if unknown.
     """
@@ -139,7 +139,7 @@ class RegisteredNode:
     hung: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
     heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
-    heard_at: int = -1
+    sources_version: int = -1
     far: tuple[RegisteredNode, ...] = ()
     clock: NodeClock | None = None
 
@@ -207,7 +207,7 @@ class Registry:
         """Return the topics that a subscriber receives; for a pattern, the published ones that match."""
         return self.patterns.topics_of(record.topic) if record.pattern else {record.topic}
 
-    def topics_heard_by(self, member: RegisteredNode) -> set[str]:
+    def topics_received_by(self, member: RegisteredNode) -> set[str]:
         """Return the topics that a node's subscribers receive."""
         return {
             topic for subscriber in member.subscribers.values() for topic in self.topics_of(subscriber.record)
@@ -221,12 +221,12 @@ class Registry:
         """Return the revision of the last change of a topic's publishers."""
         return self._topic_revisions.get(topic, 0)
 
-    def heard_by(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
+    def sources_of(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
         """Return all publishers, also recent ones, that the node's subscribers can (or could) connect to."""
         version = self.revision + self.departed.changes
-        if member.heard_at != version:
-            member.heard_at = version
-            topics = self.topics_heard_by(member)
+        if member.sources_version != version:
+            member.sources_version = version
+            topics = self.topics_received_by(member)
             names = {subscriber.record.topic for subscriber in member.subscribers.values()}
             member.heard = {known: gone for name in names for known, gone in self.departed.of(name).items()}
             member.heard |= {
@@ -240,17 +240,17 @@ class Registry:
             member.far = tuple(each for each in owners.values() if not own or each.node.computer != own)
         return member.heard
 
-    def far_from(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
+    def remote_nodes_of(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
         """Return the nodes of these publishers that are on other computers."""
-        self.heard_by(member)
+        self.sources_of(member)
         return member.far
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
-        """Return the newest message by publisher id for all publishers of `heard_by`.
+        """Return the newest message by publisher id for all publishers of `sources_of`.
 
         Includes recently unregistered ones: the node may have been disconnected when they closed.
         """
-        return {known: publisher.last_seq for known, publisher in self.heard_by(member).items()}
+        return {known: publisher.last_seq for known, publisher in self.sources_of(member).items()}
 
     # ---- changing
 
@@ -290,7 +290,7 @@ class Registry:
         member.publishers[record.id] = RegisteredPublisher(record)
         self.publisher_owners[record.id] = member
         self._publishing.setdefault(record.topic, {})[record.id] = member
-        self.patterns.topic_came(record.topic)
+        self.patterns.add_topic(record.topic)
         self._bump_revision(record.topic)
         return True
 
@@ -316,7 +316,7 @@ class Registry:
             self.departed.add(self._names_of(gone.record.topic), publisher, gone)
         _discard(self._publishing, gone.record.topic, publisher)
         if gone.record.topic not in self._publishing:
-            self.patterns.topic_went(gone.record.topic)
+            self.patterns.remove_topic(gone.record.topic)
         self._bump_revision(gone.record.topic)
         self._discard_unused(gone.record.topic)
         return gone.record
@@ -406,7 +406,7 @@ class Registry:
             publisher.changed_at = now
             publisher.count, publisher.bytes = count, size_bytes
             self.touched.add(publisher.record.topic)
-        elif now - publisher.changed_at < FADES_S:
+        elif now - publisher.changed_at < RATE_DECAY_S:
             self.touched.add(publisher.record.topic)
         publisher.meter.add(now, count, size_bytes)
 

@@ -15,9 +15,9 @@ import zmq
 
 from nep.errors import ClosedError, NepError, WaitTimeoutError, WireError
 from nep.i18n import _
-from nep.masters.bad_requests import BadRequests, who_sends
+from nep.masters.bad_requests import BadRequests, describe_sender
 from nep.masters.graph import Graph, Outgoing, with_hosts, without
-from nep.masters.leases import is_renewal, read_renewal, renewed_body
+from nep.masters.leases import encode_renewed, is_renewal, read_renewal
 from nep.masters.listen_addresses import ListenAddresses
 from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
@@ -218,7 +218,7 @@ class MasterServer:
             self._report_lost_addresses()
 
     def _report_lost_addresses(self) -> None:
-        self._graph.apply(ReportAlerts("listening", self._listening.follow()), 0, time.monotonic(), "")
+        self._graph.apply(ReportAlerts("listening", self._listening.refresh()), 0, time.monotonic(), "")
 
     def _is_needed(self) -> bool:
         # A node of another process than the owner's and this one is registered.
@@ -263,25 +263,25 @@ class MasterServer:
     def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # A failing renewal takes the general path, which replies.
         try:
-            return self._renew_quickly(sender, body, came_ns)
+            return self._renew_fast(sender, body, came_ns)
         except Exception as error:  # noqa: BLE001 - logged; other renewals go on
             self._log_failure(error, "a renewal")
             return None
 
-    def _renew_quickly(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
+    def _renew_fast(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # None if it is not a usual renewal.
         renewal = read_renewal(body)
         if renewal is None:
             return None
         graph = self._graph
         now = time.monotonic()
-        last_seqs = graph.renew_quickly(renewal, now, _name_of(sender))
+        last_seqs = graph.renew_fast(renewal, now, _name_of(sender))
         if last_seqs is None:
             return None
         member = graph.members[renewal.node_id]
         clocks = graph.clocks.differences(member, now)
         times = () if renewal.clock is None else graph.clocks.times(member, came_ns)
-        return renewed_body(
+        return encode_renewed(
             renewal.call,
             graph.epoch,
             graph.revision,
@@ -302,7 +302,7 @@ class MasterServer:
         if reason:
             member = self._graph.node_at(name)
             node_id, node_name = ("", "") if member is None else (member.node.id, member.node.name)
-            self._bad_requests.add(*who_sends(node_id, node_name, peer), reason, time.monotonic())
+            self._bad_requests.add(*describe_sender(node_id, node_name, peer), reason, time.monotonic())
 
     def _apply(self, asked: ReceivedRequest, sender: str) -> str:
         # An empty sender is this process. Returns the reason of a rejection, or "".

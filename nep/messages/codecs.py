@@ -50,7 +50,7 @@ __all__ = [
     "codec",
     "codec_for",
     "codec_numbered",
-    "nan_in",
+    "find_nan",
     "numpy_option",
     "ordinary",
 ]
@@ -336,12 +336,12 @@ class JsonEncoder:
         encoded_payload = self._encode(payload)
         data = encoded_payload.data
         if type(data) is bytes and data.rfind(NULL) >= 0:
-            self.look(payload)
+            self.check_for_nan(payload)
         return encoded_payload
 
-    def look(self, payload: object) -> None:
+    def check_for_nan(self, payload: object) -> None:
         """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log them."""
-        if _may_have_nan(payload) and (where := nan_in(payload)) is not None:
+        if _may_have_nan(payload) and (where := find_nan(payload)) is not None:
             self.count += 1
             now = self._clock()
             if now - self._warned_at >= NAN_WARNING_INTERVAL_S:
@@ -364,7 +364,7 @@ def _may_have_nan(payload: object) -> bool:
         return True
 
 
-def nan_in(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None:
+def find_nan(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None:
     """Return the path of the first NaN or infinity, such as "pose.x" or "joints[3]", or None."""
     if isinstance(value, float):
         return None if math.isfinite(value) else path
@@ -379,9 +379,9 @@ def nan_in(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None
         parts = ((f"{path}.{name}" if path else name, getattr(value, name, None)) for name in names)
     else:
         to_list = getattr(value, "tolist", None)  # numpy
-        return nan_in(to_list(), path, depth - 1) if callable(to_list) else None
+        return find_nan(to_list(), path, depth - 1) if callable(to_list) else None
     for where, each in parts:
-        found = nan_in(each, where, depth - 1)
+        found = find_nan(each, where, depth - 1)
         if found is not None:
             return found
     return None

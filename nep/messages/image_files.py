@@ -22,11 +22,11 @@ MOST_BYTES = 750_000_000
 """Maximum memory for the pixels and the decoder's buffers."""
 _DECODER_COPIES = 2
 """Copies of the pixels that OpenCV holds while decoding (measured with 4.14, JPEG and PNG)."""
-MOST_SCANS = 100
+MAX_SCANS = 100
 """Maximum number of scans of a progressive JPEG; encoders write about ten."""
-MOST_SCANNED = 1_200_000_000
+MAX_SCANNED_PIXELS = 1_200_000_000
 """Maximum number of pixels times scans, which limits decoding to a few seconds."""
-MOST_PIECES = 100_000
+MAX_SEGMENTS = 100_000
 """Maximum number of JPEG segments or PNG chunks; encoders write them of 8 kB and more."""
 
 _JPEG = b"\xff\xd8\xff"
@@ -157,7 +157,7 @@ class _Jpeg(_Reader):
 
     def read(self) -> ImageFile:
         frame, orientation, at = None, 1, 2
-        for _piece in range(MOST_PIECES):
+        for _piece in range(MAX_SEGMENTS):
             marker, at = self._marker(at)
             if marker in _MARKERS_WITHOUT_LENGTH:
                 continue
@@ -216,7 +216,7 @@ class _Jpeg(_Reader):
         if is_refined:
             # a scan of a few bytes makes the decoder process all pixels again
             scans = bytes(self.data[at:]).count(b"\xff\xda") + 1
-            if scans > MOST_SCANS or scans * frame.width * frame.height > MOST_SCANNED:
+            if scans > MAX_SCANS or scans * frame.width * frame.height > MAX_SCANNED_PIXELS:
                 reason = _("{width} × {height} pixels in {scans} passes take too long").format(  # noqa: RUF001
                     width=frame.width, height=frame.height, scans=scans
                 )
@@ -278,7 +278,7 @@ class _Png(_Reader):
         needed: list[tuple[int, int]] = []
         kinds: set[bytes] = set()
         orientation, at = 1, 8
-        for _piece in range(MOST_PIECES):
+        for _piece in range(MAX_SEGMENTS):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
             if kind == b"IHDR" and kind in kinds:
                 raise self.broken(_("it has two heads"))

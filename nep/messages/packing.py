@@ -9,7 +9,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.i18n import _
 
-__all__ = ["pack", "pack_saturated", "saturated", "unpack", "unpack_bounded", "unpack_first"]
+__all__ = ["clamp_int", "pack", "pack_saturated", "unpack", "unpack_bounded", "unpack_first"]
 
 _Value = TypeVar("_Value")
 _MIN_INT, _MAX_INT = -(2**63), 2**64 - 1
@@ -30,7 +30,7 @@ def pack(value: object, default: Callable[[object], object] | None = None) -> by
     return packed
 
 
-def saturated(value: object) -> int:
+def clamp_int(value: object) -> int:
     """Return the nearest int that msgpack can encode. Raises `TypeError` for other types."""
     if not isinstance(value, int):
         raise TypeError(_("a '{kind}' has no form in msgpack").format(kind=type(value).__name__))
@@ -42,7 +42,7 @@ def pack_saturated(value: object) -> bytes:
 
     Values from the network can't make it raise: ints saturate, lone surrogates become "?".
     """
-    packed: bytes = msgpack.packb(value, use_bin_type=True, unicode_errors="replace", default=saturated)
+    packed: bytes = msgpack.packb(value, use_bin_type=True, unicode_errors="replace", default=clamp_int)
     return packed
 
 

@@ -17,17 +17,17 @@ from nep.text import escaped, shortened
 __all__ = [
     "ANYTHING",
     "SCALARS",
-    "Misfit",
+    "ShapeMismatch",
     "ValueShape",
     "enum_shape",
     "list_shape",
     "literal_shape",
     "map_shape",
-    "missing",
+    "missing_value",
     "shown",
     "tuple_shape",
     "union_shape",
-    "wrong",
+    "wrong_type",
 ]
 
 _MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
@@ -36,7 +36,7 @@ _MAX_TEXT_LENGTH = 100
 """Maximum length of a key or value in a message."""
 
 
-class Misfit(Exception):  # noqa: N818 - internal
+class ShapeMismatch(Exception):  # noqa: N818 - internal
     """Value that doesn't match its shape. `steps` is the path to it, innermost first."""
 
     def __init__(self, reason: str) -> None:
@@ -44,7 +44,7 @@ class Misfit(Exception):  # noqa: N818 - internal
         self.steps: list[str] = []
         super().__init__(reason)
 
-    def inside(self, name: object) -> Misfit:
+    def in_field(self, name: object) -> ShapeMismatch:
         """Add the field `name` of the enclosing value to the path, and return self."""
         self.steps.append(f".{escaped(shortened(str(name), _MAX_TEXT_LENGTH))}")
         return self
@@ -65,10 +65,10 @@ class ValueShape:
     """Reader and writer of the values of one type.
 
     Created empty and filled later, because a dataclass may have fields of its own type. `read` converts a
-    JSON value, `write` converts to one; both raise `Misfit`.
+    JSON value, `write` converts to one; both raise `ShapeMismatch`.
     """
 
-    __slots__ = ("_describe", "as_it_is", "forms", "name", "read", "write")
+    __slots__ = ("_describe", "json_types", "name", "read", "unchanged_type", "write")
 
     read: Callable[[Any], Any]
     write: Callable[[Any], Any]
@@ -76,31 +76,31 @@ class ValueShape:
     def __init__(
         self,
         name: str,
-        as_it_is: type | None = None,
-        forms: Iterable[type] = (),
-        say: Callable[[], str] | None = None,
+        unchanged_type: type | None = None,
+        json_types: Iterable[type] = (),
+        describe: Callable[[], str] | None = None,
     ) -> None:
         self.name = name
-        self.forms = frozenset(forms) if as_it_is is None else frozenset({as_it_is})
+        self.json_types = frozenset(json_types) if unchanged_type is None else frozenset({unchanged_type})
         """Python types of the values in JSON; empty for any."""
-        self.as_it_is = as_it_is
+        self.unchanged_type = unchanged_type
         """Type whose instances are read unchanged, or None."""
-        self._describe = say
+        self._describe = describe
 
     @property
-    def says(self) -> str:
+    def expected(self) -> str:
         """Description of the expected value, such as "a 'float'", in the current language."""
         return _("a '{name}'").format(name=self.name) if self._describe is None else self._describe()
 
 
-def wrong(value: object, says: str) -> Misfit:
-    """Return the misfit of a value of a wrong type."""
-    return Misfit(_("is a '{kind}'; give {wanted}").format(kind=type(value).__name__, wanted=says))
+def wrong_type(value: object, expected: str) -> ShapeMismatch:
+    """Return the mismatch of a value of a wrong type."""
+    return ShapeMismatch(_("is a '{kind}'; give {wanted}").format(kind=type(value).__name__, wanted=expected))
 
 
-def missing(shape: ValueShape) -> Misfit:
-    """Return the misfit of a missing value."""
-    return Misfit(_("is missing; give {wanted}").format(wanted=shape.says))
+def missing_value(shape: ValueShape) -> ShapeMismatch:
+    """Return the mismatch of a missing value."""
+    return ShapeMismatch(_("is missing; give {wanted}").format(wanted=shape.expected))
 
 
 def shown(value: object) -> str:
@@ -135,8 +135,8 @@ def _float() -> ValueShape:
             try:
                 return float(plain)
             except OverflowError:
-                raise Misfit(_("is too large; give {wanted}").format(wanted=shape.says)) from None
-        raise wrong(value, shape.says)
+                raise ShapeMismatch(_("is too large; give {wanted}").format(wanted=shape.expected)) from None
+        raise wrong_type(value, shape.expected)
 
     shape.read, shape.write = read, write
     return shape
@@ -148,14 +148,14 @@ def _int() -> ValueShape:
     def read(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool):
             return value
-        raise wrong(value, shape.says)
+        raise wrong_type(value, shape.expected)
 
     def write(value: object) -> int:
         plain = value if isinstance(value, int) else _of_numpy(value)
         if not isinstance(plain, int) or isinstance(plain, bool):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         if not _MIN_INT <= plain <= _MAX_INT:
-            raise Misfit(_("is beyond 64 bits; give {wanted}").format(wanted=shape.says))
+            raise ShapeMismatch(_("is beyond 64 bits; give {wanted}").format(wanted=shape.expected))
         return int(plain)
 
     shape.read, shape.write = read, write
@@ -168,11 +168,11 @@ def _str() -> ValueShape:
     def read(value: object) -> str:
         if isinstance(value, str):
             return value
-        raise wrong(value, shape.says)
+        raise wrong_type(value, shape.expected)
 
     def write(value: object) -> str:
         if not isinstance(value, str):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         if not value.isascii():
             _check_letters(value)
         return str(value)
@@ -185,7 +185,7 @@ def _check_letters(value: str) -> None:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
-        raise Misfit(_("holds half of a surrogate pair; give whole letters")) from None
+        raise ShapeMismatch(_("holds half of a surrogate pair; give whole letters")) from None
 
 
 def _bool() -> ValueShape:
@@ -195,18 +195,18 @@ def _bool() -> ValueShape:
         plain = value if isinstance(value, bool) else _of_numpy(value)
         if isinstance(plain, bool):
             return plain
-        raise wrong(value, shape.says)
+        raise wrong_type(value, shape.expected)
 
     shape.read = shape.write = both
     return shape
 
 
 def _none() -> ValueShape:
-    shape = ValueShape("None", forms={type(None)}, say=lambda: "None")
+    shape = ValueShape("None", json_types={type(None)}, describe=lambda: "None")
 
     def both(value: object) -> None:
         if value is not None:
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
 
     shape.read = shape.write = both
     return shape
@@ -223,7 +223,7 @@ def _any_shape() -> ValueShape:
 
 
 def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
-    shape = ValueShape(kind.__name__, forms={str})
+    shape = ValueShape(kind.__name__, json_types={str})
 
     def is_one(value: object) -> bool:
         return isinstance(value, kind) and (kind is not date or not isinstance(value, datetime))
@@ -232,12 +232,12 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
         if is_one(value):  # msgpack has times
             return value
         if not isinstance(value, str):
-            raise wrong(value, _("text such as {example}").format(example=_EXAMPLES[kind]))
+            raise wrong_type(value, _("text such as {example}").format(example=_EXAMPLES[kind]))
         whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
             return kind.fromisoformat(whole)
         except ValueError:
-            raise Misfit(
+            raise ShapeMismatch(
                 _("is {value}; give text such as {example}").format(
                     value=shown(value), example=_EXAMPLES[kind]
                 )
@@ -245,7 +245,7 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
 
     def write(value: Any) -> str:  # noqa: ANN401 - checked here
         if not is_one(value):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         return str(value.isoformat())
 
     shape.read, shape.write = read, write
@@ -287,14 +287,16 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
         (each is None or isinstance(each, str | int)) and not isinstance(each, Enum) for each in values
     ):
         return None
-    forms = map(type, values)
-    shape = ValueShape("Literal", forms=forms, say=lambda: listed([repr(each) for each in values], "or"))
+    json_types = map(type, values)
+    shape = ValueShape(
+        "Literal", json_types=json_types, describe=lambda: listed([repr(each) for each in values], "or")
+    )
 
     def both(value: object) -> object:
         for each in values:
             if _is_same(value, each):
                 return each
-        raise Misfit(_("is {value}; give {wanted}").format(value=shown(value), wanted=shape.says))
+        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=shown(value), wanted=shape.expected))
 
     shape.read = shape.write = both
     return shape
@@ -305,7 +307,7 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
     members = list(kind)
     if not all(isinstance(each.value, str | int | float | None) for each in members):
         return None
-    shape = ValueShape(kind.__name__, forms=(type(each.value) for each in members))
+    shape = ValueShape(kind.__name__, json_types=(type(each.value) for each in members))
     is_flag = issubclass(kind, Flag)
 
     def read(value: object) -> object:
@@ -317,12 +319,12 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
                 return kind(value)
             except ValueError:
                 pass
-        wanted = shape.says if is_flag else listed([repr(each.value) for each in members], "or")
-        raise Misfit(_("is {value}; give {wanted}").format(value=shown(value), wanted=wanted))
+        wanted = shape.expected if is_flag else listed([repr(each.value) for each in members], "or")
+        raise ShapeMismatch(_("is {value}; give {wanted}").format(value=shown(value), wanted=wanted))
 
     def write(value: object) -> object:
         if not isinstance(value, kind):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         return value.value
 
     shape.read, shape.write = read, write
@@ -334,28 +336,30 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
 
     The first member that matches is read; None comes first, because null would otherwise be NaN.
     """
-    forms = [form for each in shapes for form in each.forms]
-    if len(forms) > len(set(forms)):
+    json_types = [form for each in shapes for form in each.json_types]
+    if len(json_types) > len(set(json_types)):
         return None
     none = SCALARS[None]
     others = [each for each in shapes if each.name != none.name]
-    others.sort(key=lambda each: float in each.forms)  # float accepts ints, too
+    others.sort(key=lambda each: float in each.json_types)  # float accepts ints, too
     nones = [none] if len(others) < len(shapes) else []
     ordered = [*nones, *others]
     shape = ValueShape(
-        "Union", forms=forms, say=lambda: listed([each.says for each in (*others, *nones)], "or")
+        "Union",
+        json_types=json_types,
+        describe=lambda: listed([each.expected for each in (*others, *nones)], "or"),
     )
 
     def first(value: object, ways: Sequence[Callable[[Any], Any]]) -> object:
-        misfit = None
+        mismatch = None
         for way in ways:
             try:
                 return way(value)
-            except Misfit as found:
-                misfit = found
-        if misfit is not None and misfit.steps and len(others) == 1:
-            raise misfit  # has the path inside the member
-        raise wrong(value, shape.says)
+            except ShapeMismatch as found:
+                mismatch = found
+        if mismatch is not None and mismatch.steps and len(others) == 1:
+            raise mismatch  # has the path inside the member
+        raise wrong_type(value, shape.expected)
 
     # looked up at use: a dataclass may be filled later
     shape.read = lambda value: first(value, [each.read for each in ordered])
@@ -371,33 +375,33 @@ def _convert_items(way: Callable[[Any], Any], values: Iterable[Any], first: int 
     try:
         for each in values:
             converted.append(way(each))  # noqa: PERF401 - the length gives the index for the error
-    except Misfit as misfit:
-        misfit.steps.append(f"[{first + len(converted)}]")
+    except ShapeMismatch as mismatch:
+        mismatch.steps.append(f"[{first + len(converted)}]")
         raise
     return converted
 
 
-def _items(value: object, says: str) -> list[Any] | tuple[Any, ...]:
+def _items(value: object, expected: str) -> list[Any] | tuple[Any, ...]:
     plain = value if isinstance(value, list | tuple) else _of_numpy(value)
     if not isinstance(plain, list | tuple):
-        raise wrong(value, says)
+        raise wrong_type(value, expected)
     return plain
 
 
 def list_shape(item: ValueShape, kind: type) -> ValueShape:
     """Return the shape of a list or tuple (`kind`) of any length."""
-    shape = ValueShape(kind.__name__, forms={list})
-    exact = {item.as_it_is} - {None}
+    shape = ValueShape(kind.__name__, json_types={list})
+    exact = {item.unchanged_type} - {None}
 
     def read(value: object) -> object:
-        values = _items(value, shape.says)
+        values = _items(value, shape.expected)
         # fast path for thousands of numbers; the list is copied because it may be shared
         converted = values if exact and set(map(type, values)) <= exact else _convert_items(item.read, values)
         return kind(converted)
 
     def write(value: object) -> object:
-        values = _items(value, shape.says)
-        if item.as_it_is is float and set(map(type, values)) <= exact:
+        values = _items(value, shape.expected)
+        if item.unchanged_type is float and set(map(type, values)) <= exact:
             return list(values)
         return _convert_items(item.write, values)
 
@@ -407,12 +411,16 @@ def list_shape(item: ValueShape, kind: type) -> ValueShape:
 
 def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
     """Return the shape of a tuple with fixed items."""
-    shape = ValueShape("tuple", forms={list}, say=lambda: _("{count} values").format(count=len(items)))
+    shape = ValueShape(
+        "tuple", json_types={list}, describe=lambda: _("{count} values").format(count=len(items))
+    )
 
     def each(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
-        values = _items(value, shape.says)
+        values = _items(value, shape.expected)
         if len(values) != len(ways):
-            raise Misfit(_("has {count} values; give {wanted}").format(count=len(values), wanted=shape.says))
+            raise ShapeMismatch(
+                _("has {count} values; give {wanted}").format(count=len(values), wanted=shape.expected)
+            )
         converted: list[Any] = []
         for way, part in zip(ways, values, strict=True):
             converted += _convert_items(way, (part,), len(converted))
@@ -425,18 +433,18 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
 
 def map_shape(item: ValueShape) -> ValueShape:
     """Return the shape of a map with text keys."""
-    shape = ValueShape("dict", forms={dict})
+    shape = ValueShape("dict", json_types={dict})
     word = SCALARS[str]
 
     def each(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:
         if not isinstance(value, Mapping):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         converted: dict[str, Any] = {}
         for key, part in value.items():
             try:
                 converted[word.write(key)] = way(part)
-            except Misfit as misfit:
-                raise misfit.inside(key) from misfit.__cause__
+            except ShapeMismatch as mismatch:
+                raise mismatch.in_field(key) from mismatch.__cause__
         return converted
 
     shape.read = lambda value: each(value, item.read)

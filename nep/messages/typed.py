@@ -34,16 +34,16 @@ from nep.messages.message import UNDECODED, Message, MessageKind, new_message
 from nep.messages.shapes import (
     ANYTHING,
     SCALARS,
-    Misfit,
+    ShapeMismatch,
     ValueShape,
     enum_shape,
     list_shape,
     literal_shape,
     map_shape,
-    missing,
+    missing_value,
     tuple_shape,
     union_shape,
-    wrong,
+    wrong_type,
 )
 from nep.system.arguments import text
 from nep.text import escaped, shortened
@@ -125,15 +125,15 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
             raise EncodeError(
                 declared.name,
                 type(payload).__name__,
-                _("publish {wanted}").format(wanted=declared.shape.says),
+                _("publish {wanted}").format(wanted=declared.shape.expected),
             )
 
     def encode(payload: object) -> Any:  # noqa: ANN401 - an `Encoded`
         check(payload)
         try:
             return base.encode(write(payload))
-        except Misfit as misfit:
-            place, reason = misfit.place, misfit.sentence
+        except ShapeMismatch as mismatch:
+            place, reason = mismatch.place, mismatch.sentence
         except RecursionError:
             place, reason = "", _("it holds itself, or too many levels")
         raise EncodeError(declared.name, type(payload).__name__, reason, place)
@@ -174,8 +174,8 @@ class TypedReader:
             plain = decode(data, extension)
             try:
                 return shape.read(plain)
-            except Misfit as misfit:
-                reason = misfit.sentence
+            except ShapeMismatch as mismatch:
+                reason = mismatch.sentence
             except RecursionError:
                 reason = _("it has too many levels")
             raise DecodeError(name, memoryview(data).nbytes, reason)
@@ -217,7 +217,7 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
     if hint in known:
         return known[hint]
     if is_dataclass(hint) or _is_typed_dict(hint):
-        shape = known[hint] = ValueShape(hint.__name__, forms={dict})
+        shape = known[hint] = ValueShape(hint.__name__, json_types={dict})
         (_fill_map if _is_typed_dict(hint) else _fill_dataclass)(shape, hint, known)
         return shape
     if issubclass(hint, Enum):
@@ -310,9 +310,9 @@ class _Entry(NamedTuple):
 
 
 def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) -> dict[str, Any]:
-    # Raises `Misfit` for a missing required field.
+    # Raises `ShapeMismatch` for a missing required field.
     if not isinstance(value, Mapping):
-        raise wrong(value, _("a map of the fields of '{name}'").format(name=whole.name))
+        raise wrong_type(value, _("a map of the fields of '{name}'").format(name=whole.name))
     values: dict[str, Any] = {}
     name = ""
     try:
@@ -322,9 +322,9 @@ def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) ->
             elif other_name in value:
                 values[name] = shape.read(value[other_name])
             elif is_required:
-                raise missing(shape)
-    except Misfit as misfit:
-        raise misfit.inside(name) from misfit.__cause__
+                raise missing_value(shape)
+    except ShapeMismatch as mismatch:
+        raise mismatch.in_field(name) from mismatch.__cause__
     return values
 
 
@@ -350,13 +350,13 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, declared):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         values: dict[str, Any] = {}
         for name, field_shape in written:
             try:
                 values[name] = field_shape.write(getattr(value, name))
-            except Misfit as misfit:
-                raise misfit.inside(name) from misfit.__cause__
+            except ShapeMismatch as mismatch:
+                raise mismatch.in_field(name) from mismatch.__cause__
         return values
 
     shape.read, shape.write = read, write
@@ -378,7 +378,7 @@ def _construct(declared: type, given: Mapping[str, object]) -> object:
     try:
         return declared(**given)
     except Exception as error:
-        raise Misfit(  # `__post_init__` may raise anything
+        raise ShapeMismatch(  # `__post_init__` may raise anything
             _("is refused by '{name}': {error}").format(
                 name=declared.__name__, error=escaped(shortened(str(error), 2 * _MAX_NAME_LENGTH))
             )
@@ -398,13 +398,13 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):
-            raise wrong(value, shape.says)
+            raise wrong_type(value, shape.expected)
         values: dict[str, Any] = {}
         name: object = ""
         try:
             for name, part in value.items():
                 if name not in shapes:
-                    raise Misfit(
+                    raise ShapeMismatch(
                         _("is no field of '{name}'; {did_you_mean}").format(
                             name=declared.__name__, did_you_mean=did_you_mean(str(name), tuple(shapes))
                         )
@@ -412,9 +412,9 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
                 values[str(name)] = shapes[str(name)][0].write(part)
             for name, (field_shape, is_required) in shapes.items():
                 if is_required and name not in values:
-                    raise missing(field_shape)
-        except Misfit as misfit:
-            raise misfit.inside(name) from misfit.__cause__
+                    raise missing_value(field_shape)
+        except ShapeMismatch as mismatch:
+            raise mismatch.in_field(name) from mismatch.__cause__
         return values
 
     shape.read = lambda value: _read_fields(value, entries, shape)

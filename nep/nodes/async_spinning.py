@@ -39,7 +39,7 @@ async def spin(work: Work, timeout_s: float | None) -> None:
                 if not turns:
                     await give_way()
                 continue
-            await waiter.rest(min(work.due_s, deadline - work.clock()))
+            await waiter.wait(min(work.due_s, deadline - work.clock()))
         work.check_not_forked()
     finally:
         work.unwatch(waiter)
@@ -88,7 +88,7 @@ class _LoopWaiter:
         with suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(self._ready.set)
 
-    async def rest(self, timeout_s: float) -> None:
+    async def wait(self, timeout_s: float) -> None:
         # Wait until there may be work, at most `timeout_s`.
         for subscriber in self._work.waiting:
             if subscriber not in self._watched:

@@ -375,7 +375,7 @@ class LogHandler(logging.Handler):
         return LogRecord("warning", text, "nep.log", self._node, time.time_ns(), pid=os.getpid()).to_plain()
 
 
-def handler_of(node: LogNode) -> LogHandler:
+def new_log_handler(node: LogNode) -> LogHandler:
     """Return a handler that publishes on `LOG_TOPIC` as the given node."""
     return LogHandler(
         node.name,

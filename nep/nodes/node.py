@@ -35,7 +35,7 @@ from nep.nodes.arguments import at_least, flag, function, limit, one_of, period,
 from nep.nodes.async_spinning import spin as spin_in_loop
 from nep.nodes.backend_checks import codec_with, history_for, is_pattern_for, quality_for
 from nep.nodes.executor import spin_all
-from nep.nodes.log_handler import LogHandler, handler_of
+from nep.nodes.log_handler import LogHandler, new_log_handler
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
@@ -521,7 +521,7 @@ class Node(ServiceNode):
         Add it to a logger to publish everything that is logged there.
         """
         with self._lock:
-            self._log_handler = self._log_handler or handler_of(self)
+            self._log_handler = self._log_handler or new_log_handler(self)
             return self._log_handler
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:

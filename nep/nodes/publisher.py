@@ -185,7 +185,7 @@ class Publisher:
 
     def _install_fast_publish(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
         # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
-        on_null = None if self._json_encoder is None else self._json_encoder.look
+        on_null = None if self._json_encoder is None else self._json_encoder.check_for_nan
         kind = bytes if self._spec.codec.name == "bytes" else None
         fast_publish = transport.quick_publish(QuickPublish(self, kind, encode, on_null, self.publish))
         fast_publish.__doc__ = Publisher.publish.__doc__

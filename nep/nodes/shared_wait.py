@@ -26,7 +26,7 @@ class _ReadyCallback:
 
     def wake(self) -> None:
         # Thread-safe.
-        self._waits.ring(self._subscriber)
+        self._waits.set_ready(self._subscriber)
 
 
 class SharedWait:
@@ -101,7 +101,7 @@ class SharedWait:
                 ready_subscribers[subscriber] = None
         return list(ready_subscribers)
 
-    def ring(self, subscriber: SubscriberTransport) -> None:
+    def set_ready(self, subscriber: SubscriberTransport) -> None:
         """Mark a subscriber as ready and end the wait. Thread-safe."""
         self._ready.append(subscriber)
         self._waker.wake()

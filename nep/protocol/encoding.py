@@ -20,7 +20,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.errors import WireError
 from nep.i18n import _, lazy
-from nep.messages.packing import pack_saturated, saturated, unpack, unpack_bounded, unpack_first
+from nep.messages.packing import clamp_int, pack_saturated, unpack, unpack_bounded, unpack_first
 from nep.protocol.graph_view import NodeInfo, TopicInfo
 from nep.protocol.requests import (
     Added,
@@ -197,7 +197,7 @@ class AnswerEncoder:
 
 def _packable_value(value: object) -> object:
     # Called for types unknown to msgpack: dataclasses, and ints beyond its range.
-    return saturated(value) if isinstance(value, int) else vars(value)
+    return clamp_int(value) if isinstance(value, int) else vars(value)
 
 
 def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
@@ -299,13 +299,13 @@ def read(kind: type[T], value: object) -> T:
     hint: Any = kind
     try:
         return cast("T", _reader(hint)(value))
-    except _MisfitError as misfit:
-        where = ".".join((kind.__name__, *reversed(misfit.path)))
-        code = "field-missing" if misfit.words == _MISSING else "field-type"
-        raise WireError(_(misfit.words).format(field=where, **misfit.values), code=code) from None
+    except _MismatchError as mismatch:
+        where = ".".join((kind.__name__, *reversed(mismatch.path)))
+        code = "field-missing" if mismatch.words == _MISSING else "field-type"
+        raise WireError(_(mismatch.words).format(field=where, **mismatch.values), code=code) from None
 
 
-class _MisfitError(Exception):
+class _MismatchError(Exception):
     """Validation error; its path is collected while the exception propagates, because errors are rare.
 
     ``words`` is the message with the placeholder ``field`` and those in ``values``.
@@ -350,7 +350,7 @@ def _of_plain(hint: type) -> Reader:
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
         if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
-            raise _MisfitError(_WRONG_TYPE, given=type(value).__name__, wanted=hint.__name__)
+            raise _MismatchError(_WRONG_TYPE, given=type(value).__name__, wanted=hint.__name__)
         return value
 
     return parse
@@ -359,7 +359,7 @@ def _of_plain(hint: type) -> Reader:
 def _of_tuple(item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, list | tuple):
-            raise _MisfitError(_NOT_A_LIST, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_LIST, given=type(value).__name__)
         return tuple([item(each) for each in value])
 
     return parse
@@ -368,7 +368,7 @@ def _of_tuple(item: Reader) -> Reader:
 def _of_mapping(key: Reader, item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, Mapping):
-            raise _MisfitError(_NOT_A_MAP, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_MAP, given=type(value).__name__)
         return {key(name): item(each) for name, each in value.items()}
 
     return parse
@@ -388,7 +388,7 @@ def _of_dataclass(kind: type) -> Reader:
         if fast_value is not None:
             return fast_value
         if not isinstance(value, Mapping):
-            raise _MisfitError(_NOT_A_MAP, given=type(value).__name__)
+            raise _MismatchError(_NOT_A_MAP, given=type(value).__name__)
         found: dict[str, object] = {}
         for name, usual, reader, field in readers:
             item = value.get(name, MISSING)
@@ -399,8 +399,8 @@ def _of_dataclass(kind: type) -> Reader:
             else:
                 try:
                     found[name] = reader(item)
-                except _MisfitError as misfit:
-                    misfit.path.append(name)
+                except _MismatchError as mismatch:
+                    mismatch.path.append(name)
                     raise
         return make_frozen(kind, found)
 
@@ -429,7 +429,7 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
             fields_of_it = dict(value)
             for name, reader in others:
                 fields_of_it[name] = reader(value[name])
-        except (LookupError, _MisfitError):
+        except (LookupError, _MismatchError):
             return None
         fresh: object = make_frozen(kind, fields_of_it)
         return fresh
@@ -451,6 +451,6 @@ def _default(field: Field[Any]) -> object:
         return field.default
     if field.default_factory is not MISSING:
         return field.default_factory()
-    misfit = _MisfitError(_MISSING)
-    misfit.path.append(field.name)
-    raise misfit
+    mismatch = _MismatchError(_MISSING)
+    mismatch.path.append(field.name)
+    raise mismatch

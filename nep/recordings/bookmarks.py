@@ -16,13 +16,13 @@ import orjson
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.formats.destination import disk_sentence
+from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import Recording
 from nep.system.replace_file import replace_file
 
-__all__ = ["MOST_BOOKMARKS", "Bookmark", "Bookmarks"]
+__all__ = ["MAX_BOOKMARKS", "Bookmark", "Bookmarks"]
 
-MOST_BOOKMARKS = 10_000
+MAX_BOOKMARKS = 10_000
 _MAX_FILE_BYTES = 10_000_000
 _MAX_NAME_LENGTH = 200
 
@@ -48,7 +48,7 @@ class Bookmarks:
         notes: list[Bookmark] = []
         for at_ns, value in recording.said("notes"):
             text = value.get("text") if isinstance(value, dict) else None
-            if isinstance(text, str) and len(notes) < MOST_BOOKMARKS:
+            if isinstance(text, str) and len(notes) < MAX_BOOKMARKS:
                 notes.append(Bookmark(at_ns, text[:_MAX_NAME_LENGTH], is_note=True))
         self._notes = notes
         self._saved = self._read()
@@ -76,8 +76,8 @@ class Bookmarks:
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
         """Add a bookmark within the recording's time. Raises `RecordingError` if it can't be saved."""
-        if len(self._saved) >= MOST_BOOKMARKS:
-            reason = _("it has {most} bookmarks, and there is no room for more").format(most=MOST_BOOKMARKS)
+        if len(self._saved) >= MAX_BOOKMARKS:
+            reason = _("it has {most} bookmarks, and there is no room for more").format(most=MAX_BOOKMARKS)
             raise RecordingError(str(self._recording.path), reason)
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
         bookmark = Bookmark(at_ns, name[:_MAX_NAME_LENGTH])
@@ -110,7 +110,7 @@ class Bookmarks:
             if self.path.stat().st_size > _MAX_FILE_BYTES:
                 raise ValueError("size")
             content = orjson.loads(self.path.read_bytes())
-            return [_bookmark(each) for each in content["bookmarks"]][:MOST_BOOKMARKS]
+            return [_bookmark(each) for each in content["bookmarks"]][:MAX_BOOKMARKS]
         except FileNotFoundError:
             return []
         except (OSError, ValueError, TypeError, KeyError):
@@ -136,7 +136,7 @@ class Bookmarks:
         except OSError as error:
             with suppress(OSError):
                 unfinished.unlink(missing_ok=True)
-            raise disk_sentence(self.path, error) from error
+            raise disk_error(self.path, error) from error
         self._saved = made
         self._sort()
 

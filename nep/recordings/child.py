@@ -55,7 +55,7 @@ __all__ = ["RecorderService", "main"]
 FIGURES_S = 1.0
 _MAX_LINE_BYTES = 1_000_000
 _MAX_SECONDS = 1e9
-SAID = ("runs", "alarms")
+_RUN_ROLES = ("runs", "alarms")
 """Roles accepted by "say"; the recorder itself writes the others."""
 _MAX_COPIES = 4
 """Maximum number of concurrent copies of the ring: each reads and writes at the speed of the disk."""
@@ -204,7 +204,7 @@ class RecorderService:
     def _say(self, order: Mapping[str, Any]) -> None:
         # Discarded while nothing is recorded.
         role, value, to = _text(order, "role"), order["value"], _text(order, "to", "")
-        if role not in SAID or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
+        if role not in _RUN_ROLES or not isinstance(value, dict) or to not in {"", "ring", "recording"}:
             raise ValueError(role)
         if self._recording is not None and to != "ring":
             self._recording.writer.say(role, value)

@@ -20,15 +20,15 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
-from nep.recordings.film import Container, Film, container_there, frame_of
-from nep.recordings.formats.destination import disk_sentence
+from nep.recordings.film import Container, Film, available_container, frame_of
+from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.system.replace_file import replace_file
 
 __all__ = ["ALL_OF_IT", "FORMATS", "Exported", "Part", "export", "flattened"]
 
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
-MOST_COLUMNS = 5_000
+MAX_COLUMNS = 5_000
 MAX_FILES = 1_000
 """Maximum number of files, one per topic."""
 _MAX_LIST_COLUMNS = 100
@@ -108,7 +108,7 @@ def export(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if kind == "mp4":
-            container = container_there(_opencv(), folder)
+            container = available_container(_opencv(), folder)
             make, suffix = partial(_film, container=container), container.suffix
         else:
             make, suffix = {"csv": _csv, "parquet": _parquet, "pictures": _pictures}[kind], _SUFFIXES[kind]
@@ -126,7 +126,7 @@ def export(
                 raise
             made.append(Exported(topic, path, count, source.unreadable))
     except OSError as error:
-        raise disk_sentence(folder, error) from error
+        raise disk_error(folder, error) from error
     return made
 
 
@@ -292,10 +292,10 @@ def _columns(source: _Source) -> dict[str, set[type]]:
             columns.setdefault(name, set())
             if value is not None:
                 columns[name].add(type(value))
-        if len(columns) > MOST_COLUMNS:
+        if len(columns) > MAX_COLUMNS:
             raise RecordingError(
                 source.topic,
-                _("its messages have more than {most} different fields").format(most=MOST_COLUMNS),
+                _("its messages have more than {most} different fields").format(most=MAX_COLUMNS),
             )
     return columns
 
@@ -310,7 +310,7 @@ def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) ->
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise disk_sentence(folder, error) from error
+        raise disk_error(folder, error) from error
     if path.exists():
         raise RecordingError(str(path), _("there is such a file already; choose another name"))
     try:
@@ -320,7 +320,7 @@ def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) ->
     except BaseException as error:
         _remove(unfinished)
         if isinstance(error, OSError):
-            raise disk_sentence(path, error) from error
+            raise disk_error(path, error) from error
         raise
     return Exported("", path, count, 0)
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, BinaryIO, Protocol
 from nep.errors import ClosedError
 from nep.recordings.formats.channels import ChannelDefinition
 from nep.recordings.formats.compression import check_packages
-from nep.recordings.formats.destination import disk_sentence
+from nep.recordings.formats.destination import disk_error
 from nep.recordings.formats.index import AttachedFile, Damage, FileIndex, read_chunk, read_entries, read_index
 from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.formats.records import ChunkInfo, RawMessage, messages_in
@@ -179,7 +179,7 @@ class FileReader:
         try:
             self._file: BinaryIO = open(self.path, "rb", buffering=65_536)  # noqa: SIM115, PTH123
         except OSError as error:
-            raise disk_sentence(self.path, error) from error
+            raise disk_error(self.path, error) from error
         try:
             self._index: FileIndex = read_index(self._file, self.path, progress, budget)
             self._chunks = self._index.chunks
@@ -190,7 +190,7 @@ class FileReader:
             self._facts = self._read_facts()
         except OSError as error:
             self._file.close()
-            raise disk_sentence(self.path, error) from error
+            raise disk_error(self.path, error) from error
         except BaseException:
             self._file.close()
             raise

@@ -17,7 +17,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.system.replace_file import replace_file
 
-__all__ = ["Container", "Film", "container_there", "frame_of"]
+__all__ = ["Container", "Film", "available_container", "frame_of"]
 
 LONGEST_S = 86_400.0
 """Maximum duration: an image of another day would lead to millions of frames."""
@@ -42,7 +42,7 @@ CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "C
 """Containers in order of preference."""
 
 
-def container_there(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
+def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
     """Return the first container that can be written to a folder, whose files are not touched.
 
     Raises `RecordingError` if there is none, and `OSError` if the folder is not writable.

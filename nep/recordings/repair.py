@@ -21,15 +21,15 @@ from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.formats.channels import ChannelDecoder
 from nep.recordings.formats.compression import check_packages, decompressed, decompressed_part
-from nep.recordings.formats.destination import disk_sentence
-from nep.recordings.formats.index import MOST_SMALL_BYTES, Definitions, RecordCounter, read_chunk, read_index
+from nep.recordings.formats.destination import disk_error
+from nep.recordings.formats.index import MAX_RECORD_BYTES, Definitions, RecordCounter, read_chunk, read_index
 from nep.recordings.formats.limits import open_budget
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 from nep.recordings.formats.records import (
     CHUNK_HEAD_BYTES,
     HEAD_BYTES,
     MAGIC,
-    MOST_CHUNK_BYTES,
+    MAX_CHUNK_BYTES,
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
@@ -130,7 +130,7 @@ def repair(
     try:
         file = path.open("rb")
     except OSError as error:
-        raise disk_sentence(path, error) from error
+        raise disk_error(path, error) from error
     try:
         with file:
             repairer = _Repair(file, path, unfinished, progress or _no_progress)
@@ -143,7 +143,7 @@ def repair(
             finally:
                 repairer.writer.close()
     except OSError as error:
-        raise disk_sentence(target, error) from error
+        raise disk_error(target, error) from error
     finally:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
@@ -244,7 +244,7 @@ class _Repair:
             return False
         if place.opcode == Opcode.CHUNK:
             return self._copy_chunk_at(place)
-        most = MOST_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MOST_SMALL_BYTES
+        most = MAX_CHUNK_BYTES if place.opcode == Opcode.MESSAGE else MAX_RECORD_BYTES
         if place.opcode in _PARSED_OPCODES and place.length > most:
             return False
         if place.opcode == Opcode.MESSAGE_INDEX:

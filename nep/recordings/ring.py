@@ -23,7 +23,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.formats.channels import Role
 from nep.recordings.formats.compression import decompressed
-from nep.recordings.formats.destination import USUAL_LIMITS, WriterLimits, disk_sentence
+from nep.recordings.formats.destination import USUAL_LIMITS, WriterLimits, disk_error
 from nep.recordings.formats.figures import TopicFigures, read_figures
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 from nep.recordings.formats.records import (
@@ -80,7 +80,7 @@ class _Segment:
 
 
 class _Segments:
-    """Destination of a ring's writer. `take`, `give_back` and `status` are thread-safe."""
+    """Destination of a ring's writer. `take`, `release(` and `status` are thread-safe."""
 
     def __init__(self, folder: Path, seconds: float, size_bytes: int, least_free_bytes: int) -> None:
         self.table = ChannelTable()
@@ -131,7 +131,7 @@ class _Segments:
         if not oldest.users:
             _remove(oldest.path)
 
-    def look(self) -> None:
+    def check_file(self) -> None:
         # Frees space before it raises.
         while shutil.disk_usage(self._folder).free < self._least_free_bytes:
             with self._lock:
@@ -168,7 +168,7 @@ class _Segments:
         return max(each.writer.end_ns for each in self._all)
 
     def take(self, seconds: float) -> list[tuple[_Segment, list[ChunkInfo]]]:
-        # `give_back` must follow.
+        # `release(` must follow.
         with self._lock:
             since = self._newest_ns_locked() - int(seconds * 1e9)
             taken = []
@@ -179,7 +179,7 @@ class _Segments:
                     taken.append((segment, chunks))
             return taken
 
-    def give_back(self, taken: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
+    def release(self, taken: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
         with self._lock:
             for segment, _chunks in taken:
                 segment.users -= 1
@@ -239,7 +239,7 @@ class FlightRecorder:
         try:
             self._segments = _Segments(path, seconds, size_bytes, limits.least_free_bytes)
         except OSError as error:
-            raise disk_sentence(path, error) from error
+            raise disk_error(path, error) from error
         self._writer = RecordingWriter(
             self._segments, clock=self._clock, limits=limits, on_problem=on_problem
         )
@@ -289,9 +289,9 @@ class FlightRecorder:
                 str(target), _("there is such a file already; choose another name")
             ) from None
         except OSError as error:
-            raise disk_sentence(target, error) from error
+            raise disk_error(target, error) from error
         finally:
-            self._segments.give_back(taken)
+            self._segments.release(taken)
 
     def _copy_segments(
         self, target: Path, taken: Sequence[tuple[_Segment, list[ChunkInfo]]], note: str

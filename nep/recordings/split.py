@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.formats.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_sentence
+from nep.recordings.formats.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_error
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 
 __all__ = ["MIN_PART_BYTES", "SplitFiles", "part_path"]
@@ -40,7 +40,7 @@ class SplitFiles:
         except FileExistsError:
             raise RecordingError(str(path), _("there is such a file already; choose another name")) from None
         except OSError as error:
-            raise disk_sentence(path, error) from error
+            raise disk_error(path, error) from error
         self.paths.append(path)
         return OneFile(file, self._limits.least_free_bytes)
 
@@ -63,9 +63,9 @@ class SplitFiles:
         self._part = self._new()
         full.finish()
 
-    def look(self) -> None:
+    def check_file(self) -> None:
         """Check file and disk. Raises `RecordingError`."""
-        self._part.look()
+        self._part.check_file()
 
     def finish(self) -> None:
         """Finish the last file. Raises `OSError`."""

@@ -30,7 +30,7 @@ from nep.recordings.formats.channels import (
     encoding_of,
     own_channel,
 )
-from nep.recordings.formats.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_sentence
+from nep.recordings.formats.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_error
 from nep.recordings.formats.figures import MOST_TOPICS, TopicCounter, TopicFigures, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LogClock", "RecordingStatus", "RecordingWriter"]
 
-MOST_ONES_CHANNELS = 10_000
+MAX_PUBLISHER_CHANNELS = 10_000
 """Number of channels beyond which new publishers share a channel per topic."""
 _CLOSE_S = 30.0
 _MAX_CACHED_KINDS = 10_000
@@ -188,7 +188,7 @@ class RecordingWriter:
                     str(whole), _("there is such a file already; choose another name")
                 ) from None
             except OSError as error:
-                raise disk_sentence(whole, error) from error
+                raise disk_error(whole, error) from error
         else:
             self._destination = path
         self._limits = limits
@@ -332,7 +332,7 @@ class RecordingWriter:
             self._write_until_closed()
             self._finish()
         except OSError as error:
-            self._fail(disk_sentence(self._destination.file.path, error))
+            self._fail(disk_error(self._destination.file.path, error))
         except RecordingError as error:
             self._finish_early(error)
         except Exception as error:  # noqa: BLE001 - any error must be reported as the end of the recording
@@ -371,7 +371,7 @@ class RecordingWriter:
             if now >= look_at:
                 look_at = now + self._limits.figures_s
                 self._write_figures()
-                self._destination.look()
+                self._destination.check_file()
             if is_closing and not self._queue:
                 return
 
@@ -421,7 +421,7 @@ class RecordingWriter:
             if channel is None:
                 known.counter.leave_out(message.publisher, 1, message.size_bytes)
                 return
-            if not encoding.is_apart:
+            if not encoding.is_self_contained:
                 known.channels[key] = channel
         if message.kind.is_latched:
             self._part.keep(message)
@@ -449,9 +449,9 @@ class RecordingWriter:
         # With too many publishers it is shared, and the record has all properties.
         table = self._destination.file.table
         definition = definition_of(message, encoding)
-        if len(table.definitions) < MOST_ONES_CHANNELS or table.has(definition):
+        if len(table.definitions) < MAX_PUBLISHER_CHANNELS or table.has(definition):
             return table.number(definition), encoding
-        apart = encoding_of(message, log_ns, is_apart=True)
+        apart = encoding_of(message, log_ns, is_self_contained=True)
         return table.number(definition_of(message, apart)), apart
 
     def _write_own(self, role: Role, text: bytes) -> None:

@@ -14,7 +14,7 @@ import orjson
 import nep
 from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
-from nep.messages.codecs import CODECS, nan_in
+from nep.messages.codecs import CODECS, find_nan
 from nep.messages.image_files import examine
 from nep.messages.packing import pack, unpack, unpack_bounded, unpack_first
 from nep.messages.typed import TypedReader, message_type, typed_codec
@@ -41,7 +41,7 @@ def values() -> Iterator[bytes]:
 def json_codec(data: bytes) -> None:
     codec = CODECS["json"]
     value = codec.decode(memoryview(data), {})
-    nan_in(value)
+    find_nan(value)
     assert is_same(codec.decode(data, {}), value)
     made = codec.encode(value).data
     # NaN and infinity are sent as null, however deep.

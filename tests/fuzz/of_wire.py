@@ -11,7 +11,7 @@ from nep.backends.zeromq.services.tcp_stream import TcpStream
 from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.errors import BadTopicError, NepError, WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import read_renewal, renewed_body
+from nep.masters.leases import encode_renewed, read_renewal
 from nep.masters.registry import check_request
 from nep.protocol import batch, encoding, service_wire, topic_pattern, wire
 from nep.protocol.graph_view import GraphView
@@ -221,7 +221,7 @@ def renewals(data: bytes) -> None:
     raw = read_renewal(data)
     if raw is not None:
         assert raw.call >= 0
-        renewed_body(raw.call, raw.epoch, raw.revision, {1: 2}, ("127.0.0.1",), 3.0)
+        encode_renewed(raw.call, raw.epoch, raw.revision, {1: 2}, ("127.0.0.1",), 3.0)
 
 
 def conversations() -> Iterator[bytes]:
@@ -248,7 +248,7 @@ def answers() -> Iterator[bytes]:
     yield encoding.encode_answer(Refused(1, 2, "no"), 2)
     yield encoding.encode_answer(Found(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
     yield encoding.encode_answer(Seen(1, 2, GraphView(1, 2, {}, {}, ())), 4)
-    yield renewed_body(1, 2, 3, {4: 5}, ("127.0.0.1",), 2.0)
+    yield encode_renewed(1, 2, 3, {4: 5}, ("127.0.0.1",), 2.0)
 
 
 @TARGETS.add(WireError, seeds=answers, words=WORDS)

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from nep.i18n import _
-from nep.messages.codecs import nan_in
+from nep.messages.codecs import find_nan
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -44,11 +44,11 @@ class ParameterForm:
             if not issubclass(self._kind, dict) and isinstance(value, self._kind):
                 value = self._shape.write(value)
             plain = self._shape.write(self._shape.read(value))
-        except shapes.Misfit as misfit:
-            raise ValueError(misfit.sentence) from misfit
+        except shapes.ShapeMismatch as mismatch:
+            raise ValueError(mismatch.sentence) from mismatch
         except RecursionError:
             raise ValueError(_("it has too many levels")) from None
-        where = nan_in(plain)
+        where = find_nan(plain)
         if where is not None:
             raise ValueError(_("{where} is no finite number; give one").format(where=where or _("it")))
         return plain

@@ -43,13 +43,13 @@ class PayloadType:
         return base if self._declared is None else typed.typed_codec(self._declared, base)
 
     def read(self, plain: object, size_bytes: int) -> object:
-        """Return the instance of a decoded payload. Raises `DecodeError` with the path of the misfit."""
+        """Return the instance of a decoded payload. Raises `DecodeError` with the path of the mismatch."""
         if self._declared is None:
             return plain
         try:
             return self._declared.shape.read(plain)
-        except shapes.Misfit as misfit:
-            reason = misfit.sentence
+        except shapes.ShapeMismatch as mismatch:
+            reason = mismatch.sentence
         except RecursionError:
             reason = _("it has too many levels")
         raise DecodeError(self._declared.name, size_bytes, reason)

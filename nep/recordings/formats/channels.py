@@ -79,7 +79,7 @@ class Encoding(NamedTuple):
     sequence: int
     publish_ns: int
     is_decodable: bool
-    is_apart: bool = False
+    is_self_contained: bool = False
     """True if the record includes its publisher and type, because the recording has too many channels."""
 
 
@@ -94,10 +94,10 @@ _VIEWABLE_LAYOUTS = frozenset({
 # ---- encoding
 
 
-def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Encoding:
+def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = False) -> Encoding:
     """Return the encoding of a message received at `log_ns`. Never raises.
 
-    `is_apart`: include all properties in the record, because its publisher has no channel.
+    `is_self_contained`: include all properties in the record, because its publisher has no channel.
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
@@ -109,7 +109,7 @@ def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Enc
         extra["seq"] = seq
     if stamp is not None and not 0 <= stamp <= _U64:
         extra["stamp_ns"] = stamp
-    if is_apart:
+    if is_self_contained:
         kind = message.kind
         extra.update(
             codec=codec,
@@ -128,7 +128,7 @@ def encoding_of(message: Message, log_ns: int, *, is_apart: bool = False) -> Enc
         before += bytes_field(_DATA_FIELD[form], message.size_bytes)
     sequence = 0 if seq is None else seq & _U32
     publish_ns = log_ns if stamp is None else max(0, min(stamp, _U64))
-    return Encoding(form, before, sequence, publish_ns, is_decodable, is_apart)
+    return Encoding(form, before, sequence, publish_ns, is_decodable, is_self_contained)
 
 
 def _packed(extra: Mapping[str, Any]) -> bytes:
@@ -200,7 +200,7 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
     """Return the channel of a message with this encoding."""
     kind, form = message.kind, encoding.form
     metadata = [("nep.form", form)]
-    if not encoding.is_apart:
+    if not encoding.is_self_contained:
         metadata += [
             ("nep.codec", kind.codec),
             ("nep.msg_type", kind.msg_type),

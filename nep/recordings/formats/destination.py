@@ -12,7 +12,7 @@ from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.formats.mcap_file import FileWriter
 
-__all__ = ["USUAL_LIMITS", "Destination", "OneFile", "WriterLimits", "disk_sentence"]
+__all__ = ["USUAL_LIMITS", "Destination", "OneFile", "WriterLimits", "disk_error"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Destination(Protocol):
         Raises as `finish` does.
         """
 
-    def look(self) -> None:
+    def check_file(self) -> None:
         """Check the disk, once a second. Raises `RecordingError` if it is full."""
 
     def finish(self) -> None:
@@ -83,7 +83,7 @@ class OneFile:
     def next_file(self) -> None:
         """Do nothing: there is only one file."""
 
-    def look(self) -> None:
+    def check_file(self) -> None:
         """Check that the file was not moved or deleted and the disk is not full. Raises `RecordingError`."""
         if _identity(self.file.path) != self._identity:
             raise RecordingError(
@@ -109,7 +109,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def disk_sentence(path: Path, error: OSError) -> RecordingError:
+def disk_error(path: Path, error: OSError) -> RecordingError:
     """Return the error of a recording for an I/O error."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
         reason = _("the disk is full; what came before is kept")

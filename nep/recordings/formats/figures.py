@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 import orjson
 
-__all__ = ["MOST_LOST", "MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
+__all__ = ["MAX_LOST", "MOST_PUBLISHERS", "MOST_TOPICS", "TopicCounter", "TopicFigures", "read_figures"]
 
 MOST_TOPICS = 10_000
 """Maximum number of topics counted separately; the others are counted together."""
 MOST_PUBLISHERS = 1_000
 """Maximum number of publishers per topic whose sequence numbers are tracked; losses of others are unknown."""
-MOST_LOST = 2**63 - 1
+MAX_LOST = 2**63 - 1
 """Limit of the count: random sequence numbers would lead to values that JSON can't represent."""
 
 
@@ -141,7 +141,7 @@ class TopicCounter:
         """Return the current counts."""
         lost = None
         if self._publishers:
-            lost = min(sum(each.lost for each in self._publishers.values()), MOST_LOST)
+            lost = min(sum(each.lost for each in self._publishers.values()), MAX_LOST)
         return TopicFigures(self.received, lost, self.late, self.undecodable, self.unkept, self.size_bytes)
 
 

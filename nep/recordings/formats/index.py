@@ -24,9 +24,9 @@ from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget, open_bu
 from nep.recordings.formats.records import (
     HEAD_BYTES,
     MAGIC,
+    MAX_CHUNK_BYTES,
     MESSAGE_REST_BYTES,
     MESSAGE_START,
-    MOST_CHUNK_BYTES,
     RECORD_HEAD,
     ChunkHead,
     ChunkInfo,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from mcap.records import Channel, Schema
 
 __all__ = [
-    "MOST_SMALL_BYTES",
+    "MAX_RECORD_BYTES",
     "AttachedFile",
     "Damage",
     "Definitions",
@@ -57,7 +57,7 @@ __all__ = [
 ]
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
-MOST_SMALL_BYTES = 64_000_000
+MAX_RECORD_BYTES = 64_000_000
 """Maximum size of records other than chunks; larger ones are damaged, or attachments that are not needed."""
 _MAX_SCHEMA_BYTES = 8_000_000
 _MAX_CHANNEL_BYTES = 256_000
@@ -261,7 +261,7 @@ def _content(file: BinaryIO, place: Place) -> bytes:
 
 def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
     index.metadata_bytes += place.length
-    if not 0 < place.length <= MOST_SMALL_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
+    if not 0 < place.length <= MAX_RECORD_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
         return
     with suppress(ValueError):
         made = read_record("Metadata", _content(file, place))
@@ -550,7 +550,7 @@ def _index_by_reading(
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
     """Return the records of a chunk. Raises `ValueError` if it is damaged or too large, and `OSError`."""
-    if info.length > MOST_CHUNK_BYTES:
+    if info.length > MAX_CHUNK_BYTES:
         raise ValueError("size")
     file.seek(info.offset)
     record = memoryview(file.read(info.length))

@@ -38,10 +38,10 @@ if TYPE_CHECKING:
 else:  # optional for programs that don't record
     mcap_records = lazy_module("mcap.records")
 
-__all__ = ["CHUNK_BYTES", "MOST_CHANNELS", "ChannelTable", "FileWriter"]
+__all__ = ["CHUNK_BYTES", "MAX_CHANNELS", "ChannelTable", "FileWriter"]
 
 CHUNK_BYTES = 1_000_000
-MOST_CHANNELS = 65_535
+MAX_CHANNELS = 65_535
 """Maximum number of channels: their numbers have 16 bits."""
 
 
@@ -61,7 +61,7 @@ class ChannelTable:
         """Return the channel's number (from 1), or None if there are too many."""
         known = self._numbers.get(definition)
         if known is None:
-            if self._next > MOST_CHANNELS:
+            if self._next > MAX_CHANNELS:
                 return None
             known = self._next
             self._add(known, definition)
@@ -309,11 +309,11 @@ class FileWriter:
                     at += self._file.write(whole[at:]) or 0
                 size += whole.nbytes
         except OSError:
-            self.cut_back()
+            self.truncate()
             raise
         self._at += size
 
-    def cut_back(self) -> None:
+    def truncate(self) -> None:
         """Truncate the file after its last whole record, as far as possible."""
         try:
             self._file.truncate(self._at)

@@ -31,10 +31,10 @@ __all__ = [
     "CHUNK_HEAD_BYTES",
     "HEAD_BYTES",
     "MAGIC",
+    "MAX_CHUNK_BYTES",
     "MESSAGE_HEAD",
     "MESSAGE_REST_BYTES",
     "MESSAGE_START",
-    "MOST_CHUNK_BYTES",
     "RECORD_HEAD",
     "ChunkHead",
     "ChunkInfo",
@@ -71,7 +71,7 @@ _OFFSET = struct.Struct("<HQ")
 _INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the index offsets
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
-MOST_CHUNK_BYTES = 2**31
+MAX_CHUNK_BYTES = 2**31
 """Maximum size of a chunk; larger ones can't be read in memory."""
 CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
 """Number of bytes that contain the header of any chunk."""
@@ -196,7 +196,7 @@ def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
         return None
     start_ns, end_ns, uncompressed, crc, letters = _CHUNK.unpack_from(record, HEAD_BYTES)
     at = HEAD_BYTES + _CHUNK.size + letters
-    if letters > 16 or len(record) < at + _SIZE.size or max(uncompressed, length) > MOST_CHUNK_BYTES:
+    if letters > 16 or len(record) < at + _SIZE.size or max(uncompressed, length) > MAX_CHUNK_BYTES:
         return None
     compression = bytes(record[at - letters : at])
     (data_bytes,) = _SIZE.unpack_from(record, at)

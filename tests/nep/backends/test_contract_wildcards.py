@@ -386,13 +386,13 @@ def test_zenoh_hears_all_that_matches(pattern: str, topic: str) -> None:
 
 def test_an_index_forgets_what_nobody_needs() -> None:
     index: PatternIndex[str] = PatternIndex()
-    index.topic_came("a/1")
+    index.add_topic("a/1")
     index.add("a/*", 1, "n", ["a/1", "b/1"])
     index.add("a/*", 2, "m", [])
-    index.topic_came("a/2")
+    index.add_topic("a/2")
     assert index.topics_of("a/*") == {"a/1", "a/2"}
     assert index.subscribers_of("a/2") == [("n", 1), ("m", 2)]
-    index.topic_went("a/1")
+    index.remove_topic("a/1")
     assert index.topics_of("a/*") == {"a/2"}
     assert index.subscribers_of("a/1") == [("n", 1), ("m", 2)], "they are told that it went"
     index.remove("a/*", 1)

@@ -9,7 +9,7 @@ import pytest
 
 from nep.errors import WireError
 from nep.masters.graph import Graph
-from nep.masters.leases import RawRenewal, read_renewal, renewed_body
+from nep.masters.leases import RawRenewal, encode_renewed, read_renewal
 from nep.messages.clocks import OFFSET_MAX_NS, UNCERTAINTY_MAX_NS
 from nep.messages.packing import pack
 from nep.protocol import encoding
@@ -158,10 +158,10 @@ def test_the_quick_way_says_the_same(clock: tuple[int, ...] | None) -> None:
 
 
 def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
-    last_seqs = graph.renew_quickly(said, 1.0, said.node_id)
+    last_seqs = graph.renew_fast(said, 1.0, said.node_id)
     assert last_seqs is not None
     clocks = graph.clocks.differences(graph.members[said.node_id], 1.0)
-    return renewed_body(7, EPOCH, graph.revision, last_seqs, (), clocks=clocks, **more)
+    return encode_renewed(7, EPOCH, graph.revision, last_seqs, (), clocks=clocks, **more)
 
 
 def test_older_nodes_and_masters_see_what_they_always_saw() -> None:

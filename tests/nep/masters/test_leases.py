@@ -37,11 +37,11 @@ def told(nodes: int, managed: int = 0, rounds: int = 4, within_s: float = 1.0) -
     times = []
     for _ in range(rounds):
         times.append(due)
-        found.set_pace(min(due))
+        found.set_renew_interval(min(due))
         order = sorted(range(nodes), key=lambda n: due[n])
         next_due = list(due)
         for n in order:
-            found.set_pace(due[n])
+            found.set_renew_interval(due[n])
             next_due[n] = due[n] + found.renew(registry.members[f"n{n}"], due[n])
         due = next_due
     return times
@@ -71,7 +71,7 @@ def test_nodes_of_large_graphs_renew_less_often_together_and_spread(
 def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
     registry = census_of(500)
     found = Leases(registry, LEASE_S)
-    found.set_pace(0.0)
+    found.set_renew_interval(0.0)
     member = registry.members["n0"]
     at = 10.03
     for late_s in (0.04, 0.0, 0.03, 0.01):
@@ -82,13 +82,13 @@ def test_a_node_that_comes_a_little_late_stays_in_its_place() -> None:
 def test_whoever_was_told_to_wait_is_late_and_lapses_that_much_later() -> None:
     registry = census_of(500)
     found = Leases(registry, LEASE_S)
-    found.set_pace(0.0)
+    found.set_renew_interval(0.0)
     assert found.renew(registry.members["n0"], 0.0) == pytest.approx(4.0)
-    assert "n0" not in found.late(4.39)
-    assert "n0" in found.late(4.41)
-    assert "n0" not in found.lapsed(5.9)
-    assert "n0" in found.lapsed(6.1)
-    assert "n1" in found.lapsed(3.0)  # it was told nothing yet
+    assert "n0" not in found.overdue(4.39)
+    assert "n0" in found.overdue(4.41)
+    assert "n0" not in found.expired(5.9)
+    assert "n0" in found.expired(6.1)
+    assert "n1" in found.expired(3.0)  # it was told nothing yet
 
 
 def test_a_master_tells_how_long_to_wait() -> None:

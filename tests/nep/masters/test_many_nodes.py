@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nep.masters.graph import Graph
-from nep.masters.leases import read_renewal, renewed_body
+from nep.masters.leases import encode_renewed, read_renewal
 from nep.masters.master import Master
 from nep.masters.snapshot import GraphViewer
 from nep.messages.packing import pack
@@ -72,8 +72,8 @@ def renew(graph: Graph, request: Renew, now: float) -> bytes | None:
     said = read_renewal(encoding.encode_request(request, 7))
     if said is None:
         return None
-    last_seqs = graph.renew_quickly(said, now, said.node_id)
-    return None if last_seqs is None else renewed_body(said.call, EPOCH, graph.revision, last_seqs, ())
+    last_seqs = graph.renew_fast(said, now, said.node_id)
+    return None if last_seqs is None else encode_renewed(said.call, EPOCH, graph.revision, last_seqs, ())
 
 
 def view(graph: Graph) -> GraphView:
@@ -130,7 +130,7 @@ def test_an_unusual_renewal_goes_the_long_way(change: dict[str, object]) -> None
     what = write(renewal(0, graph))
     assert isinstance(what, dict)
     said = read_renewal(pack({"do": "renew", "call": 7, "what": what | change}))
-    assert said is None or graph.renew_quickly(said, 1.0, said.node_id) is None
+    assert said is None or graph.renew_fast(said, 1.0, said.node_id) is None
 
 
 @settings(deadline=None, max_examples=60)

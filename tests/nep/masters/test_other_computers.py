@@ -182,19 +182,19 @@ def test_the_loss_of_a_served_address_is_an_alert_until_it_is_back():
     listening = nep.masters.listen_addresses.ListenAddresses(Router(), 7780, lambda: here[0])
     listening.serve(["192.168.1.20"])
     assert bound == ["tcp://192.168.1.20:7780"]
-    assert listening.follow() == ()
+    assert listening.refresh() == ()
     here[0] = HERE[1:]
-    (alert,) = listening.follow()
+    (alert,) = listening.refresh()
     assert "192.168.1.20" in alert.sentence
     assert "10.8.0.2" in alert.hint
     assert bound == []
     here[0] = HERE
-    assert listening.follow() == ()
+    assert listening.refresh() == ()
     assert bound == ["tcp://192.168.1.20:7780"]
     listening.serve([ANY])
     assert sorted(bound) == ["tcp://10.8.0.2:7780", "tcp://192.168.1.20:7780"]
     here[0] = HERE[:1]
-    assert listening.follow() == ()
+    assert listening.refresh() == ()
     assert bound == ["tcp://192.168.1.20:7780"]
 
 

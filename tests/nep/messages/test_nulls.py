@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.messages.codecs import NAN_WARNING_INTERVAL_S, JsonEncoder, nan_in
+from nep.messages.codecs import NAN_WARNING_INTERVAL_S, JsonEncoder, find_nan
 
 
 @dataclasses.dataclass
@@ -77,7 +77,7 @@ VALUES = st.recursive(
 def test_none_is_missed_and_none_is_made_up(payload):
     teller = JsonEncoder("t")
     teller.encode(payload)
-    assert (teller.count == 1) == (nan_in(payload) is not None)
+    assert (teller.count == 1) == (find_nan(payload) is not None)
 
 
 def test_who_publishes_nan_is_told_so(master, caplog):

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import nep
 from nep.errors import WireError
 from nep.masters.graph import Graph, with_hosts
-from nep.masters.leases import read_renewal, renewed_body
+from nep.masters.leases import encode_renewed, read_renewal
 from nep.masters.master import Master
 from nep.messages.packing import pack_saturated
 from nep.protocol import encoding, requests, wire
@@ -108,7 +108,7 @@ def test_every_answer_can_be_sent_and_read(kind: type[Any]) -> None:
 def test_every_quick_answer_to_a_renewal_can_be_read(
     last_seqs: dict[int, int], epoch: int, next_s: float
 ) -> None:
-    call, read = encoding.decode_answer(renewed_body(7, epoch, epoch, last_seqs, ("h",), next_s))
+    call, read = encoding.decode_answer(encode_renewed(7, epoch, epoch, last_seqs, ("h",), next_s))
     assert (call, type(read)) == (7, requests.Renewed)
 
 
@@ -231,7 +231,7 @@ def test_a_share_of_a_processor_that_cannot_be_is_none(value: float) -> None:
         assert graph.view().nodes["n"].cpu_ratio is None
         said = read_renewal(encoding.encode_request(request, 1))
         assert said is not None
-        assert graph.renew_quickly(said, 0.2, "n") is not None
+        assert graph.renew_fast(said, 0.2, "n") is not None
         assert graph.view().nodes["n"].cpu_ratio is None
 
 

@@ -84,7 +84,7 @@ def test_what_cannot_be_kept_is_a_sentence_and_changes_nothing(path, monkeypatch
             marks.add(recording.start_ns, "new")
         assert len(marks.all) == 1
         marks.path.rmdir()
-        monkeypatch.setattr("nep.recordings.bookmarks.MOST_BOOKMARKS", 1)
+        monkeypatch.setattr("nep.recordings.bookmarks.MAX_BOOKMARKS", 1)
         marks.add(recording.start_ns, "new")
         with pytest.raises(RecordingError, match="no room for more"):
             marks.add(recording.start_ns, "too many")

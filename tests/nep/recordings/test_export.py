@@ -218,7 +218,7 @@ def test_nothing_is_written_over_and_nothing_half_is_left(recording, tmp_path, m
     with pytest.raises(RecordingError, match="such a file already"):
         export(recording, "csv", tmp_path / "out")
     assert (tmp_path / "out" / "t.csv").read_bytes() == before
-    monkeypatch.setattr("nep.recordings.export.MOST_COLUMNS", 3)
+    monkeypatch.setattr("nep.recordings.export.MAX_COLUMNS", 3)
     with pytest.raises(RecordingError, match="more than 3 different fields"):
         export(recording, "csv", tmp_path / "more")
     assert not list((tmp_path / "more").iterdir())

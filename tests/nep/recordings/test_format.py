@@ -37,8 +37,8 @@ VALUES = st.recursive(
 )
 
 
-def there_and_back(message: Message, *, is_apart: bool = False) -> Message:
-    encoding = encoding_of(message, START_NS, is_apart=is_apart)
+def there_and_back(message: Message, *, is_self_contained: bool = False) -> Message:
+    encoding = encoding_of(message, START_NS, is_self_contained=is_self_contained)
     data = memoryview(encoding.before + bytes(message.data))
     raw = RawMessage(0, 1, encoding.sequence, START_NS, encoding.publish_ns, data)
     return ChannelDecoder(definition_of(message, encoding)).message(raw)
@@ -51,19 +51,19 @@ def there_and_back(message: Message, *, is_apart: bool = False) -> Message:
     stamp_ns=NUMBERS,
     publisher=NUMBERS,
     extension=st.dictionaries(st.text(max_size=10), VALUES, max_size=3),
-    is_apart=st.booleans(),
+    is_self_contained=st.booleans(),
 )
-def test_every_message_comes_back_whole(codec, data, seq, stamp_ns, publisher, extension, is_apart):
+def test_every_message_comes_back_whole(codec, data, seq, stamp_ns, publisher, extension, is_self_contained):
     message = Message(
         "/a/b", data, codec, "some/Type", seq=seq, stamp_ns=stamp_ns, publisher=publisher, extension=extension
     )
-    assert kept(there_and_back(message, is_apart=is_apart)) == kept(message)
+    assert kept(there_and_back(message, is_self_contained=is_self_contained)) == kept(message)
 
 
 @pytest.mark.parametrize("message", odd_messages(), ids=lambda each: each.topic)
 def test_odd_messages_come_back_whole(message):
     assert kept(there_and_back(message)) == kept(message)
-    assert kept(there_and_back(message, is_apart=True)) == kept(message)
+    assert kept(there_and_back(message, is_self_contained=True)) == kept(message)
 
 
 @given(st.binary(max_size=60))

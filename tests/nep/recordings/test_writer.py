@@ -15,7 +15,7 @@ import pytest
 from nep.errors import RecordingError
 from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
 from nep.messages.message import Message, arrived, kind_of
-from nep.recordings.formats.figures import MOST_LOST
+from nep.recordings.formats.figures import MAX_LOST
 from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.reader import Recording
 from nep.recordings.repair import repair
@@ -267,7 +267,7 @@ def test_numbers_at_random_end_no_recording(tmp_path):
         writer.post(messages)
     assert (writer.status.problem, writer.status.message_count) == ("", 6)
     with Recording(path) as recording:
-        assert recording.figures()["/odom"].lost == MOST_LOST
+        assert recording.figures()["/odom"].lost == MAX_LOST
 
 
 def test_a_disk_that_is_full_from_the_beginning_has_no_empty_file(tmp_path, monkeypatch):
@@ -295,7 +295,7 @@ def test_no_file_is_written_over_and_no_folder_is_no_reason_for_a_traceback(tmp_
 
 
 def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_path, monkeypatch):
-    monkeypatch.setattr("nep.recordings.writer.MOST_ONES_CHANNELS", 3)
+    monkeypatch.setattr("nep.recordings.writer.MAX_PUBLISHER_CHANNELS", 3)
     path = tmp_path / "a.mcap"
     messages = [json_message(seq, publisher=seq) for seq in range(1, 50)] + odd_messages()
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
@@ -305,8 +305,8 @@ def test_with_too_many_publishers_they_share_a_channel_and_nothing_is_lost(tmp_p
 
 
 def test_with_too_many_channels_what_is_left_out_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr("nep.recordings.formats.mcap_file.MOST_CHANNELS", 5)
-    monkeypatch.setattr("nep.recordings.writer.MOST_ONES_CHANNELS", 2)
+    monkeypatch.setattr("nep.recordings.formats.mcap_file.MAX_CHANNELS", 5)
+    monkeypatch.setattr("nep.recordings.writer.MAX_PUBLISHER_CHANNELS", 2)
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
         writer.post([json_message(1, topic=f"/t{number}") for number in range(20)])
