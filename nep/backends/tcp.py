@@ -48,14 +48,14 @@ class TcpTransport(ZeromqTransport):
 
 def _over_tcp(configuration: Configuration) -> Direct:
     if not isinstance(configuration, Direct):
-        said = _("plain TCP has no master; name the address of both sides with 'node.direct(ip, port)'")
-        raise NepError(said)
+        reason = _("plain TCP has no master; name the address of both sides with 'node.direct(ip, port)'")
+        raise NepError(reason)
     return replace(configuration, wire="tcp")
 
 
 def _no_topics(name: str) -> NepError:
-    said = _("plain TCP has servers and clients only; make a node with 'zeromq' for '{name}'")
-    return NepError(said.format(name=name))
+    reason = _("plain TCP has servers and clients only; make a node with 'zeromq' for '{name}'")
+    return NepError(reason.format(name=name))
 
 
 BACKEND = Backend("tcp", TcpTransport, aliases=("posix", "socket", "normal"))

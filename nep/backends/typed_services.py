@@ -88,11 +88,11 @@ class TypedService:
 
         Requests of ROS types are converted to msgpack, which supports bytes and NaN.
         """
-        asked = self.request.decode(body)
+        request = self.request.decode(body)
         if not self.is_nep:
             codec = CODECS["msgpack"]
-            return AskedCall(codec.encode(asked).data, codec.number, None)
-        number, limit_ms, data = asked["codec"], asked["timeout_ms"], asked["data"]
+            return AskedCall(codec.encode(request).data, codec.number, None)
+        number, limit_ms, data = request["codec"], request["timeout_ms"], request["data"]
         if not isinstance(number, int) or not isinstance(limit_ms, int) or not isinstance(data, bytes):
             raise WireError(_("it is no call of a service"), len(body))
         return AskedCall(data, number, limit_ms / 1000 if limit_ms else None)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from nep.backends.connection import checked_mode, checked_port
-from nep.backends.nanomsg.endpoints import endpoint, own_part, places_of, split_one
+from nep.backends.nanomsg.endpoints import endpoint, own_part, parse_endpoint, split_one
 from nep.backends.ros import carried, definition
 from nep.backends.ros.address import address_of
 from nep.backends.ros2.names import (
@@ -283,7 +283,7 @@ def messages_of_nanomsg(data: bytes) -> None:
 @TARGETS.add(seeds=lambda: [endpoint("127.0.0.1", 5, 6).encode()], words=(b"nanomsg://", b":65536/", b"/0"))
 def endpoints_of_nanomsg(data: bytes) -> None:
     text = text_of(data)
-    found = places_of(text)
+    found = parse_endpoint(text)
     if found is not None:
         messages, hellos = (each.rpartition(":") for each in found)
         assert endpoint(messages[0], int(messages[2]), int(hellos[2])) == text or "0" in text

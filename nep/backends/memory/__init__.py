@@ -236,8 +236,8 @@ class MemorySubscriber(WakingSubscriber):
                 return
             self.is_closed = True
             self.hub.patterns = tuple(each for each in self.hub.patterns if each is not self)
-            there = self.hub.subscribers.pop(self.spec.topic, ())
-            others = tuple(each for each in there if each is not self)
+            subscribers = self.hub.subscribers.pop(self.spec.topic, ())
+            others = tuple(each for each in subscribers if each is not self)
             if others:
                 self.hub.subscribers[self.spec.topic] = others
             self._transport.forget(self)
@@ -324,13 +324,14 @@ class MemoryTransport:
         calls: Sequence[CallQueue] = (),
     ) -> None:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
-        mine = [each for each in subscribers if isinstance(each, MemorySubscriber)]
+        own_subscribers = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         before = self._wakes
         with woken_by(calls, self.wake) as is_empty:
             if is_empty:
                 with self.changed:
                     self.changed.wait_for(
-                        lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+                        lambda: self._wakes != before or any(len(each.inbox) for each in own_subscribers),
+                        timeout_s,
                     )
 
     def wake(self) -> None:

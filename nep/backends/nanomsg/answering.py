@@ -19,7 +19,7 @@ from nep.errors import WireError
 from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
 
 _logger = logging.getLogger("nep")
-ANSWER_S = 2.0
+REPLY_TIMEOUT_S = 2.0
 """Timeout for sending a reply to a client that doesn't read."""
 _JOIN_S = 2.0
 _LINGER_S = 0.2
@@ -28,17 +28,17 @@ have disconnected.
 """
 
 
-def in_one(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
+def join_parts(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
     """Return a call or reply as one message: the native header and the payload, or the payload alone."""
     return b"".join(parts) if framing is NATIVE else bytes(parts[-1])
 
 
-def in_parts(framing: Framing, message: bytes) -> list[bytes]:
+def split_parts(framing: Framing, message: bytes) -> list[bytes]:
     """Split a message into the parts that `framing` reads."""
     return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
 
 
-def heard(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
+def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
     """Return the next message, or None on timeout or after closing."""
     try:
         data: bytes = context.recv()
@@ -77,28 +77,30 @@ class NanomsgServer:
         self._answered_at = 0.0
         self._contexts: set[Any] = set()
         """Contexts that wait for a call, or whose call has no reply yet."""
-        self._is_alone = threading.Event()
-        socket.add_post_pipe_remove_cb(self._went)
-        self._thread = threading.Thread(target=self._hear, name=f"nep-{spec.service}", daemon=True)
+        self._disconnected = threading.Event()
+        socket.add_post_pipe_remove_cb(self._pipe_removed)
+        self._thread = threading.Thread(target=self._receive_calls, name=f"nep-{spec.service}", daemon=True)
         self._thread.start()
 
-    def _went(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_removed(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         if self.is_closed and not self._socket.pipes:
-            self._is_alone.set()
+            self._disconnected.set()
 
-    def _hear(self) -> None:
-        while (context := self._new_context()) is not None and (data := heard(context)) is not None:
+    def _receive_calls(self) -> None:
+        while (context := self._new_context()) is not None and (data := receive(context)) is not None:
             try:
-                call = self._framing.read_call(in_parts(self._framing, data))
+                call = self._framing.read_call(split_parts(self._framing, data))
             except WireError as error:
-                self._leave_out(context, error)
+                self._reject(context, error)
                 continue
             deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
-            incoming = IncomingCall(call.data, call.codec, deadline, self._answerer(context, call.number))
+            incoming = IncomingCall(
+                call.data, call.codec, deadline, self._reply_function(context, call.number)
+            )
             if not self.calls.put(incoming):
                 incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _leave_out(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
+    def _reject(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
         with self._lock:
             self._contexts.discard(context)
         close_context(context)
@@ -115,16 +117,16 @@ class NanomsgServer:
             self._contexts.add(context)
             return context
 
-    def _answerer(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
+    def _reply_function(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
         def answer(reply: Reply) -> bool:
-            fit = fitting(reply)
-            self.tally.add(fit)
+            checked = fitting(reply)
+            self.tally.add(checked)
             with self._lock:
                 if self.is_closed:
                     return False
                 self._answered_at = time.monotonic()
             try:
-                context.send(in_one(self._framing, self._framing.answer(number, fit)))
+                context.send(join_parts(self._framing, self._framing.answer(number, checked)))
             except (library().NNGException, TypeError) as error:  # the client no longer waits
                 _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False
@@ -154,7 +156,7 @@ class NanomsgServer:
         self._on_close(self)
         left = min(timeout_s, self._answered_at + _LINGER_S - time.monotonic())
         if left > 0.0 and self._socket.pipes:
-            self._is_alone.wait(left)
+            self._disconnected.wait(left)
         with self._lock:
             contexts, self._contexts = tuple(self._contexts), set()
         for context in contexts:  # before the socket: afterwards pynng can't close them

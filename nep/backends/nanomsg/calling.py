@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nep.backends.deadlines import Deadlines
-from nep.backends.nanomsg.answering import close_context, in_one, in_parts
+from nep.backends.nanomsg.answering import close_context, join_parts, split_parts
 from nep.backends.nanomsg.library import keep_forever, library
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
@@ -26,7 +26,7 @@ from nep.protocol.service_wire import ORIGINAL, Framing
 _logger = logging.getLogger("nep")
 _JSON = 1
 _JOIN_S = 2.0
-_LEFT_MAX = 100
+_MAX_LATE_CALLS = 100
 """Maximum number of timed-out calls whose replies are still received."""
 
 Then = Callable[[Outcome], None]
@@ -67,16 +67,16 @@ class NanomsgClient(ClientCalls[_Call]):
         self._deadlines = deadlines
         self._on_close = on_close
         self._pipes: set[int] = set()
-        self._left: dict[int, _Call] = {}
+        self._late_calls: dict[int, _Call] = {}
         """Calls that timed out or were cancelled, oldest first; their replies are counted as late."""
         self._threads: set[threading.Thread] = set()
-        socket.add_post_pipe_connect_cb(self._came)
-        socket.add_post_pipe_remove_cb(self._went)
+        socket.add_post_pipe_connect_cb(self._pipe_added)
+        socket.add_post_pipe_remove_cb(self._pipe_removed)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.add(pipe.id)
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.discard(pipe.id)
 
     @property
@@ -112,7 +112,7 @@ class NanomsgClient(ClientCalls[_Call]):
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
         close_context(call.context)
         if outcome is not None:
-            self._end(call, outcome)
+            self._finish(call, outcome)
         with self._lock:
             self._threads.discard(threading.current_thread())
 
@@ -122,7 +122,7 @@ class NanomsgClient(ClientCalls[_Call]):
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
         try:
-            call.context.send(in_one(self._framing, parts))  # blocks until a server is connected
+            call.context.send(join_parts(self._framing, parts))  # blocks until a server is connected
             call.is_sent, call.data = True, b""  # the context outlives the timeout: free the payload
             parts.clear()
             data = call.context.recv()
@@ -131,14 +131,16 @@ class NanomsgClient(ClientCalls[_Call]):
         except (nng.NNGException, TypeError):
             return None
         try:
-            return self._framing.read_answer(in_parts(self._framing, data)).reply
+            return self._framing.read_answer(split_parts(self._framing, data)).reply
         except WireError as error:
             return error
 
-    def _end(self, call: _Call, outcome: Outcome) -> None:
+    def _finish(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
             is_waited_for = self._remove_locked(call)
-            is_late = self._left.pop(call.number, None) is not None and not isinstance(outcome, NepError)
+            is_late = self._late_calls.pop(call.number, None) is not None and not isinstance(
+                outcome, NepError
+            )
             self.late += is_late
         if is_waited_for:
             self._run_callback(call, outcome)
@@ -150,15 +152,21 @@ class NanomsgClient(ClientCalls[_Call]):
             if known is not None:
                 self._remove_locked(known)
         if known is not None:
-            self._leave(known)
+            self._abandon(known)
 
-    def _leave(self, call: _Call) -> None:
+    def _abandon(self, call: _Call) -> None:
         # Keeps receiving the reply of a call that is no longer in flight. Call without the lock.
         with self._lock:
             if call.is_sent:
-                self._left[call.number] = call
-            too_many = len(self._left) > _LEFT_MAX
-            closed = self._left.pop(next(iter(self._left))) if too_many else None if call.is_sent else call
+                self._late_calls[call.number] = call
+            too_many = len(self._late_calls) > _MAX_LATE_CALLS
+            closed = (
+                self._late_calls.pop(next(iter(self._late_calls)))
+                if too_many
+                else None
+                if call.is_sent
+                else call
+            )
         if closed is not None:
             close_context(closed.context)
 
@@ -172,7 +180,7 @@ class NanomsgClient(ClientCalls[_Call]):
             ]
             due = min((each.deadline for each in self._calls.values()), default=math.inf)
         for call in late:
-            self._leave(call)
+            self._abandon(call)
             kind = ServiceTimeoutError if call.is_sent else NoServerError
             self._run_callback(call, kind(self.spec.service, call.timeout_s or 0.0))
         return due
@@ -190,7 +198,7 @@ class NanomsgClient(ClientCalls[_Call]):
                 return
             self.is_closed = True
             left, self._calls = list(self._calls.values()), {}
-            abandoned, self._left = list(self._left.values()), {}
+            abandoned, self._late_calls = list(self._late_calls.values()), {}
             threads = tuple(self._threads)
         self._deadlines.forget(self)
         self._on_close(self)
@@ -209,6 +217,6 @@ class NanomsgClient(ClientCalls[_Call]):
         """Become closed in a forked child, without touching nng."""
         self.is_closed = True
         self._lock = threading.Lock()
-        for call in (*self._calls.values(), *self._left.values()):
+        for call in (*self._calls.values(), *self._late_calls.values()):
             keep_forever(call.context)
         self._calls = {}

@@ -10,8 +10,8 @@ from typing import Any
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.library import library, listen, new_socket, queue_of
-from nep.backends.nanomsg.sub_socket import QuickSub
+from nep.backends.nanomsg.library import library, listen, new_socket, queue_length
+from nep.backends.nanomsg.sub_socket import PollableSub
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
 from nep.backends.zeromq.sockets import RejectionLog, wait_until
@@ -29,7 +29,7 @@ _LINGER_S = 0.2
 """pynng discards its queue when a socket is closed and doesn't report when it is sent. Time after the last
 message to flush it.
 """
-_LARGEST = 2**20
+_LIBNANOMSG_MAX_BYTES = 2**20
 """libnanomsg silently rejects larger messages by default."""
 
 
@@ -89,9 +89,9 @@ class DirectPublisher:
         self._changed = threading.Condition(threading.RLock())
         self.fd = -1
         """-1: there is no input."""
-        self._socket: Any = new_socket("Pub0", send_buffer_size=queue_of(spec.codec.name))
-        self._socket.add_post_pipe_connect_cb(self._came)
-        self._socket.add_post_pipe_remove_cb(self._went)
+        self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec.name))
+        self._socket.add_post_pipe_connect_cb(self._pipe_added)
+        self._socket.add_post_pipe_remove_cb(self._pipe_removed)
         try:
             self.endpoint = attach(
                 self._socket, direct, is_publisher=True, what=f"a publisher of '{spec.topic}'"
@@ -110,12 +110,12 @@ class DirectPublisher:
         """True if there are any connections."""
         return bool(self._pipes)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
             self._changed.notify_all()
@@ -146,7 +146,7 @@ class DirectPublisher:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.count += 1
-            warns = len(frame) > _LARGEST and not self._has_warned
+            warns = len(frame) > _LIBNANOMSG_MAX_BYTES and not self._has_warned
             self._has_warned = self._has_warned or warns
             self._sent_at = time.monotonic()
             self._socket.send(frame, block=False)
@@ -155,7 +155,7 @@ class DirectPublisher:
                 _(
                     "a message on '{topic}' has {size} bytes; programs that use libnanomsg take no more than "
                     "{most} and say nothing, so send less at once"
-                ).format(topic=self.spec.topic, size=len(frame), most=_LARGEST)
+                ).format(topic=self.spec.topic, size=len(frame), most=_LIBNANOMSG_MAX_BYTES)
             )
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - no input
@@ -194,7 +194,7 @@ class DirectSubSocket(UnbatchedReader):
         self.problem = ""
         self._spec = spec
         self._codec = codec_for(spec.msg_type).name
-        self._sub = QuickSub(self._codec)
+        self._sub = PollableSub(self._codec)
         self.fd = self._sub.fd
         self._sub.socket.subscribe(b"")  # frames of generation B don't start with the topic
         try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from nep.backends.connection import Direct
 from nep.backends.deadlines import Deadlines
-from nep.backends.nanomsg.answering import ANSWER_S, NanomsgServer
+from nep.backends.nanomsg.answering import REPLY_TIMEOUT_S, NanomsgServer
 from nep.backends.nanomsg.calling import NanomsgClient
 from nep.backends.nanomsg.direct import attach, dial
 from nep.backends.nanomsg.library import listen, new_socket
@@ -24,10 +24,10 @@ from nep.protocol.service_wire import HEADER_BYTES, NATIVE, ORIGINAL, PAYLOAD_MA
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-_LARGEST = PAYLOAD_MAX_BYTES + HEADER_BYTES
-_ANSWER_MS = round(ANSWER_S * 1000)
-_FOR_EVER = -1
-_AGAIN = {"reconnect_time_min": 10, "reconnect_time_max": 500}
+_MAX_MESSAGE_BYTES = PAYLOAD_MAX_BYTES + HEADER_BYTES
+_ANSWER_MS = round(REPLY_TIMEOUT_S * 1000)
+_NEVER_RESEND = -1
+_RECONNECT_MS = {"reconnect_time_min": 10, "reconnect_time_max": 500}
 """Reconnection interval in milliseconds: the initial and the largest one."""
 
 
@@ -78,7 +78,7 @@ class DirectServices:
         self, spec: ServerSpec, kind: str, framing: Framing, attached: Callable[[object], str]
     ) -> NanomsgServer:
         self._check_open()
-        socket = new_socket(kind, send_timeout=_ANSWER_MS, recv_max_size=_LARGEST)
+        socket = new_socket(kind, send_timeout=_ANSWER_MS, recv_max_size=_MAX_MESSAGE_BYTES)
         try:
             server = NanomsgServer(socket, attached(socket), spec, framing, self._servers.discard)
         except BaseException:
@@ -96,7 +96,9 @@ class DirectServices:
     def client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
         """Create a client and start to connect; the server may start later."""
         self._check_open()
-        socket = new_socket("Req0", resend_time=_FOR_EVER, recv_max_size=_LARGEST, **_AGAIN)
+        socket = new_socket(
+            "Req0", resend_time=_NEVER_RESEND, recv_max_size=_MAX_MESSAGE_BYTES, **_RECONNECT_MS
+        )
         try:
             client = NanomsgClient(socket, spec, _framing(direct), self._deadlines, self._clients.discard)
             dial(socket, f"{direct.ip}:{direct.port}")

@@ -20,7 +20,7 @@ def endpoint(host: str, messages: int, hellos: int) -> str:
     return f"nanomsg://{host}:{messages}/{hellos}"
 
 
-def places_of(endpoint: str) -> tuple[str, str] | None:
+def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
     """Return the addresses (`HOST:PORT`) for messages and for hellos, or None for another back end."""
     found = _ENDPOINT.fullmatch(endpoint)
     if found is None or not all(0 < int(port) < 65536 for port in found.groups()[1:]):

@@ -19,12 +19,12 @@ from nep.system.descriptors import check_room
 from nep.system.exits import after_nodes, not_after_nodes
 from nep.system.forks import in_child
 
-MOST = 8192
+MAX_QUEUE = 8192
 """Largest queue that pynng allows, in messages. Its defaults are too small for bursts."""
 _QUEUES = {"image": 64, "bytes": 1000}
 SOCKET_FILES = 6
 """File descriptors per socket: the socket, its port, its signals, and a connection."""
-_TRIES = 100
+_PORT_ATTEMPTS = 100
 _MODULE = "pynng.nng"
 _at_exit: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
@@ -67,9 +67,9 @@ def _end_after_nodes() -> None:
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
     """Create a socket of pynng, such as "Pub0", with these options."""
-    made = getattr(library(), kind)(**options)
-    _sockets.add(made)
-    return made
+    created = getattr(library(), kind)(**options)
+    _sockets.add(created)
+    return created
 
 
 def keep_forever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
@@ -93,9 +93,9 @@ def _forked() -> None:
 in_child(_forked)
 
 
-def queue_of(codec: str) -> int:
+def queue_length(codec: str) -> int:
     """Return the queue length per connection, in messages. pynng doesn't bound the bytes."""
-    return _QUEUES.get(codec, MOST)
+    return _QUEUES.get(codec, MAX_QUEUE)
 
 
 def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
@@ -110,7 +110,7 @@ def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not ty
     """
     nng = library()
     check_room(SOCKET_FILES, what)
-    for _try in range(_TRIES):
+    for _try in range(_PORT_ATTEMPTS):
         try:
             listener = owner.listen(f"tcp://{address}")
         except nng.AddressInUse as error:

@@ -16,7 +16,7 @@ from typing import Any
 
 from nep.backends.base import PublisherSpec
 from nep.backends.nanomsg.endpoints import endpoint, own_part
-from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_of
+from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.publisher import GreetedPublisher
 from nep.backends.zeromq.sockets import LOOPBACK, RejectionLog, wait_until
@@ -37,9 +37,9 @@ from nep.protocol.wire import (
 )
 
 _logger = logging.getLogger("nep")
-_MOST_HELLOS = 10_000
+_MAX_HELLOS = 10_000
 _HELLO_QUEUE = 1000
-_BYE_AGAIN_S = 0.05
+_BYE_RETRY_S = 0.05
 
 
 class NanomsgPublisher(GreetedPublisher):
@@ -62,12 +62,12 @@ class NanomsgPublisher(GreetedPublisher):
         self.is_local = False
         self._on_close = on_close
         self._serve_soon = serve_soon
-        queue = max(queue_of(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
-        self._out: Any = new_socket("Pub0", send_buffer_size=queue)
-        self._in: Any = new_socket(
+        queue = max(queue_length(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
+        self._message_socket: Any = new_socket("Pub0", send_buffer_size=queue)
+        self._hello_socket: Any = new_socket(
             "Pull0", recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES
         )
-        self.fd = int(self._in.recv_fd)
+        self.fd = int(self._hello_socket.recv_fd)
         self._endpoint = ""
         self._bytes = 0
         self._last_stamp_ns: int | None = None
@@ -83,8 +83,8 @@ class NanomsgPublisher(GreetedPublisher):
         self._events: deque[tuple[int, str]] = deque()
         self._refusals = RejectionLog()
         super().__init__(threading.Condition(threading.Lock()), {})
-        self._out.add_post_pipe_connect_cb(self._came)
-        self._out.add_post_pipe_remove_cb(self._went)
+        self._message_socket.add_post_pipe_connect_cb(self._pipe_added)
+        self._message_socket.add_post_pipe_remove_cb(self._pipe_removed)
 
     # ---- subscribers
 
@@ -109,7 +109,9 @@ class NanomsgPublisher(GreetedPublisher):
         """Listen at the first call; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
         if not self._endpoint:
             what = f"a publisher of '{self.spec.topic}'"
-            messages, hellos = (listen(each, f"{LOOPBACK}:0", what) for each in (self._out, self._in))
+            messages, hellos = (
+                listen(each, f"{LOOPBACK}:0", what) for each in (self._message_socket, self._hello_socket)
+            )
             self._endpoint = endpoint(LOOPBACK, bound_port(messages), bound_port(hellos))
         return (self._endpoint,)
 
@@ -134,9 +136,9 @@ class NanomsgPublisher(GreetedPublisher):
 
     def send(self, encoded: Encoded) -> None:
         """Publish one message. Raises `WireError` for an extension that can't be encoded."""
-        data, beside = encoded
-        extension = extension_part(beside) if beside else b""
-        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if beside else 0)
+        data, extension_fields = encoded
+        extension = extension_part(extension_fields) if extension_fields else b""
+        flags = (LATCHED if self.spec.is_latched else 0) | (EXTENSION if extension_fields else 0)
         size = len(data) if isinstance(data, bytes) else data.nbytes
         with self._changed:
             if self._is_closed:
@@ -144,13 +146,13 @@ class NanomsgPublisher(GreetedPublisher):
             self.count += 1
             self._bytes += size
             self._last_stamp_ns = time.time_ns()
-            told = size if size <= SIZE_MAX else 0
+            size_field = size if size <= SIZE_MAX else 0
             header = Header(
-                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, told
+                self.spec.codec.number, flags, self.count, self._last_stamp_ns, self.spec.id, size_field
             )
             tail = b"".join((header.pack(), data, extension))
             self._history.add(tail, size)
-            self._out.send(self._topic + tail, block=False)
+            self._message_socket.send(self._topic + tail, block=False)
 
     # ---- subscribers, in the node's thread
 
@@ -158,67 +160,67 @@ class NanomsgPublisher(GreetedPublisher):
         """Process hellos, connects and disconnects."""
         with self._changed:
             while self._events:
-                self._note(*self._events.popleft())
+                self._note_connection_locked(*self._events.popleft())
             while not self._is_released:
                 try:
-                    said = self._in.recv(block=False)
+                    received = self._hello_socket.recv(block=False)
                 except self._again:
                     break
-                self._hello(said)
+                self._process_hello_locked(received)
         return PollState()
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, str(pipe.remote_address)))
         self._serve_soon(self)
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, ""))
         self._serve_soon(self)
 
-    def _note(self, pipe: int, address: str) -> None:
+    def _note_connection_locked(self, pipe: int, address: str) -> None:
         # `address` is "" for a closed connection. Call with the lock held.
         if address:
             self._pipes[pipe] = address
-            self._greet(address)
+            self._greet_locked(address)
             return
         gone = self._hellos.pop(self._pipes.pop(pipe, ""), None)
         if gone is not None and gone not in self._hellos.values():  # otherwise it has reconnected
             self._seen.pop(gone, None)
             self._changed.notify_all()
 
-    def _hello(self, said: bytes) -> None:
-        address, _space, part = said.partition(b" ")
+    def _process_hello_locked(self, received: bytes) -> None:
+        address, _space, part = received.partition(b" ")
         hello = parse_hello(part)
-        if hello is not None and len(self._hellos) >= _MOST_HELLOS:
-            self._forget_lone_hellos()
-        if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MOST_HELLOS:
-            if self._refusals.add(f"an invalid hello of {len(said)} bytes"):
+        if hello is not None and len(self._hellos) >= _MAX_HELLOS:
+            self._discard_lone_hellos_locked()
+        if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MAX_HELLOS:
+            if self._refusals.add(f"an invalid hello of {len(received)} bytes"):
                 _logger.info("'%s' received %s", self.spec.topic, self._refusals.recent_message())
             return
-        place = address.decode("ascii", "replace")
-        self._hellos[place] = hello.subscriber
-        if place in self._pipes.values():
-            self._greet(place)
+        remote = address.decode("ascii", "replace")
+        self._hellos[remote] = hello.subscriber
+        if remote in self._pipes.values():
+            self._greet_locked(remote)
 
-    def _forget_lone_hellos(self) -> None:
+    def _discard_lone_hellos_locked(self) -> None:
         # Hellos whose connection was never established, or is closed. Call with the lock held.
         there = set(self._pipes.values())
-        self._hellos = {place: each for place, each in self._hellos.items() if place in there}
+        self._hellos = {remote: each for remote, each in self._hellos.items() if remote in there}
 
-    def _greet(self, address: str) -> None:
+    def _greet_locked(self, address: str) -> None:
         # The history, then the echo: from here on the subscriber counts losses. Call with the lock held.
         subscriber = self._hellos.get(address)
         if subscriber is None or self._is_released:
             return
         self._seen[subscriber] = self.count
         for kept in self._history:
-            self._out.send(own_part(subscriber, self.spec.topic) + kept, block=False)
-        self._tell(subscriber, 0)
+            self._message_socket.send(own_part(subscriber, self.spec.topic) + kept, block=False)
+        self._send_notice_locked(subscriber, 0)
         self._changed.notify_all()
 
-    def _tell(self, subscriber: int, flags: int) -> None:
+    def _send_notice_locked(self, subscriber: int, flags: int) -> None:
         header = Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id)
-        self._out.send(own_part(subscriber, self.spec.topic) + header.pack(), block=False)
+        self._message_socket.send(own_part(subscriber, self.spec.topic) + header.pack(), block=False)
 
     # ---- closing
 
@@ -230,22 +232,22 @@ class NanomsgPublisher(GreetedPublisher):
         """Send the bye, after which every subscriber reads the remaining messages and disconnects."""
         with self._changed:
             self._is_closed = True
-            self._bye()
+            self._send_bye_locked()
 
     def finish(self, deadline: float) -> None:
         """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
-                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_AGAIN_S)):
-                    self._bye()  # a full queue drops the bye like any message
-            owed = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
-            if any(owed):
+                if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):
+                    self._send_bye_locked()  # a full queue drops the bye like any message
+            undelivered = [max(self.count - seen, len(self._history)) for seen in self._seen.values()]
+            if any(undelivered):
                 _logger.warning(
                     "'%s' was closed before %d subscriber(s) received everything: "
                     "up to %d messages not delivered",
                     self.spec.topic,
-                    sum(map(bool, owed)),
-                    max(owed),
+                    sum(map(bool, undelivered)),
+                    max(undelivered),
                 )
             self._seen.clear()
 
@@ -255,9 +257,9 @@ class NanomsgPublisher(GreetedPublisher):
             if self._is_released:
                 return
             self._is_closed = self._is_released = True
-        self._in.close()
-        self._out.close()
+        self._hello_socket.close()
+        self._message_socket.close()
 
-    def _bye(self) -> None:
+    def _send_bye_locked(self) -> None:
         for subscriber in () if self._is_released else self._seen:
-            self._tell(subscriber, BYE)
+            self._send_notice_locked(subscriber, BYE)

@@ -12,8 +12,8 @@ from typing import Any
 import zmq
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.nanomsg.endpoints import own_part, places_of, split_one
-from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_of
+from nep.backends.nanomsg.endpoints import own_part, parse_endpoint, split_one
+from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_length
 from nep.backends.zeromq.loss import PublisherTracker
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog
 from nep.backends.zeromq.sub_socket import CarefulParser, MessageBuffer
@@ -31,17 +31,20 @@ _logger = logging.getLogger("nep")
 _HELLO_QUEUE = 8
 
 
-class QuickSub:
+class PollableSub:
     """SUB socket with a descriptor to poll; an empty one returns None instead of raising."""
 
     def __init__(self, codec: str) -> None:
         nng = library()
-        self._nothing = (nng.TryAgain, nng.Timeout, nng.Closed)
+        self._empty_errors = (nng.TryAgain, nng.Timeout, nng.Closed)
         self.socket: Any = new_socket(
-            "Sub0", recv_buffer_size=queue_of(codec), recv_max_size=0, recv_timeout=round(SHORT_WAIT_S * 1000)
+            "Sub0",
+            recv_buffer_size=queue_length(codec),
+            recv_max_size=0,
+            recv_timeout=round(SHORT_WAIT_S * 1000),
         )
         self.fd = int(self.socket.recv_fd)
-        self._room = queue_of(codec)
+        self._room = queue_length(codec)
         self._is_closed = False
 
     @property
@@ -59,7 +62,7 @@ class QuickSub:
         """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
         try:
             return bytes(self.socket.recv(block=may_wait))
-        except self._nothing:
+        except self._empty_errors:
             return None
 
     def close(self) -> None:
@@ -72,7 +75,7 @@ class QuickSub:
 class _Link:
     # Connection to a publisher, with the PUSH socket for the hello.
     endpoint: str
-    place: str
+    address: str
     greeter: Any
     dialer: Any = None
 
@@ -88,7 +91,7 @@ class NanomsgSubSocket(UnbatchedReader):
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
         self.refusals = RejectionLog()
-        self._sub = QuickSub(codec_for(spec.msg_type).name)
+        self._sub = PollableSub(codec_for(spec.msg_type).name)
         self.fd = self._sub.fd
         self._name = spec.topic
         self._topic = topic_part(spec.topic)
@@ -126,9 +129,9 @@ class NanomsgSubSocket(UnbatchedReader):
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher (idempotent). Removes silent publishers that it replaces."""
         for old in self.sources.replaced_by(remote):
-            self.sources.settle(old)
+            self.sources.count_missing(old)
             self.leave(old)
-        source = self.sources.listed(remote)
+        source = self.sources.add_listed(remote)
         self._sub.make_room(remote.publisher.history)
         source.is_silent = False
         source.ends_at = None
@@ -140,7 +143,7 @@ class NanomsgSubSocket(UnbatchedReader):
             self._unlink(remote.publisher.id)
             source.has_echoed = False
         source.refused = source.problem = source.endpoint = ""
-        places = places_of(endpoint)
+        places = parse_endpoint(endpoint)
         why = "" if places is None else self._link(remote.publisher.id, endpoint, *places)
         if places is not None and not why:
             source.endpoint = f"tcp://{places[0]}"
@@ -152,17 +155,17 @@ class NanomsgSubSocket(UnbatchedReader):
         if self.refusals.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
-    def _link(self, publisher: int, endpoint: str, place: str, hellos: str) -> str:
+    def _link(self, publisher: int, endpoint: str, address: str, hellos: str) -> str:
         # The hello is sent once the connection is established. Returns the error, or "".
         nng = library()
         try:
             check_room(2 * SOCKET_FILES, f"a subscriber of '{self._name}'")
             # with a queue, sending never blocks pynng's threads
-            link = _Link(endpoint, place, new_socket("Push0", send_buffer_size=_HELLO_QUEUE))
+            link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE))
             self._links[publisher] = link
-            self._greeters[place] = link.greeter
+            self._greeters[address] = link.greeter
             link.greeter.dial(f"tcp://{hellos}", block=False)
-            link.dialer = self._sub.socket.dial(f"tcp://{place}", block=False)
+            link.dialer = self._sub.socket.dial(f"tcp://{address}", block=False)
         except (nng.NNGException, TooManyFilesError) as error:
             self._unlink(publisher)
             return str(error)
@@ -188,16 +191,16 @@ class NanomsgSubSocket(UnbatchedReader):
     def _unlink(self, publisher: int) -> None:
         link = self._links.pop(publisher, None)
         if link is not None:
-            self._greeters.pop(link.place, None)
+            self._greeters.pop(link.address, None)
             link.close()
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
         """Return the next message, or None; with `may_wait` wait up to `SHORT_WAIT_S`."""
-        while (came := self._sub.recv(may_wait=may_wait)) is not None:
-            is_alone = came.startswith(self._own)
+        while (frame := self._sub.recv(may_wait=may_wait)) is not None:
+            is_alone = frame.startswith(self._own)
             first = self._own if is_alone else self._topic
             try:
-                message = self._parser.parse(first, split_one(came, first, is_alone=is_alone))
+                message = self._parser.parse(first, split_one(frame, first, is_alone=is_alone))
             except WireError as error:
                 if self.refusals.add(error.reason):
                     _logger.warning("malformed message on '%s': %s", self._name, error)
@@ -208,7 +211,7 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def dropped(self, count: int) -> None:
         """Count received messages that were dropped for lack of room."""
-        self.sources.dropped(count)
+        self.sources.count_dropped(count)
 
     def close(self) -> None:
         """Close all sockets."""

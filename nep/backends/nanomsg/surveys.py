@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.answering import close_context, heard
+from nep.backends.nanomsg.answering import close_context, receive
 from nep.backends.nanomsg.direct import attach
 from nep.backends.nanomsg.library import keep_forever, library, new_socket
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
@@ -23,14 +23,14 @@ from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
 
 _JSON = 1
-_LONGEST_MS = 2**31 - 1
+_MAX_SURVEY_MS = 2**31 - 1
 _JOIN_S = 2.0
 
 Then = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
-class _Question:
+class _Survey:
     # Open survey; its pynng context receives the replies in a thread.
     number: int
     context: Any
@@ -55,11 +55,11 @@ class NanomsgSurveyor:
         self._on_close = on_close
         self._changed = threading.Condition(threading.Lock())
         self._pipes: set[int] = set()
-        self._questions: dict[int, _Question] = {}
-        self._asked = 0
+        self._surveys: dict[int, _Survey] = {}
+        self._survey_count = 0
         self._socket: Any = new_socket("Surveyor0")
-        self._socket.add_post_pipe_connect_cb(self._came)
-        self._socket.add_post_pipe_remove_cb(self._went)
+        self._socket.add_post_pipe_connect_cb(self._pipe_added)
+        self._socket.add_post_pipe_remove_cb(self._pipe_removed)
         try:
             attach(self._socket, direct, is_publisher=True, what=f"a surveyor of '{spec.service}'")
         except BaseException:
@@ -71,12 +71,12 @@ class NanomsgSurveyor:
         """Number of connected respondents."""
         return len(self._pipes)
 
-    def _came(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _went(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
 
@@ -90,43 +90,43 @@ class NanomsgSurveyor:
         with self._changed:
             if self.is_closed:
                 raise self._closed_error()
-            check_calls(self.spec.service, len(self._questions), 0, len(data))
+            check_calls(self.spec.service, len(self._surveys), 0, len(data))
             count = len(self._pipes)
             if not count:
                 return []
-            limit_ms = _LONGEST_MS if timeout_s is None else min(_LONGEST_MS, round(timeout_s * 1000))
+            limit_ms = _MAX_SURVEY_MS if timeout_s is None else min(_MAX_SURVEY_MS, round(timeout_s * 1000))
             self._socket.survey_time = max(1, limit_ms)
-            self._asked += 1
-            question = _Question(self._asked, self._socket.new_context(), count, then)
-            question.thread = threading.Thread(
-                target=self._hear, args=(question,), name=f"nep-{self.spec.service}", daemon=True
+            self._survey_count += 1
+            survey = _Survey(self._survey_count, self._socket.new_context(), count, then)
+            survey.thread = threading.Thread(
+                target=self._receive_replies, args=(survey,), name=f"nep-{self.spec.service}", daemon=True
             )
-            self._questions[question.number] = question
+            self._surveys[survey.number] = survey
         # Without the lock: callbacks in pynng's threads take it, and sending may wait for them.
         with contextlib.suppress(library().NNGException):  # just closed
-            question.context.send(bytes(data))
-            question.thread.start()
-        return [question] * count
+            survey.context.send(bytes(data))
+            survey.thread.start()
+        return [survey] * count
 
-    def _hear(self, question: _Question) -> None:
-        while question.left and (data := heard(question.context)) is not None:
-            question.left -= 1
-            if question.is_over:
+    def _receive_replies(self, survey: _Survey) -> None:
+        while survey.left and (data := receive(survey.context)) is not None:
+            survey.left -= 1
+            if survey.is_over:
                 return
-            question.then(ORIGINAL.read_answer([b"", data]).reply)
+            survey.then(ORIGINAL.read_answer([b"", data]).reply)
 
     def forget_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel the survey."""
         for call in calls[:1]:
             with self._changed:
-                question = self._questions.pop(call.number, None)
-            if question is not None:
-                self._end(question)
+                survey = self._surveys.pop(call.number, None)
+            if survey is not None:
+                self._finish(survey)
 
-    def _end(self, question: _Question) -> None:
-        question.is_over = True
-        close_context(question.context)
-        thread = question.thread
+    def _finish(self, survey: _Survey) -> None:
+        survey.is_over = True
+        close_context(survey.context)
+        thread = survey.thread
         if thread is not None and thread.ident is not None and thread is not threading.current_thread():
             thread.join(_JOIN_S)
 
@@ -136,19 +136,19 @@ class NanomsgSurveyor:
             if self.is_closed:
                 return
             self.is_closed = True
-            questions, self._questions = list(self._questions.values()), {}
+            surveys, self._surveys = list(self._surveys.values()), {}
         self._on_close(self)
-        for question in questions:
-            self._end(question)
-            question.then(self._closed_error())
+        for survey in surveys:
+            self._finish(survey)
+            survey.then(self._closed_error())
         self._socket.close()
 
     def forked(self) -> None:
         """Become closed in a forked child, without touching nng."""
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
-        for question in self._questions.values():
-            keep_forever(question.context)
+        for survey in self._surveys.values():
+            keep_forever(survey.context)
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

@@ -51,7 +51,7 @@ _CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _AR
 _EMPTY_LAYOUT = bytes(8)
 _DEPTH_HEADER = 12
 """Header of compressed_depth_image_transport, unused for 16-bit images; a PNG follows."""
-_NUMBER = 6
+_CODEC_NUMBER = 6
 """Not a codec number of the native wire, on which such messages aren't sent."""
 _definitions: dict[str, Definition] = {}
 
@@ -115,7 +115,7 @@ def ros_codec(definition: Definition) -> Codec:
     def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
         return definition.decode(data)
 
-    return Codec("ros", _NUMBER, encode, decode, dict, definition.check)
+    return Codec("ros", _CODEC_NUMBER, encode, decode, dict, definition.check)
 
 
 def _stamped(payload: object) -> object:
@@ -151,13 +151,13 @@ def _picture_codec(definition: Definition) -> Codec:
 
 
 def _encode_file(payload: object) -> Encoded:
-    made = image_codec.encode(payload)
-    _check_file(made, type(payload).__name__)
-    return made
+    encoded = image_codec.encode(payload)
+    _check_file(encoded, type(payload).__name__)
+    return encoded
 
 
-def _check_file(made: Encoded, kind: str) -> str:
-    encoding = (made.extension or {}).get("encoding")
+def _check_file(encoded: Encoded, kind: str) -> str:
+    encoding = (encoded.extension or {}).get("encoding")
     if encoding not in {"jpeg", "png"}:
         raise EncodeError(
             "image", kind, _("'{name}' carries JPEG and PNG; use the type '{raw}'").format(
@@ -233,7 +233,7 @@ def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpa
     """
     wanted = codec_for(msg_type)
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
-        raise another_version(ros_type)
+        raise version_error(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
         raise _mismatch(msg_type, ros_type)
     if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
@@ -251,11 +251,11 @@ def _installed_like(ros_type: str, md5sum: str) -> Definition:
     # For a publisher that doesn't announce its definition.
     definition, found = installed(ros_type), message_text(ros_type)
     if found is None or md5sum not in {"*", found[1]}:
-        raise another_version(ros_type)
+        raise version_error(ros_type)
     return definition
 
 
-def another_version(ros_type: str) -> NepError:
+def version_error(ros_type: str) -> NepError:
     """Return the error for a type with another definition on the other side."""
     return NepError(
         _(
@@ -272,7 +272,7 @@ def _mismatch(msg_type: str, ros_type: str) -> NepError:
     )
 
 
-def _sized(body: memoryview, at: int) -> tuple[memoryview, int]:
+def _read_sized(body: memoryview, at: int) -> tuple[memoryview, int]:
     # Returns the bytes after the length at `at`, and the offset of their end.
     (size,) = _LENGTH.unpack_from(body, at)
     if at + 4 + size > len(body):
@@ -280,15 +280,15 @@ def _sized(body: memoryview, at: int) -> tuple[memoryview, int]:
     return body[at + 4 : at + 4 + size], at + 4 + size
 
 
-def _all(body: memoryview, at: int) -> memoryview:
-    data, end = _sized(body, at)
+def _read_all(body: memoryview, at: int) -> memoryview:
+    data, end = _read_sized(body, at)
     if end != len(body):
         raise WireError(_("{count} bytes are too many").format(count=len(body) - end), len(body))
     return data
 
 
 def _from_string(body: memoryview) -> Unpacked:
-    return _all(body, 0), None
+    return _read_all(body, 0), None
 
 
 def _from_array(body: memoryview) -> Unpacked:
@@ -297,16 +297,16 @@ def _from_array(body: memoryview) -> Unpacked:
     if count * 12 > len(body):
         raise WireError(_("it is cut off"), len(body))
     for _number in range(count):
-        _label, at = _sized(body, at)
+        _label, at = _read_sized(body, at)
         at += 8
     (offset,) = _LENGTH.unpack_from(body, at)
-    return _all(body, at + 4)[offset:], None
+    return _read_all(body, at + 4)[offset:], None
 
 
 def _from_compressed(body: memoryview) -> Unpacked:
-    _frame, at = _sized(body, STAMP.size)
-    kind, at = _sized(body, at)
-    data = _all(body, at)
+    _frame, at = _read_sized(body, STAMP.size)
+    kind, at = _read_sized(body, at)
+    data = _read_all(body, at)
     if b"compressedDepth" in bytes(kind) and bytes(kind[:4]) == b"16UC":
         data = data[_DEPTH_HEADER:]
     return data, picture_info(data)
@@ -314,11 +314,11 @@ def _from_compressed(body: memoryview) -> Unpacked:
 
 def _from_raw(body: memoryview) -> Unpacked:
     # Returns the rows without padding, in little-endian order.
-    _frame, at = _sized(body, STAMP.size)
+    _frame, at = _read_sized(body, STAMP.size)
     height, width = struct.unpack_from("<II", body, at)
-    name, at = _sized(body, at + 8)
+    name, at = _read_sized(body, at + 8)
     is_big, step = struct.unpack_from("<BI", body, at)
-    pixels = _all(body, at + 5)
+    pixels = _read_all(body, at + 5)
     encoding = str(name, "utf-8", "replace")
     encoding = f"{encoding}C1" if encoding in {"8U", "16U", "32F"} else encoding
     layout = raw_layout(encoding)

@@ -27,15 +27,15 @@ _INTEGERS = {
     "uint32": "I", "int64": "q", "uint64": "Q",
 }  # fmt: skip
 _FLOATS = {"float32": "f", "float64": "d"}
-_LETTERS = {**_INTEGERS, **_FLOATS, "bool": "?"}
+_FORMATS = {**_INTEGERS, **_FLOATS, "bool": "?"}
 _TIMES = {"time": struct.Struct("<II"), "duration": struct.Struct("<ii")}
 _BYTES = ("uint8", "char")
 _LENGTH = struct.Struct("<I")
 _HEADERS = ("Header", "std_msgs/Header", "roslib/Header")
-_DEEPEST = 30
-_MOST_FIELDS = 2_000
+_MAX_DEPTH = 30
+_MAX_FIELDS = 2_000
 """Limit including nested fields: a definition may come from an untrusted publisher."""
-_MOST_EMPTY = 10_000
+_MAX_EMPTY = 10_000
 """Maximum number of nested messages without content."""
 
 
@@ -50,7 +50,7 @@ class _Reader:
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = memoryview(data)
         self.at = 0
-        self.messages_left = _MOST_EMPTY + _DEEPEST * len(self.data)
+        self.messages_left = _MAX_EMPTY + _MAX_DEPTH * len(self.data)
         """Remaining number of nested messages; those without content are not bounded by the data's size."""
 
     @property
@@ -69,7 +69,7 @@ class _Reader:
 
 @dataclass(frozen=True)
 class FieldKind:
-    """Type of a field with its encoder and decoder. A value has at least `least` bytes.
+    """Type of a field with its encoder and decoder. A value has at least `min_bytes` bytes.
 
     `fields` are those of a message; `element` is the type of an array's items, `length` the size of a fixed
     array.
@@ -78,7 +78,7 @@ class FieldKind:
     name: str
     write: Callable[[object, str, bytearray], None]
     read: Callable[[_Reader, str], object]
-    least: int
+    min_bytes: int
     fields: tuple[DefinitionField, ...] = ()
     element: FieldKind | None = None
     length: int | None = None
@@ -122,7 +122,7 @@ class Definition:
         """Decode a map. Raises `DecodeError` with the path of the invalid field."""
         reader = _Reader(data)
         try:
-            made = _read_fields(self.fields, reader, "")
+            values = _read_fields(self.fields, reader, "")
         except _FieldError as error:
             reason = _("field '{path}' {reason}").format(path=error.path, reason=error.reason)
             raise DecodeError(self.name, len(reader.data), reason) from None
@@ -130,7 +130,7 @@ class Definition:
             raise DecodeError(
                 self.name, len(reader.data), _("{count} bytes are too many").format(count=reader.left)
             )
-        return made
+        return values
 
     def check(self, payload: object) -> None:
         """Raise `EncodeError` if the payload isn't a map."""
@@ -171,8 +171,8 @@ class _Parser:
                 continue
             found = _FIELD.fullmatch(stripped)
             self._count += 1
-            if found is None or self._count > _MOST_FIELDS or found[4] in names:
-                raise self._bad(stripped)
+            if found is None or self._count > _MAX_FIELDS or found[4] in names:
+                raise self._definition_error(stripped)
             names.add(found[4])
             if depth == 0 and not fields:
                 self.has_header = found[1] in _HEADERS and not found[2] and found[4] == "header"
@@ -189,8 +189,8 @@ class _Parser:
         name = self._resolved(inside, written)
         known = self._known.get(name)
         if known is None:
-            if depth >= _DEEPEST:
-                raise self._bad(written)
+            if depth >= _MAX_DEPTH:
+                raise self._definition_error(written)
             known = self._known[name] = _nested(name, self.fields_of(name, depth + 1))
         return known
 
@@ -204,9 +204,9 @@ class _Parser:
         for each in candidates:
             if each in self._texts:
                 return each
-        raise self._bad(written)
+        raise self._definition_error(written)
 
-    def _bad(self, part: str) -> NepError:
+    def _definition_error(self, part: str) -> NepError:
         return NepError(
             _("the definition of '{name}' cannot be read; see '{part}' in it").format(
                 name=escaped(shortened(self._name, 100)), part=escaped(shortened(part, 60))
@@ -238,9 +238,9 @@ def _integer(name: str) -> FieldKind:
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if is_signed else (0, (1 << bits) - 1)
 
     def write(value: object, path: str, out: bytearray) -> None:
-        number = _whole(value)
+        number = _to_integer(value)
         if number is None:
-            raise _wrong(path, value, name)
+            raise _type_error(path, value, name)
         if not low <= number <= high:
             raise _FieldError(
                 path,
@@ -261,12 +261,12 @@ def _float(name: str) -> FieldKind:
     def write(value: object, path: str, out: bytearray) -> None:
         as_float = getattr(type(value), "__float__", None)
         if as_float is None or isinstance(value, bool):
-            raise _wrong(path, value, name)
+            raise _type_error(path, value, name)
         try:
             out += packing.pack(as_float(value))
         except (OverflowError, TypeError, ValueError, struct.error):
             raise _FieldError(
-                path, _("is {value}, which is no '{name}'").format(value=_shown(value), name=name)
+                path, _("is {value}, which is no '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     return FieldKind(
@@ -282,7 +282,7 @@ def _time(name: str) -> FieldKind:
             out += packing.pack(*_secs_of(value, path, name))
         except struct.error:
             raise _FieldError(
-                path, _("is {value}, which is no '{name}'").format(value=_shown(value), name=name)
+                path, _("is {value}, which is no '{name}'").format(value=_describe(value), name=name)
             ) from None
 
     def read(reader: _Reader, _path: str) -> object:
@@ -296,21 +296,21 @@ def _secs_of(value: object, path: str, name: str) -> tuple[int, int]:
     if isinstance(value, Mapping):
         for key in value:
             if key not in {"secs", "nsecs"}:
-                raise _unknown(path, key, ("secs", "nsecs"))
-        secs, nsecs = _whole(value.get("secs", 0)), _whole(value.get("nsecs", 0))
+                raise _unknown_field(path, key, ("secs", "nsecs"))
+        secs, nsecs = _to_integer(value.get("secs", 0)), _to_integer(value.get("nsecs", 0))
         if secs is not None and nsecs is not None:
             return secs, nsecs
     elif isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1 << 33:
         whole = round(value * 1_000_000_000) if isinstance(value, float) else value * 1_000_000_000
         return divmod(whole, 1_000_000_000)
-    raise _wrong(path, value, name)
+    raise _type_error(path, value, name)
 
 
 def _write_bool(value: object, path: str, out: bytearray) -> None:
     is_bool = isinstance(value, bool) or type(value).__name__ in {"bool", "bool_"}  # also numpy's
-    number = int(bool(value)) if is_bool else _whole(value)
+    number = int(bool(value)) if is_bool else _to_integer(value)
     if number not in {0, 1}:
-        raise _wrong(path, value, "bool")
+        raise _type_error(path, value, "bool")
     out.append(number)
 
 
@@ -321,7 +321,7 @@ def _write_string(value: object, path: str, out: bytearray) -> None:
         except UnicodeEncodeError:
             raise _FieldError(path, _("holds half of a surrogate pair")) from None
     if not isinstance(value, bytes):
-        raise _wrong(path, value, "string")
+        raise _type_error(path, value, "string")
     out += _LENGTH.pack(len(value))
     out += value
 
@@ -347,7 +347,7 @@ def _array(kind: FieldKind, length: int | None) -> FieldKind:
     def read_fixed(reader: _Reader, path: str) -> object:
         return read(reader, path, length)
 
-    return FieldKind(name, write, read_fixed, length * kind.least, element=kind, length=length)
+    return FieldKind(name, write, read_fixed, length * kind.min_bytes, element=kind, length=length)
 
 
 def _writes_bytes(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
@@ -371,7 +371,7 @@ def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memory
             return bytes(as_bytes())
         value = to_list()
     if not isinstance(value, Sequence) or isinstance(value, str):
-        raise _wrong(path, value, name)
+        raise _type_error(path, value, name)
     try:
         return bytes(value)
     except (TypeError, ValueError):
@@ -383,17 +383,17 @@ def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
 
 
 def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
-    letter = _LETTERS.get(kind.name, "") if kind.name != "bool" else ""
+    format_char = _FORMATS.get(kind.name, "") if kind.name != "bool" else ""
 
     def write(value: object, path: str, out: bytearray) -> None:
         to_list = getattr(value, "tolist", None)
         values = to_list() if callable(to_list) else value
         if not isinstance(values, Sequence) or isinstance(values, str | bytes | bytearray):
-            raise _wrong(path, value, name)
+            raise _type_error(path, value, name)
         _write_length(len(values), length, path, out)
-        if letter and not any(type(each) is bool for each in values):
+        if format_char and not any(type(each) is bool for each in values):
             try:
-                out += struct.pack(f"<{len(values)}{letter}", *values)
+                out += struct.pack(f"<{len(values)}{format_char}", *values)
                 return
             except (struct.error, OverflowError, TypeError, ValueError):
                 pass  # encode one by one to find the invalid item
@@ -404,14 +404,14 @@ def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
 
 
 def _reads_list(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
-    letter = _LETTERS.get(kind.name, "")
-    size = struct.calcsize(f"<{letter}")
+    format_char = _FORMATS.get(kind.name, "")
+    size = struct.calcsize(f"<{format_char}")
 
     def read(reader: _Reader, path: str, count: int) -> object:
-        if count * kind.least > reader.left:
+        if count * kind.min_bytes > reader.left:
             raise _FieldError(path, _("has {count} elements, more than can be there").format(count=count))
-        if letter:
-            return list(struct.unpack(f"<{count}{letter}", reader.take(count * size)))
+        if format_char:
+            return list(struct.unpack(f"<{count}{format_char}", reader.take(count * size)))
         return [kind.read(reader, path) for _number in range(count)]
 
     return read
@@ -433,7 +433,7 @@ def _nested(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
     def read(reader: _Reader, path: str) -> object:
         return _read_fields(fields, reader, path)
 
-    return FieldKind(name, write, read, sum(each.kind.least for each in fields), fields)
+    return FieldKind(name, write, read, sum(each.kind.min_bytes for each in fields), fields)
 
 
 def _write_fields(
@@ -442,35 +442,35 @@ def _write_fields(
     if not isinstance(payload, Mapping):
         if not path:
             raise _FieldError("", _not_a_map(fields))
-        raise _wrong(path, payload, name)
+        raise _type_error(path, payload, name)
     for each in fields:
         if each.name in payload:
             each.kind.write(payload[each.name], f"{path}.{each.name}" if path else each.name, out)
         else:
-            out += bytes(each.kind.least)  # zero and empty values are zero bytes in every type
+            out += bytes(each.kind.min_bytes)  # zero and empty values are zero bytes in every type
     if len(payload) > len(fields) or not payload.keys() <= {each.name for each in fields}:
         names = tuple(each.name for each in fields)
-        raise _unknown(path, next(key for key in payload if key not in names), names)
+        raise _unknown_field(path, next(key for key in payload if key not in names), names)
 
 
 def _read_fields(fields: tuple[DefinitionField, ...], reader: _Reader, path: str) -> dict[str, object]:
-    made: dict[str, object] = {}
+    values: dict[str, object] = {}
     reader.messages_left -= 1
     if reader.messages_left < 0:
         raise _FieldError(path, _("has more inside than can be there"))
     for each in fields:
         where = f"{path}.{each.name}" if path else each.name
         try:
-            made[each.name] = each.kind.read(reader, where)
+            values[each.name] = each.kind.read(reader, where)
         except struct.error:
             raise _FieldError(where, _("is cut off")) from None
-    return made
+    return values
 
 
 # ---- names
 
 
-def _whole(value: object) -> int | None:
+def _to_integer(value: object) -> int | None:
     # Accepts any integer class, such as numpy's; returns None for others.
     if isinstance(value, bool):
         return None
@@ -485,11 +485,11 @@ def _not_a_map(fields: tuple[DefinitionField, ...]) -> str:
     return _("publish a 'dict' with its fields {names}").format(names=names or "{}")
 
 
-def _wrong(path: str, value: object, name: str) -> _FieldError:
-    return _FieldError(path, _("is {value}; give a '{name}'").format(value=_shown(value), name=name))
+def _type_error(path: str, value: object, name: str) -> _FieldError:
+    return _FieldError(path, _("is {value}; give a '{name}'").format(value=_describe(value), name=name))
 
 
-def _unknown(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
+def _unknown_field(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
     where = f"{path}.{key}" if path else str(key)
     return _FieldError(
         escaped(shortened(where, 200)),
@@ -497,7 +497,7 @@ def _unknown(path: str, key: object, names: tuple[str, ...]) -> _FieldError:
     )
 
 
-def _shown(value: object) -> str:
+def _describe(value: object) -> str:
     if value is None or isinstance(value, str | int | float):
         return escaped(shortened(repr(value), 40))
     return _("a '{kind}'").format(kind=type(value).__name__)

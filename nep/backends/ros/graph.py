@@ -55,25 +55,25 @@ def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
     Rates of other nodes are unknown: ROS doesn't report them.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-    for topic, name in _others(known.publishers, own, lambda each: each.publishers):
+    for topic, name in _foreign(known.publishers, own, lambda each: each.publishers):
         kind = known.types.get(topic, "*")
         uri = known.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
-        _tell(graph, AddPublisher(_node(name, uri), record))
-    for topic, name in _others(known.subscribers, own, lambda each: each.subscribers):
-        heard = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
-        _tell(graph, AddSubscriber(_node(name, known.uris.get(name, "")), heard))
-    for service, name in _others(known.services, own, lambda each: each.servers):
+        _apply(graph, AddPublisher(_node(name, uri), record))
+    for topic, name in _foreign(known.subscribers, own, lambda each: each.subscribers):
+        subscriber_count = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
+        _apply(graph, AddSubscriber(_node(name, known.uris.get(name, "")), subscriber_count))
+    for service, name in _foreign(known.services, own, lambda each: each.servers):
         node = _node(name, known.uris.get(name, ""))
-        _tell(graph, _serves(node, _id(name, service, "s"), service))
+        _apply(graph, _server_request(node, _id(name, service, "s"), service))
     for each in own:
         if each.ros_name:
-            _tell_own(graph, each, known.uris.get(each.ros_name, ""))
+            _add_own(graph, each, known.uris.get(each.ros_name, ""))
     return graph.view()
 
 
-def _others(
+def _foreign(
     known: Mapping[str, Sequence[str]],
     own: list[OwnNode],
     rows_of: Callable[[OwnNode], Sequence[tuple[object, ...]]],
@@ -83,31 +83,36 @@ def _others(
     return ((each, node) for each, nodes in known.items() for node in nodes if (each, node) not in mine)
 
 
-def _serves(node: NodeRecord, server_id: int, service: str, uri: str = "") -> AddPublisher:
+def _server_request(node: NodeRecord, server_id: int, service: str, uri: str = "") -> AddPublisher:
     endpoints = (uri,) if uri else ()
     return AddPublisher(
         node, PublisherRecord(server_id, topic_of(service), SERVICE_TYPE, SERVICE_TYPE, endpoints)
     )
 
 
-def _tell_own(graph: Graph, own: OwnNode, uri: str) -> None:
+def _add_own(graph: Graph, own: OwnNode, uri: str) -> None:
     node = replace(own.node, generation=_GENERATION)
     for topic, kind, is_latched, count in own.publishers:
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(count.id, topic, kind, codec, (uri,) if uri else (), is_latched)
-        _tell(graph, AddPublisher(node, record))
-    for topic, kind, heard in own.subscribers:
-        _tell(graph, AddSubscriber(node, SubscriberRecord(heard.id, topic, kind)))
+        _apply(graph, AddPublisher(node, record))
+    for topic, kind, subscriber_count in own.subscribers:
+        _apply(graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic, kind)))
     for service, count in own.servers:
-        _tell(graph, _serves(node, count.id, service, uri))
-    for service, heard in own.clients:
-        _tell(graph, AddSubscriber(node, SubscriberRecord(heard.id, topic_of(service), SERVICE_TYPE)))
+        _apply(graph, _server_request(node, count.id, service, uri))
+    for service, subscriber_count in own.clients:
+        _apply(
+            graph, AddSubscriber(node, SubscriberRecord(subscriber_count.id, topic_of(service), SERVICE_TYPE))
+        )
     counts = (*(each[-1] for each in own.publishers), *(count for _, count in own.servers))
-    ears = (*(each[-1] for each in own.subscribers), *(heard for _, heard in own.clients))
-    _tell(graph, Renew(node.id, graph.epoch, graph.revision, counts, ears))
+    subscriber_counts = (
+        *(each[-1] for each in own.subscribers),
+        *(subscriber_count for _, subscriber_count in own.clients),
+    )
+    _apply(graph, Renew(node.id, graph.epoch, graph.revision, counts, subscriber_counts))
 
 
-def _tell(graph: Graph, request: Request) -> None:
+def _apply(graph: Graph, request: Request) -> None:
     graph.apply(request, 0, time.monotonic(), "")
 
 

@@ -29,8 +29,8 @@ _NAMES = frozenset({
     "rospy", "rosgraph", "roslib", "rospkg", "roscpp", "genpy", "genmsg", "catkin", "catkin_pkg",
     "yaml", "_yaml", "defusedxml", "netifaces", "distro", "dateutil", "docutils", "pyparsing", "six",
 })  # fmt: skip
-_ENDINGS = ("_msgs", "_srvs")
-_OLD_WAYS = r"(rospy|rosgraph|roslib|rospkg|genpy|genmsg|catkin_pkg)(\..*)?"
+_PACKAGE_SUFFIXES = ("_msgs", "_srvs")
+_DEPRECATED_MODULES = r"(rospy|rosgraph|roslib|rospkg|genpy|genmsg|catkin_pkg)(\..*)?"
 _inherited: set[str] = set()
 
 
@@ -48,7 +48,7 @@ class RosFinder(MetaPathFinder):
         target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
         """Find a top-level package of ROS; submodules are found by the package itself."""
-        if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_ENDINGS)):
+        if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)):
             return None
         return importlib.machinery.PathFinder.find_spec(name, self._places)
 
@@ -100,7 +100,7 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            made = load("rospy")
+            module = load("rospy")
             load("std_msgs.msg")
     except ImportError as error:
         raise BackendUnavailableError(
@@ -109,8 +109,8 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
         ) from error
     finally:
         logging.setLoggerClass(logger_class)  # rospy replaces the logger class for the whole program
-    warnings.filterwarnings("ignore", category=DeprecationWarning, module=_OLD_WAYS)
-    return made
+    warnings.filterwarnings("ignore", category=DeprecationWarning, module=_DEPRECATED_MODULES)
+    return module
 
 
 class ServiceTexts(NamedTuple):
@@ -123,14 +123,14 @@ class ServiceTexts(NamedTuple):
 
 def message_text(name: str) -> tuple[str, str] | None:
     """Return definition and MD5 sum of an installed message type; None if not installed."""
-    found = _found(name, "msg")
+    found = _installed_class(name, "msg")
     text, checksum = getattr(found, "_full_text", None), getattr(found, "_md5sum", None)
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
 def service_texts(name: str) -> ServiceTexts | None:
     """Return the definition of an installed service type, such as "std_srvs/SetBool", or None."""
-    found = _found(name, "srv")
+    found = _installed_class(name, "srv")
     request, answer = (
         getattr(getattr(found, each, None), "_full_text", None)
         for each in ("_request_class", "_response_class")
@@ -141,7 +141,7 @@ def service_texts(name: str) -> ServiceTexts | None:
     return None
 
 
-def _found(name: str, folder: str) -> object:
+def _installed_class(name: str, folder: str) -> object:
     package, _slash, kind = name.partition("/")
     if not package.isidentifier() or not kind.isidentifier():
         return None

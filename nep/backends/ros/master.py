@@ -15,10 +15,10 @@ from nep.errors import MasterUnreachable, NepError
 from nep.i18n import _
 
 _CALLER = "/nep"
-_ASK_S = 1.0
+_REQUEST_TIMEOUT_S = 1.0
 """Timeout of one request to a master."""
-_AGAIN_S = 0.1
-_OF_ROSPY = ("/get_loggers", "/set_logger_level")
+_RETRY_S = 0.1
+_ROSPY_SERVICES = ("/get_loggers", "/set_logger_level")
 """Services that every ROS node has."""
 _FAILURES = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
@@ -68,8 +68,8 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
 def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
     """Return a node's connections: peer, direction ("i" or "o") and topic. Empty if it doesn't answer."""
     try:
-        said = _call(uri, timeout_s, "getBusInfo", _CALLER)
-        return [(str(each[1]), str(each[2]), str(each[4])) for each in said]
+        buses = _call(uri, timeout_s, "getBusInfo", _CALLER)
+        return [(str(each[1]), str(each[2]), str(each[4])) for each in buses]
     except _FAILURES:
         return []
 
@@ -107,19 +107,19 @@ class RosMaster:
         pause = threading.Event()
         while True:
             waited = time.monotonic() - started
-            left = _ASK_S if timeout_s is None else min(_ASK_S, timeout_s - waited)
+            left = _REQUEST_TIMEOUT_S if timeout_s is None else min(_REQUEST_TIMEOUT_S, timeout_s - waited)
             try:
                 _call(self.uri, left, "getPid", _CALLER)
                 return
             except _FAILURES as error:
                 waited = time.monotonic() - started
-                if timeout_s is not None and waited + _AGAIN_S >= timeout_s:
+                if timeout_s is not None and waited + _RETRY_S >= timeout_s:
                     raise RosMasterUnreachable(self.address, timeout_s) from error
-            pause.wait(_AGAIN_S)
+            pause.wait(_RETRY_S)
 
     def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the nodes that publish a topic, and those that subscribe to it."""
-        state = self._ask("getSystemState", timeout_s)
+        state = self._request("getSystemState", timeout_s)
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
 
@@ -156,12 +156,12 @@ class RosMaster:
 
     def nodes(self, timeout_s: float) -> RosNodes:
         """Return the state of the master."""
-        state = self._ask("getSystemState", timeout_s)
+        state = self._request("getSystemState", timeout_s)
         publishers, subscribers, services = (
             {str(each): tuple(names) for each, names in part} for part in state[:3]
         )
-        served = {name: nodes for name, nodes in services.items() if not name.endswith(_OF_ROSPY)}
-        types = {str(topic): str(kind) for topic, kind in self._ask("getTopicTypes", timeout_s)}
+        served = {name: nodes for name, nodes in services.items() if not name.endswith(_ROSPY_SERVICES)}
+        types = {str(topic): str(kind) for topic, kind in self._request("getTopicTypes", timeout_s)}
         names = {
             name for part in (publishers, subscribers, served) for each in part.values() for name in each
         }
@@ -169,8 +169,8 @@ class RosMaster:
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
         """Return the services that have a server."""
-        services = self._ask("getSystemState", timeout_s)[2]
-        return tuple(str(name) for name, _nodes in services if not str(name).endswith(_OF_ROSPY))
+        services = self._request("getSystemState", timeout_s)[2]
+        return tuple(str(name) for name, _nodes in services if not str(name).endswith(_ROSPY_SERVICES))
 
     def service_uri(self, name: str, timeout_s: float) -> str:
         """Return the address of a service, or ""."""
@@ -191,7 +191,7 @@ class RosMaster:
             return {}
         return {name: str(each[2]) for name, each in zip(names, answers, strict=False) if each[0] == 1}
 
-    def _ask(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
+    def _request(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
         try:
             return _call(self.uri, timeout_s, method, _CALLER)
         except _FAILURES as error:

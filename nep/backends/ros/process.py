@@ -34,10 +34,10 @@ _logger = logging.getLogger("nep")
 _NAME = re.compile(r"\W+", re.ASCII)
 _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
-_ASK_S = 0.5
-_WATCH_S = 1.0
+_REQUEST_TIMEOUT_S = 0.5
+_MASTER_CHECK_S = 1.0
 """Interval for detecting a restart of the master."""
-_LEAST_S = 0.2
+_MIN_TIMEOUT_S = 0.2
 """Minimum time in seconds for a request to the master, even when the timeout has almost passed."""
 
 
@@ -99,7 +99,7 @@ class RosProcess:
         """Unregister everything and shut rospy down at the end of the program."""
         self._ended.set()
         try:
-            self.master.wait(_ASK_S)
+            self.master.wait(_REQUEST_TIMEOUT_S)
         except RosMasterUnreachable:
             return
         self.rospy.signal_shutdown("the program exits")
@@ -108,16 +108,16 @@ class RosProcess:
         if not self._ended.is_set():
             self._ended.set()
             _logger.warning("%s", RosShutdownError())
-            for tell in list(self.at_shutdown):
-                tell()
+            for callback in list(self.at_shutdown):
+                callback()
 
     def _watch(self) -> None:
         # Thread that detects restarts of the master until rospy ends.
-        while not self._ended.wait(_WATCH_S):
-            if self.master.has_forgotten(self.name, _ASK_S) and self._register_anew():
+        while not self._ended.wait(_MASTER_CHECK_S):
+            if self.master.has_forgotten(self.name, _REQUEST_TIMEOUT_S) and self._register_again():
                 _logger.warning("the ROS master at '%s' was restarted; registered again", self.master.address)
 
-    def _register_anew(self) -> bool:
+    def _register_again(self) -> bool:
         # Repeats rospy's registrations, which rospy doesn't do after a restart of the master. Returns False
         # on failure.
         registration = self.rospy.impl.registration
@@ -125,7 +125,7 @@ class RosProcess:
         with topics.lock:  # a registration removed meanwhile must not be restored
             known = Registered(topics.get_publications(), topics.get_subscriptions(), services)
             return bool(known.publications or known.subscriptions or services) and self.master.register(
-                self.name, self.uri, known, _ASK_S
+                self.name, self.uri, known, _REQUEST_TIMEOUT_S
             )
 
     def resolved(self, topic: str) -> str:
@@ -158,12 +158,12 @@ class RosProcess:
             self._types[topic] = definition.name, users + 1
         return made
 
-    def publishes(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
+    def add_publisher(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
         """Add a nep publisher, with the publisher returned by `advertise`."""
         with self._lock:
             self._published.setdefault(topic, {})[id_] = publisher
 
-    def publishes_no_more(self, topic: str, id_: int) -> None:
+    def remove_publisher(self, topic: str, id_: int) -> None:
         """Remove a closed publisher."""
         with self._lock:
             self._published.get(topic, {}).pop(id_, None)
@@ -184,7 +184,7 @@ class RosProcess:
 
     def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
         """Unregister a publisher."""
-        if self.is_over or not within(publisher.unregister, timeout_s):
+        if self.is_over or not run_with_timeout(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
             known, users = self._types[topic]
@@ -195,7 +195,7 @@ class RosProcess:
     def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
         """Unregister a subscriber."""
         if not self.is_over:
-            within(subscriber.unregister, timeout_s)
+            run_with_timeout(subscriber.unregister, timeout_s)
 
     def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
         """Wait until rospy has sent its queue; return the number of connections with unsent messages."""
@@ -271,18 +271,18 @@ class RosProcess:
     def peer_unsubscribe(self, *_told: object) -> None:
         """Do nothing when a subscriber disconnects. Called by rospy."""
 
-    def hearers(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy is not typed
+    def connected_nodes(self, publisher: Any) -> tuple[str, ...]:  # noqa: ANN401 - rospy is not typed
         """Return the names of the nodes connected to a publisher."""
         impl = publisher.impl
         return () if impl is None else tuple(str(each.endpoint_id) for each in impl.connections)
 
-    def wait_for_hearers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
+    def wait_for_subscribers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
         """Wait until all registered subscribers are connected, for up to `timeout_s` seconds."""
-        expected = set(self.master.names(topic, _ASK_S)[1])
+        expected = set(self.master.names(topic, _REQUEST_TIMEOUT_S)[1])
         with self.changed:
-            self.changed.wait_for(lambda: expected <= set(self.hearers(publisher)), timeout_s)
+            self.changed.wait_for(lambda: expected <= set(self.connected_nodes(publisher)), timeout_s)
 
-    def wait_for_sources(self, topic: str, timeout_s: float) -> None:
+    def wait_for_publishers(self, topic: str, timeout_s: float) -> None:
         """Wait until all publishers of a topic report a connection to this node.
 
         rospy lists its own side of a connection before it is established.
@@ -290,14 +290,14 @@ class RosProcess:
         deadline = time.monotonic() + timeout_s
         pause = threading.Event()
         uris = {
-            name: self.uri if name == self.name else self.master.uri_of(name, _ASK_S)
-            for name in self.master.names(topic, _ASK_S)[0]
+            name: self.uri if name == self.name else self.master.uri_of(name, _REQUEST_TIMEOUT_S)
+            for name in self.master.names(topic, _REQUEST_TIMEOUT_S)[0]
         }
         for uri in filter(None, uris.values()):
-            while (left := deadline - time.monotonic()) > 0.0 and not self._is_heard_from(uri, topic, left):
+            while (left := deadline - time.monotonic()) > 0.0 and not self._is_connected_to(uri, topic, left):
                 pause.wait(_POLL_S)
 
-    def _is_heard_from(self, uri: str, topic: str, timeout_s: float) -> bool:
+    def _is_connected_to(self, uri: str, topic: str, timeout_s: float) -> bool:
         if uri != self.uri:
             buses = buses_of(uri, timeout_s)
             return not buses or (self.name, "o", topic) in buses
@@ -305,7 +305,7 @@ class RosProcess:
         return own is None or self.name in {each.endpoint_id for each in own.connections}
 
 
-def within(call: Callable[[], object], timeout_s: float) -> bool:
+def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
     """Run `call` in a thread and wait; return False on timeout.
 
     rospy's requests to a master have no timeout.
@@ -315,7 +315,7 @@ def within(call: Callable[[], object], timeout_s: float) -> bool:
         thread.start()
     except RuntimeError:  # Python 3.12 starts no threads at exit; rospy itself unregisters everything then
         return False
-    thread.join(max(_LEAST_S, timeout_s))
+    thread.join(max(_MIN_TIMEOUT_S, timeout_s))
     return not thread.is_alive()
 
 

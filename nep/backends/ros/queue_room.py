@@ -23,22 +23,22 @@ class QueueRoom:
         is_measured = self._unmeasured >= min(_STEP_BYTES, self._max_bytes)
         if is_measured:
             self._unmeasured = 0
-        most = self._max_bytes - size if is_measured else None
-        return sum(_shorten(each, most) for each in connections)
+        max_left = self._max_bytes - size if is_measured else None
+        return sum(_drop_oldest(each, max_left) for each in connections)
 
 
-def _shorten(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401 - rospy is not typed
+def _drop_oldest(connection: Any, max_bytes: int | None) -> int:  # noqa: ANN401 - rospy is not typed
     # connections of the program's own publishers may have no queue
     queue_size = getattr(connection, "_queue_size", 0)
     if not queue_size:
         return 0
     with connection._lock:  # noqa: SLF001 - rospy has no API for it
         queue: list[bytes] = connection._queue  # noqa: SLF001 - its thread removes all of it at once
-        surplus = max(0, len(queue) - queue_size + 1)
-        if max_bytes is not None and len(queue) > surplus:
-            left = sum(map(len, queue)) - sum(map(len, queue[:surplus]))
-            while left > max_bytes and surplus < len(queue):
-                left -= len(queue[surplus])
-                surplus += 1
-        del queue[:surplus]
-    return surplus
+        drop_count = max(0, len(queue) - queue_size + 1)
+        if max_bytes is not None and len(queue) > drop_count:
+            left = sum(map(len, queue)) - sum(map(len, queue[:drop_count]))
+            while left > max_bytes and drop_count < len(queue):
+                left -= len(queue[drop_count])
+                drop_count += 1
+        del queue[:drop_count]
+    return drop_count

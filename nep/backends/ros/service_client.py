@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nep.backends.ros.carried import another_version
+from nep.backends.ros.carried import version_error
 from nep.backends.ros.master import RosMasterUnreachable
 from nep.backends.ros.process import RosProcess
 from nep.backends.ros.service_connection import ServiceConnection
@@ -21,9 +21,9 @@ from nep.protocol.requests import SubscriberCount
 from nep.protocol.service_wire import CallKind, failure
 
 _logger = logging.getLogger("nep")
-_ASK_S = 0.5
-_AGAIN_S = 0.1
-_LOOK_S = 0.2
+_REQUEST_TIMEOUT_S = 0.5
+_RETRY_S = 0.1
+_CONNECTED_TIMEOUT_S = 0.2
 
 Then = Callable[[Outcome], None]
 
@@ -49,16 +49,18 @@ class RosClient(ClientCalls[_Call]):
         super().__init__(spec)
         self.process = process
         self.service = process.resolved(spec.service)
-        self._forget_me = forget
+        self._on_close = forget
         self._waiting: list[_Call] = []
-        self._is_looking = False
-        self._is_over = threading.Event()
+        self._is_discovering = False
+        self._closed = threading.Event()
         self._threads: set[threading.Thread] = set()
 
     @property
     def is_connected(self) -> bool:
         """True if the master knows a server."""
-        return not self.is_closed and bool(self.process.master.service_uri(self.service, _LOOK_S))
+        return not self.is_closed and bool(
+            self.process.master.service_uri(self.service, _CONNECTED_TIMEOUT_S)
+        )
 
     def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
@@ -70,29 +72,29 @@ class RosClient(ClientCalls[_Call]):
             call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(call.data)
-            self._seek(call)
+            self._seek_locked(call)
         return call
 
     # ---- server discovery, in one thread for all waiting calls
 
-    def _seek(self, call: _Call) -> None:
+    def _seek_locked(self, call: _Call) -> None:
         # Call with the lock held.
         self._waiting.append(call)
-        if not self._is_looking:
-            self._is_looking = True
-            self._start(self._look)
+        if not self._is_discovering:
+            self._is_discovering = True
+            self._start_thread_locked(self._discover)
 
-    def _start(self, target: Callable[..., None], *arguments: object) -> None:
+    def _start_thread_locked(self, target: Callable[..., None], *arguments: object) -> None:
         # Call with the lock held.
         name = f"nep-call-{self.spec.service}"
         thread = threading.Thread(target=target, args=arguments, name=name, daemon=True)
         self._threads = {each for each in self._threads if each.is_alive()} | {thread}
         thread.start()
 
-    def _look(self) -> None:
+    def _discover(self) -> None:
         # Runs until each waiting call has a server or has expired.
         while True:
-            uri = self.process.master.service_uri(self.service, _ASK_S)
+            uri = self.process.master.service_uri(self.service, _REQUEST_TIMEOUT_S)
             now = time.monotonic()
             with self._lock:
                 waiting = [each for each in self._waiting if each.number in self._calls]
@@ -100,18 +102,18 @@ class RosClient(ClientCalls[_Call]):
                 ready = waiting if uri else []
                 self._waiting = [] if uri else [each for each in waiting if each.deadline > now]
                 for call in ready[1:]:
-                    self._start(self._run, call, uri)
+                    self._start_thread_locked(self._run, call, uri)
                 is_done = not self._waiting or self.is_closed
                 if is_done:
-                    self._is_looking = False
+                    self._is_discovering = False
                 due = min((each.deadline for each in self._waiting), default=math.inf)
             for call in late:
-                self._end_with(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
+                self._finish(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
             if ready:
                 self._run(ready[0], uri)
             if is_done:
                 return
-            self._is_over.wait(max(0.0, min(_AGAIN_S, due - time.monotonic())))
+            self._closed.wait(max(0.0, min(_RETRY_S, due - time.monotonic())))
 
     # ---- calling, in one thread per call
 
@@ -120,7 +122,7 @@ class RosClient(ClientCalls[_Call]):
             with self.process.handshakes.turn(uri, lambda: call.number not in self._calls, call.deadline):
                 connection = ServiceConnection(uri, self.service, self.process.name, call.deadline)
         except OSError:  # no longer registered, or just closed
-            self._look_again(call)
+            self._retry_discovery(call)
             return
         try:
             outcome = self._outcome(call, connection)
@@ -131,20 +133,20 @@ class RosClient(ClientCalls[_Call]):
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
         finally:
             connection.close()
-        self._end_with(call, outcome)
+        self._finish(call, outcome)
 
-    def _look_again(self, call: _Call) -> None:
+    def _retry_discovery(self, call: _Call) -> None:
         # Waits first, so that a registered but unreachable server isn't tried continuously.
         left = call.deadline - time.monotonic()
-        self._is_over.wait(max(0.0, min(_AGAIN_S, left)))
+        self._closed.wait(max(0.0, min(_RETRY_S, left)))
         if left <= 0.0:
-            self._end_with(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
+            self._finish(call, NoServerError(self.spec.service, call.timeout_s or 0.0))
             return
         with self._lock:
             if call.number in self._calls:
-                self._seek(call)
+                self._seek_locked(call)
 
-    def _end_with(self, call: _Call, outcome: Outcome) -> None:
+    def _finish(self, call: _Call, outcome: Outcome) -> None:
         is_answered = not isinstance(outcome, NepError)
         with self._lock:
             is_waited_for = self._remove_locked(call)
@@ -160,7 +162,7 @@ class RosClient(ClientCalls[_Call]):
                 return self._closed_error()  # discarded
             call.connection = connection
         try:
-            is_carried_out, answer = connection.ask(
+            is_carried_out, answer = connection.call(
                 kind.body_of_call(self.spec.codec, call.data, call.timeout_s)
             )
         except TimeoutError:
@@ -176,7 +178,7 @@ class RosClient(ClientCalls[_Call]):
     def _type_of(self, connection: ServiceConnection) -> ServiceType:
         kind = installed_service(connection.header["type"])
         if connection.header.get("md5sum", "*") not in {"*", kind.md5sum}:
-            raise another_version(kind.name)
+            raise version_error(kind.name)
         return kind
 
     def forget(self, call: OpenCall) -> None:
@@ -185,9 +187,9 @@ class RosClient(ClientCalls[_Call]):
             known = self._calls.get(call.number)
             if known is not None:
                 self._remove_locked(known)
-                self._end(known)
+                self._interrupt_locked(known)
 
-    def _end(self, call: _Call) -> None:
+    def _interrupt_locked(self, call: _Call) -> None:
         # Ends the call's thread. Call with the lock held.
         if call.connection is not None:
             call.connection.end()
@@ -203,7 +205,7 @@ class RosClient(ClientCalls[_Call]):
         """Return the statistics for the graph."""
         return SubscriberCount(self.spec.id, self._answered, self._failed)
 
-    def close(self, timeout_s: float = _ASK_S) -> None:
+    def close(self, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
         """Unregister; calls in flight fail with `ClosedError`."""
         with self._lock:
             if self.is_closed:
@@ -211,10 +213,10 @@ class RosClient(ClientCalls[_Call]):
             self.is_closed = True
             left, self._calls = list(self._calls.values()), {}
             for call in left:
-                self._end(call)
+                self._interrupt_locked(call)
             threads = tuple(self._threads)
-        self._is_over.set()
-        self._forget_me(self)
+        self._closed.set()
+        self._on_close(self)
         for call in left:
             self._run_callback(call, self._closed_error())
         deadline = time.monotonic() + timeout_s

@@ -75,7 +75,7 @@ class ServiceConnection:
         self._socket = socket.create_connection((host, port), max(0.001, self._left()))
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self.header = self._shake_hands({"callerid": caller, "service": service, "md5sum": "*"})
+            self.header = self._handshake({"callerid": caller, "service": service, "md5sum": "*"})
             self._deadline = deadline
         except BaseException:
             self._socket.close()
@@ -84,10 +84,10 @@ class ServiceConnection:
     def _left(self) -> float:
         return self._deadline - time.monotonic()
 
-    def _shake_hands(self, fields: dict[str, str]) -> dict[str, str]:
+    def _handshake(self, fields: dict[str, str]) -> dict[str, str]:
         packed = [f"{key}={value}".encode() for key, value in fields.items()]
         self._send(b"".join(_LENGTH.pack(len(each)) + each for each in packed))
-        data = self._sized(_HEADER_MAX_BYTES)
+        data = self._receive_sized(_HEADER_MAX_BYTES)
         header: dict[str, str] = {}
         at = 0
         while at + 4 <= len(data):
@@ -99,34 +99,34 @@ class ServiceConnection:
             raise ServiceConnectionError(header.get("error", ""))
         return header
 
-    def ask(self, body: bytes) -> tuple[bool, bytes]:
+    def call(self, body: bytes) -> tuple[bool, bytes]:
         """Send a request; return True and the response, or False and the error."""
         self._send(body)
-        is_carried_out = self._exactly(1) != b"\0"
-        return is_carried_out, self._sized(PAYLOAD_MAX_BYTES + 2**20)
+        is_carried_out = self._receive_exactly(1) != b"\0"
+        return is_carried_out, self._receive_sized(PAYLOAD_MAX_BYTES + 2**20)
 
     def _send(self, data: bytes) -> None:
-        self._limit()
+        self._set_timeout()
         self._socket.sendall(_LENGTH.pack(len(data)) + data)
 
-    def _sized(self, most: int) -> bytes:
-        (size,) = _LENGTH.unpack(self._exactly(4))
-        if size > most:
+    def _receive_sized(self, max_size: int) -> bytes:
+        (size,) = _LENGTH.unpack(self._receive_exactly(4))
+        if size > max_size:
             raise ServiceConnectionError(_("it sends too much"))
-        return self._exactly(size)
+        return self._receive_exactly(size)
 
-    def _exactly(self, size: int) -> bytes:
+    def _receive_exactly(self, size: int) -> bytes:
         data = bytearray(size)
         view = memoryview(data)
         while view:
-            self._limit()
+            self._set_timeout()
             count = self._socket.recv_into(view)
             if not count:
                 raise ServiceConnectionError(_("it is gone"))
             view = view[count:]
         return bytes(data)
 
-    def _limit(self) -> None:
+    def _set_timeout(self) -> None:
         if self._deadline == math.inf:
             self._socket.settimeout(None)
             return

@@ -17,7 +17,7 @@ from nep.protocol.requests import PublisherCount
 from nep.protocol.service_wire import CallKind, Reply, failure, read_failure
 
 
-class _Waiting:
+class _PendingReply:
     # Thread of rospy that waits for the reply to its call.
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -52,9 +52,9 @@ class RosServer:
         self._forget = forget
         self._type = served_type(spec.msg_type)
         self._changed = threading.Condition(threading.Lock())
-        self._waiting: set[_Waiting] = set()
+        self._pending_replies: set[_PendingReply] = set()
         self._unregistering: threading.Thread | None = None
-        process.at_shutdown.add(self._rospy_ends)
+        process.at_shutdown.add(self._on_rospy_shutdown)
         self._response = _message_class(process.rospy, f"{self._type.name}Response", self._type)
         self._rospy_service: Any = process.serve(self.service, _service_class(process.rospy, self._type,
             self._response), self._handle)  # fmt: skip
@@ -67,37 +67,37 @@ class RosServer:
     # ---- callbacks of rospy, in a thread per connection
 
     def _handle(self, request: Any) -> Any:  # noqa: ANN401 - rospy is not typed
-        waiting = _Waiting()
+        pending_reply = _PendingReply()
         with self._changed:
-            self._waiting.add(waiting)
+            self._pending_replies.add(pending_reply)
         try:
-            self._ask(request.body, waiting)
-            body, reason = waiting.wait()
+            self._queue_call(request.body, pending_reply)
+            body, reason = pending_reply.wait()
             if body is None:
                 raise self.process.rospy.ServiceException(reason)  # rospy sends it to the client
-            made = self._response()
-            made.body = body
-            return made
+            response = self._response()
+            response.body = body
+            return response
         finally:
             with self._changed:
-                self._waiting.discard(waiting)
+                self._pending_replies.discard(pending_reply)
                 self._changed.notify_all()
 
-    def _ask(self, body: bytes, waiting: _Waiting) -> None:
+    def _queue_call(self, body: bytes, pending_reply: _PendingReply) -> None:
         # Queues the call or rejects it.
         try:
-            asked = self._type.call_in(body)
+            call = self._type.call_in(body)
         except NepError as error:
-            self._answer(waiting, failure(CallKind.REFUSED, "", str(error)))
+            self._answer(pending_reply, failure(CallKind.REFUSED, "", str(error)))
             return
-        deadline = None if asked.timeout_s is None else time.monotonic() + asked.timeout_s
+        deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
         incoming = IncomingCall(
-            asked.data, asked.codec, deadline, lambda reply: self._answer(waiting, fitting(reply))
+            call.data, call.codec, deadline, lambda reply: self._answer(pending_reply, fitting(reply))
         )
         if self.is_closed or not self.calls.put(incoming):
-            self._answer(waiting, refusal(self.spec.service, is_closed=self.calls.is_closed))
+            self._answer(pending_reply, refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, waiting: _Waiting, reply: Reply) -> bool:
+    def _answer(self, pending_reply: _PendingReply, reply: Reply) -> bool:
         body: bytes | None = None
         if self._type is NEP_CALL or reply.kind == CallKind.ANSWER:
             try:
@@ -106,8 +106,8 @@ class RosServer:
                 reply = failure(CallKind.ERROR, type(error).__name__, str(error))
         self.tally.add(reply)
         if body is not None:
-            return waiting.end(body)
-        return waiting.end(None, ": ".join(filter(None, read_failure(reply.data))))
+            return pending_reply.end(body)
+        return pending_reply.end(None, ": ".join(filter(None, read_failure(reply.data))))
 
     # ---- closing
 
@@ -122,13 +122,13 @@ class RosServer:
             if self._unregistering is not None:
                 return
             thread = threading.Thread(target=self._unregister, name="nep-ros-unregister", daemon=True)
-            with contextlib.suppress(RuntimeError):  # see `process.within`
+            with contextlib.suppress(RuntimeError):  # see `process.run_with_timeout`
                 thread.start()
                 self._unregistering = thread
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
 
-    def _rospy_ends(self) -> None:
+    def _on_rospy_shutdown(self) -> None:
         self.is_closed = True
         for call in self.calls.close():
             call.answer(refusal(self.spec.service, is_closed=True))
@@ -145,11 +145,11 @@ class RosServer:
         if self._unregistering is not None:
             self._unregistering.join(max(0.0, timeout_s))
         with self._changed:
-            self._changed.wait_for(lambda: not self._waiting, max(0.0, deadline - time.monotonic()))
+            self._changed.wait_for(lambda: not self._pending_replies, max(0.0, deadline - time.monotonic()))
             self.is_closed = True
-            for waiting in self._waiting:
-                waiting.end(None, _("the server ends"))
-        self.process.at_shutdown.discard(self._rospy_ends)
+            for pending_reply in self._pending_replies:
+                pending_reply.end(None, _("the server ends"))
+        self.process.at_shutdown.discard(self._on_rospy_shutdown)
         self._forget(self)
 
     def forked(self) -> None:

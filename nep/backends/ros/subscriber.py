@@ -26,7 +26,7 @@ from nep.text import escaped, shortened
 _logger = logging.getLogger("nep")
 _BUFFER_BYTES = 2**18
 """Receive buffer of rospy: its default of 64 KiB is slow for images."""
-_SOURCES = 1_000
+_MAX_SOURCES = 1_000
 
 
 class RospyOwner(Protocol):
@@ -85,7 +85,7 @@ class RospySubscriber(WakingSubscriber):
         self.refusals = RejectionLog()
         self.is_closed = False
         self._owner = owner
-        self._told = ""
+        self._reader_problem = ""
         self._sources: dict[tuple[str, ...], _Source] = {}
         self._subscriber: Any = None
 
@@ -93,9 +93,9 @@ class RospySubscriber(WakingSubscriber):
         """Subscribe."""
         with self._owner.changed:
             self.process.subscribed[self.topic] += 1
-        self.process.at_shutdown.add(self._rospy_ends)
+        self.process.at_shutdown.add(self._on_rospy_shutdown)
         self._subscriber = self.process.rospy.Subscriber(
-            self.topic, self.process.rospy.AnyMsg, self._came, buff_size=_BUFFER_BYTES, tcp_nodelay=True
+            self.topic, self.process.rospy.AnyMsg, self._receive, buff_size=_BUFFER_BYTES, tcp_nodelay=True
         )
 
     @property
@@ -106,11 +106,11 @@ class RospySubscriber(WakingSubscriber):
     @property
     def problem(self) -> str:
         """Problem of the newest message; empty if none."""
-        return self._told or self.refusals.recent_message()
+        return self._reader_problem or self.refusals.recent_message()
 
     # ---- callbacks of rospy, in a thread per connection
 
-    def _came(self, raw: Any) -> None:  # noqa: ANN401 - rospy is not typed
+    def _receive(self, raw: Any) -> None:  # noqa: ANN401 - rospy is not typed
         header: Mapping[str, str] = raw._connection_header  # noqa: SLF001 - rospy documents it
         body = memoryview(_bytes_of(raw))
         with self._owner.changed:
@@ -123,7 +123,7 @@ class RospySubscriber(WakingSubscriber):
             try:
                 message = self._read(source, body)
             except (WireError, struct.error) as error:
-                self._refuse(error.reason if isinstance(error, WireError) else _("it is cut off"))
+                self._reject(error.reason if isinstance(error, WireError) else _("it is cut off"))
                 return
             dropped = self.inbox.put(message)
             self.received += 1 - dropped
@@ -131,7 +131,7 @@ class RospySubscriber(WakingSubscriber):
                 self.lost = (self.lost or 0) + dropped
             self.notify_waiting()
 
-    def _rospy_ends(self) -> None:
+    def _on_rospy_shutdown(self) -> None:
         # `poll` raises from now on.
         with self._owner.changed:
             self.notify_waiting()
@@ -141,12 +141,12 @@ class RospySubscriber(WakingSubscriber):
         key = tuple(header.get(each, "") for each in ("callerid", "type", "md5sum", "latching"))
         source = self._sources.get(key)
         if source is None:
-            if len(self._sources) >= _SOURCES:
+            if len(self._sources) >= _MAX_SOURCES:
                 self._sources.clear()
-            source = self._sources[key] = self._met(header)
+            source = self._sources[key] = self._new_source(header)
         return source
 
-    def _met(self, header: Mapping[str, str]) -> _Source:
+    def _new_source(self, header: Mapping[str, str]) -> _Source:
         ros_type = header.get("type", "")
         text, md5sum = header.get("message_definition", ""), header.get("md5sum", "*")
         try:
@@ -179,10 +179,10 @@ class RospySubscriber(WakingSubscriber):
             seq, secs, nsecs = STAMP.unpack_from(body, 0)
             message.stamp_ns = secs * 1_000_000_000 + nsecs
             message.seq = seq
-            self._number(source, seq)
+            self._count_losses(source, seq)
         return message
 
-    def _number(self, source: _Source, seq: int) -> None:
+    def _count_losses(self, source: _Source, seq: int) -> None:
         # A gap counts as lost messages; a smaller number means that the publisher has restarted.
         gap = seq - source.seq - 1
         if source.seq and gap >= 0:
@@ -191,7 +191,7 @@ class RospySubscriber(WakingSubscriber):
             self.lost = 0
         source.seq = seq
 
-    def _refuse(self, reason: str) -> None:
+    def _reject(self, reason: str) -> None:
         if self.refusals.add(reason):
             _logger.warning("malformed message on '%s': %s", self.spec.topic, reason)
 
@@ -222,7 +222,7 @@ class RospySubscriber(WakingSubscriber):
 
     def report(self, problem: str) -> None:
         """Set the reader's problem, which the graph of this process shows."""
-        self._told = problem
+        self._reader_problem = problem
 
     def forked(self) -> None:
         """Become closed in a forked child."""
@@ -237,7 +237,7 @@ class RospySubscriber(WakingSubscriber):
             self.inbox.take_all()
             self.notify_waiting()
             self.process.subscribed[self.topic] -= 1
-        self.process.at_shutdown.discard(self._rospy_ends)
+        self.process.at_shutdown.discard(self._on_rospy_shutdown)
         self._owner.forget(self)
         if self._subscriber is not None:
             self.process.unsubscribe(self._subscriber, timeout_s)

@@ -28,8 +28,8 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
 
 _logger = logging.getLogger("nep")
-_QUEUES = {"image": 64, "bytes": 1000, "ros": 1000}
-_MOST = 10_000
+_QUEUE_LENGTHS = {"image": 64, "bytes": 1000, "ros": 1000}
+_DEFAULT_QUEUE_LENGTH = 10_000
 """Queue length per connection: rospy then drops the oldest message silently."""
 _BATCH_BYTES = 64 * 2**20
 """Maximum size of a sink's batch; the inbox is smaller by this, so that both together stay within the bound.
@@ -60,11 +60,11 @@ class RospyPublisher:
         self._is_closed = False
         self._room = QueueRoom()
         self._drops = RejectionLog()
-        queue = _QUEUES.get(spec.codec.name, _MOST)
+        queue = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
         self._publisher: Any = process.advertise(
             self.topic, self._definition, is_latched=spec.is_latched, queue=queue
         )
-        process.publishes(self.topic, spec.id, self._publisher)
+        process.add_publisher(self.topic, spec.id, self._publisher)
 
     @property
     def ros_type(self) -> str:
@@ -74,9 +74,9 @@ class RospyPublisher:
     @property
     def subscribers(self) -> int:
         """Number of connected ROS nodes; this process counts with its number of subscribers."""
-        hearers = () if self._is_closed else self.process.hearers(self._publisher)
-        own = max(1, self.process.subscribed[self.topic]) if self.process.name in hearers else 0
-        return sum(each != self.process.name for each in hearers) + own
+        connected_nodes = () if self._is_closed else self.process.connected_nodes(self._publisher)
+        own = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
+        return sum(each != self.process.name for each in connected_nodes) + own
 
     @property
     def is_heard(self) -> bool:
@@ -91,8 +91,8 @@ class RospyPublisher:
             registered = self.process.master.names(self.topic, HANDSHAKE_S)[1]
         except RosMasterUnreachable:
             return ()
-        hearers = self.process.hearers(self._publisher)
-        return tuple(each.lstrip("/") for each in registered if each not in hearers)
+        connected_nodes = self.process.connected_nodes(self._publisher)
+        return tuple(each.lstrip("/") for each in registered if each not in connected_nodes)
 
     def lend(self, _size_bytes: int) -> memoryview | None:
         """Return None: rospy has no shared memory."""
@@ -124,9 +124,9 @@ class RospyPublisher:
             self.last_stamp_ns = time.time_ns()
             dropped = self.process.send(self._publisher, self._definition, self.topic, body, self._room)
             if dropped:
-                self._tell(dropped)
+                self._report_drops(dropped)
 
-    def _tell(self, dropped: int) -> None:
+    def _report_drops(self, dropped: int) -> None:
         reason = _("subscribers are too slow for it, and the oldest messages for them are dropped")
         for _each in range(dropped):
             if self._drops.add(reason):
@@ -146,7 +146,7 @@ class RospyPublisher:
                 return
             self._is_closed = True
         self._transport.forget(self)
-        self.process.publishes_no_more(self.topic, self.spec.id)
+        self.process.remove_publisher(self.topic, self.spec.id)
         left = self.process.unsent(self._publisher, deadline)
         if left:
             _logger.warning(
@@ -181,7 +181,7 @@ class RospyTransport:
             self._publishers = (*self._publishers, publisher)
         try:
             self._check_open()
-            process.wait_for_hearers(publisher._publisher, publisher.topic, HANDSHAKE_S)  # noqa: SLF001
+            process.wait_for_subscribers(publisher._publisher, publisher.topic, HANDSHAKE_S)  # noqa: SLF001
         except BaseException:
             publisher.close(0.0)
             raise
@@ -197,9 +197,9 @@ class RospyTransport:
         try:
             subscriber.begin()
             self._check_open()
-            process.wait_for_sources(subscriber.topic, HANDSHAKE_S)
+            process.wait_for_publishers(subscriber.topic, HANDSHAKE_S)
             if spec.sink is not None:
-                self._pour()
+                self._start_sinks()
         except BaseException:
             subscriber.close()
             raise
@@ -237,9 +237,9 @@ class RospyTransport:
         self._close_if_closed(client)
         return client
 
-    def _close_if_closed(self, made: RosServer | RosClient) -> None:
+    def _close_if_closed(self, owner: RosServer | RosClient) -> None:
         if self._is_closed:
-            made.close(0.0)
+            owner.close(0.0)
             self._check_open()
 
     def wait(
@@ -252,14 +252,15 @@ class RospyTransport:
 
         Raises `RosShutdownError` for servers after rospy was shut down.
         """
-        mine = [each for each in subscribers if isinstance(each, RospySubscriber)]
+        own_subscribers = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
         with woken_by(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
                 self.changed.wait_for(
-                    lambda: self._wakes != before or any(len(each.inbox) for each in mine), timeout_s
+                    lambda: self._wakes != before or any(len(each.inbox) for each in own_subscribers),
+                    timeout_s,
                 )
         if any(each.process.is_over for each in self._servers):
             raise RosShutdownError
@@ -331,7 +332,7 @@ class RospyTransport:
 
     # ---- sinks
 
-    def _pour(self) -> None:
+    def _start_sinks(self) -> None:
         with self._lock:
             if self._thread is None:
                 name = f"nep-sinks-{self.node.name}"

@@ -13,14 +13,14 @@ from nep.i18n import _
 
 _DOMAINS = 233
 """Number of domains; higher ones have no valid ports."""
-_EVERYWHERE = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
-_RANGES = frozenset({"", "OFF", "LOCALHOST", *_EVERYWHERE})
+_SUBNET_RANGES = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
+_VALID_RANGES = frozenset({"", "OFF", "LOCALHOST", *_SUBNET_RANGES})
 PARTICIPANTS_MAX = 100
 """Maximum number of participants per computer in a domain, and of ports probed without multicast."""
 _PARTICIPANTS = PARTICIPANTS_MAX - 1
-_SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
+_PACKET_SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
 """Large packets: 8 MB take a seventh of the time."""
-_INTERNAL = (
+_INTERNALS = (
     "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration></Internal>"
 )
@@ -60,9 +60,9 @@ def distribution(environment: Mapping[str, str]) -> str:
     return environment.get("ROS_DISTRO", "").strip().lower() or "jazzy"
 
 
-def _range(environment: Mapping[str, str]) -> str:
+def _configured_range(environment: Mapping[str, str]) -> str:
     said = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper()
-    if said not in _RANGES:
+    if said not in _VALID_RANGES:
         raise NepError(
             _("ROS_AUTOMATIC_DISCOVERY_RANGE is '{said}'; use SUBNET, LOCALHOST or OFF").format(
                 said=said[:40]
@@ -71,14 +71,14 @@ def _range(environment: Mapping[str, str]) -> str:
     return said
 
 
-def _reach(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
+def _discovery_reach(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
     # Returns the discovery range. Raises `NepError`.
-    local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _range(environment)
+    local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _configured_range(environment)
     if said == "OFF":
         return "nobody"
     if local == "1":
         return "computer"
-    if local == "0" or said in _EVERYWHERE:
+    if local == "0" or said in _SUBNET_RANGES:
         return "subnet"
     return "peers" if _peers(environment) else "computer"
 
@@ -89,14 +89,14 @@ def _peers(environment: Mapping[str, str]) -> list[str]:
 
 def is_loopback_only(environment: Mapping[str, str]) -> bool:
     """Return True if only programs of this computer, or none, are discovered. This is the default."""
-    return _reach(environment) in {"nobody", "computer"}
+    return _discovery_reach(environment) in {"nobody", "computer"}
 
 
 def configuration(environment: Mapping[str, str]) -> str | None:
     """Return the XML configuration for Cyclone DDS; None if $CYCLONEDDS_URI has the user's own."""
     if environment.get("CYCLONEDDS_URI"):
         return None
-    reach = _reach(environment)
+    reach = _discovery_reach(environment)
     peers = {
         "nobody": [],
         "computer": ["127.0.0.1"],
@@ -108,9 +108,9 @@ def configuration(environment: Mapping[str, str]) -> str | None:
     listed = "".join(f'<Peer Address="{escape(each)}"/>' for each in peers)
     return (
         f'<CycloneDDS><Domain Id="any"><General>{interface if is_loopback_only(environment) else ""}'
-        f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_SIZES}</General>"
+        f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_PACKET_SIZES}</General>"
         f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if reach == 'nobody' else ''}"
         f"<ParticipantIndex>auto</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{_PARTICIPANTS}</MaxAutoParticipantIndex>"
-        f"{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>{_INTERNAL}</Domain></CycloneDDS>"
+        f"{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>{_INTERNALS}</Domain></CycloneDDS>"
     )

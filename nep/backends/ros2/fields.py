@@ -24,7 +24,7 @@ _NUMBERS = {
     **{name: name for name in ("bool", "float32", "float64", *_RANGES) if name != "byte"},
 }
 _FLOATS = frozenset({"float32", "float64"})
-_LARGEST_FLOAT32 = 3.4028235677973366e38
+_FLOAT32_OVERFLOW = 3.4028235677973366e38
 """Smallest number that rounds to infinity."""
 _OCTETS = frozenset({"uint8", "byte"})
 
@@ -34,7 +34,7 @@ class RosField:
     """Field of a message; `kind` is the type of its value or of its items.
 
     `length` is None for a single value, the number of items of an array, and -1 for a sequence. `size` bounds
-    a sequence and `text_most` each string; 0 is unbounded.
+    a sequence and `max_text_bytes` each string; 0 is unbounded.
     """
 
     name: str
@@ -42,7 +42,7 @@ class RosField:
     is_message: bool
     length: int | None = None
     size: int = 0
-    text_most: int = 0
+    max_text_bytes: int = 0
 
 
 class RosFieldError(Exception):
@@ -82,10 +82,10 @@ def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pair
     if kind == _NAME:
         return RosField(name, rest, is_message=True)
     if kind == _BASE:
-        return RosField(name, rest[0], is_message=False, text_most=rest[1])
+        return RosField(name, rest[0], is_message=False, max_text_bytes=rest[1])
     item = _field(name, rest[0])
     length = rest[1] if kind == _ARRAY else -1
-    return RosField(name, item.kind, item.is_message, length, rest[1], item.text_most)
+    return RosField(name, item.kind, item.is_message, length, rest[1], item.max_text_bytes)
 
 
 # ---- maps to messages
@@ -105,35 +105,37 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
     for key in payload:
         if key not in fields:
             raise RosFieldError(
-                _joined(path, escaped(str(key)[:100])),
+                _join_path(path, escaped(str(key)[:100])),
                 _("is no field of '{name}'; it has {fields}").format(
                     name=name, fields=", ".join(f"'{each}'" for each in fields) or _("none")
                 ),
             )
-    made = {}
+    values = {}
     for each in types.fields(name):
-        where = _joined(path, each.name)
+        where = _join_path(path, each.name)
         is_given = each.name in payload
-        made[each.name] = _value(types, each, payload[each.name], where) if is_given else _zero(types, each)
-    return types.message_class(name)(**made)
+        values[each.name] = (
+            _value(types, each, payload[each.name], where) if is_given else _default_value(types, each)
+        )
+    return types.message_class(name)(**values)
 
 
-def _joined(path: str, name: str) -> str:
+def _join_path(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def _zero(types: Types, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
+def _default_value(types: Types, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return to_message(types, field.kind, {})
-        return "" if field.kind == "string" else _NUMBERS_ZERO.get(field.kind, 0)
+        return "" if field.kind == "string" else _NUMERIC_DEFAULTS.get(field.kind, 0)
     count = max(field.length, 0)
     if field.is_message:
         return [to_message(types, field.kind, {}) for _ in range(count)]
     return [""] * count if field.kind == "string" else _numpy().zeros(count, _NUMBERS[field.kind])
 
 
-_NUMBERS_ZERO: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
+_NUMERIC_DEFAULTS: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
 
 
 def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - depends on the field
@@ -141,28 +143,26 @@ def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # n
         return _items(types, field, value, path)
     if field.is_message:
         return to_message(types, field.kind, value, path)
-    return _single(field, value, path)
+    return _scalar(field, value, path)
 
 
-def _single(field: RosField, value: object, path: str) -> str | bool | int | float:
+def _scalar(field: RosField, value: object, path: str) -> str | bool | int | float:
     if field.kind == "string":
         return _text(field, value, path)
-    value = _plain(value)
+    value = _unwrap_scalar(value)
     if field.kind == "bool":
         if not isinstance(value, bool):
             raise RosFieldError(path, _("is a '{kind}'; give True or False").format(kind=_kind(value)))
         return value
     if field.kind in _FLOATS:
         return _float(field, value, path)
-    least, most = _RANGES[field.kind]
+    low, high = _RANGES[field.kind]
     if not isinstance(value, int) or isinstance(value, bool):
         raise RosFieldError(path, _("is a '{kind}'; give a whole number").format(kind=_kind(value)))
-    if not least <= value <= most:
+    if not low <= value <= high:
         raise RosFieldError(
             path,
-            _("is not from {least} to {most}, as '{kind}' is").format(
-                least=least, most=most, kind=field.kind
-            ),
+            _("is not from {least} to {most}, as '{kind}' is").format(least=low, most=high, kind=field.kind),
         )
     return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags stores bytes as signed
 
@@ -176,7 +176,7 @@ def _float(field: RosField, value: object, path: str) -> float:
         number = math.nan
         is_fitting = False
     else:
-        is_fitting = field.kind != "float32" or math.isinf(number) or not abs(number) >= _LARGEST_FLOAT32
+        is_fitting = field.kind != "float32" or math.isinf(number) or not abs(number) >= _FLOAT32_OVERFLOW
     if not is_fitting:
         raise RosFieldError(path, _("is too large for '{kind}'").format(kind=field.kind))
     return number
@@ -191,9 +191,9 @@ def _text(field: RosField, value: object, path: str) -> str:
         size = len(value.encode())
     except UnicodeEncodeError:
         raise RosFieldError(path, _("holds half of a surrogate pair")) from None
-    if field.text_most and size > field.text_most:
+    if field.max_text_bytes and size > field.max_text_bytes:
         raise RosFieldError(
-            path, _("has {size} bytes, {most} are allowed").format(size=size, most=field.text_most)
+            path, _("has {size} bytes, {most} are allowed").format(size=size, most=field.max_text_bytes)
         )
     return value
 
@@ -209,7 +209,7 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
             path, _("has {count} dimensions; give one, such as by 'ravel()'").format(count=dimensions)
         )
     if field.is_message or field.kind == "string":
-        single = RosField(field.name, field.kind, field.is_message, text_most=field.text_most)
+        single = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
         items: Any = [
             _value(types, single, each, f"{path}[{number}]")
             for number, each in enumerate(list(value))  # type: ignore[call-overload]
@@ -242,7 +242,7 @@ def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an 
     if found.ndim == 1 and (not found.size or _fits(found, field, wanted)):
         return np.ascontiguousarray(found.astype(wanted))
     single = RosField(field.name, "uint8" if field.kind in _OCTETS else field.kind, is_message=False)
-    items = [_single(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
+    items = [_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
     return np.array(items, wanted)
 
 
@@ -256,14 +256,14 @@ def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - a
         if field.kind == "float64" or found.dtype.kind != "f":
             return True
         finite = found[_numpy().isfinite(found)]
-        return not finite.size or bool(abs(finite).max() < _LARGEST_FLOAT32)
+        return not finite.size or bool(abs(finite).max() < _FLOAT32_OVERFLOW)
     if field.kind == "bool" or found.dtype.kind not in "iu":
         return False
-    least, most = _RANGES[field.kind]
-    return bool(least <= int(found.min()) and int(found.max()) <= most)
+    low, high = _RANGES[field.kind]
+    return bool(low <= int(found.min()) and int(found.max()) <= high)
 
 
-def _plain(value: object) -> object:
+def _unwrap_scalar(value: object) -> object:
     if isinstance(value, bool | int | float | str) or getattr(value, "shape", None) != ():
         return value
     return value.item() if hasattr(value, "item") else value
@@ -279,13 +279,13 @@ def _kind(value: object) -> str:
 def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - not typed
     """Convert a message object to maps, lists, `bytes`, numbers and strings."""
     return {
-        each.name: _plain_field(types, each, getattr(message, each.name))
+        each.name: _to_plain(types, each, getattr(message, each.name))
         for each in types.fields(name)
         if each.name != PLACEHOLDER
     }
 
 
-def _plain_field(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - depends on the field
+def _to_plain(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return from_message(types, field.kind, value)

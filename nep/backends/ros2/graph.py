@@ -43,7 +43,7 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-_MOST = 10_000
+_MAX_FOREIGN = 10_000
 """Maximum number of foreign writers and readers shown."""
 
 
@@ -61,12 +61,12 @@ class _Names:
 
     def msg_type(self, endpoint: DdsEndpoint) -> str:
         known = self.types.get((endpoint.topic, endpoint.type))
-        return known or endpoint.told.get("neptype") or ros_type(endpoint.type)
+        return known or endpoint.announced.get("neptype") or ros_type(endpoint.type)
 
     def id(self, endpoint: DdsEndpoint) -> int:
         # The announced id, unless another endpoint announces the same.
-        said = id_of(endpoint.gid, endpoint.told.get("nepid"))
-        found = id_of(endpoint.gid, None) if said in self.ids else said
+        announced_ids = id_of(endpoint.gid, endpoint.announced.get("nepid"))
+        found = id_of(endpoint.gid, None) if announced_ids in self.ids else announced_ids
         self.ids.add(found)
         return found
 
@@ -86,11 +86,11 @@ def graph_of(participant: Participant) -> GraphView:
     own = participant.own_gids()
     for kind, each in found:
         if each.gid in own and ros_service(each.topic) is None:
-            _note(parties, names, Party(own[each.gid], each), kind)
-    for node, kind, endpoint in islice(_foreign(participant, found, names), _MOST):
+            _add_party(parties, names, Party(own[each.gid], each), kind)
+    for node, kind, endpoint in islice(_foreign(participant, found, names), _MAX_FOREIGN):
         _add_foreign(graph, node, kind, endpoint, names)
         if endpoint is not None and ros_service(endpoint.topic) is None:
-            _note(parties, names, Party(node.name, endpoint), kind)
+            _add_party(parties, names, Party(node.name, endpoint), kind)
     alerts = (
         alert
         for topic, each in sorted(parties.items())
@@ -100,7 +100,7 @@ def graph_of(participant: Participant) -> GraphView:
     return graph.view()
 
 
-def _note(parties: dict[str, dict[str, list[Party]]], names: _Names, party: Party, kind: str) -> None:
+def _add_party(parties: dict[str, dict[str, list[Party]]], names: _Names, party: Party, kind: str) -> None:
     topic = names.topic(party.endpoint)
     parties.setdefault(topic, {"writer": [], "reader": []})[kind].append(party)
 
@@ -117,9 +117,9 @@ def _add_local(graph: Graph, local: Local, names: _Names) -> None:
         names.ids.add(spec.id)
     called: list[ServerSpec | ClientSpec] = [each.spec for each in servers]
     called += [each.spec for each in clients]
-    for asked in called:
-        names.topics.setdefault(dds_service(asked.service)[0], topic_of(asked.service))
-        names.ids.add(asked.id)
+    for service_spec in called:
+        names.topics.setdefault(dds_service(service_spec.service)[0], topic_of(service_spec.service))
+        names.ids.add(service_spec.id)
     node = local.node
     graph.apply(Join(node), 0, 0.0, node.id)
     for record in (*(each.record for each in publishers), *(each.record for each in servers)):
@@ -141,19 +141,21 @@ def _foreign(
     alive = participant.participants() - {own}
     found = [(kind, each) for kind, each in all_found if each.participant != own]
     for _kind, each in found:
-        if each.told.get("neptype"):
-            names.types.setdefault((each.topic, each.type), each.told["neptype"])
-    said = {each.gid: each.told["nepnode"] for _kind, each in found if each.told.get("nepnode")}
+        if each.announced.get("neptype"):
+            names.types.setdefault((each.topic, each.type), each.announced["neptype"])
+    announced_ids = {
+        each.gid: each.announced["nepnode"] for _kind, each in found if each.announced.get("nepnode")
+    }
     owners: dict[bytes, NodeRecord] = {}
     for gid, nodes in sorted(participant.others(alive).items()):
         for number, node in enumerate(nodes):
-            node_id = next((said[one] for one in sorted(node.gids) if one in said), "")
+            node_id = next((announced_ids[one] for one in sorted(node.gids) if one in announced_ids), "")
             record = _record(node_id or _id_from(gid + number.to_bytes(4, "little")), node.name)
             owners.update(dict.fromkeys(node.gids, record))
             yield record, "", None
-    strangers = {each.participant: _stranger(each.participant) for _kind, each in found}
+    unknown_nodes = {each.participant: _unknown_node(each.participant) for _kind, each in found}
     for kind, each in found:
-        yield owners.get(each.gid) or strangers[each.participant], kind, each
+        yield owners.get(each.gid) or unknown_nodes[each.participant], kind, each
 
 
 def _id_from(data: bytes) -> str:
@@ -164,7 +166,7 @@ def _record(node_id: str, name: str) -> NodeRecord:
     return NodeRecord(node_id, name, "", None, language="", generation="ros2")
 
 
-def _stranger(gid: bytes) -> NodeRecord:
+def _unknown_node(gid: bytes) -> NodeRecord:
     return _record(_id_from(gid), f"dds/{gid.hex()[:24]}")
 
 

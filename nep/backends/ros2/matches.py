@@ -19,16 +19,16 @@ GID_BYTES, PREFIX_BYTES = 16, 12
 """Length of a GUID, and of the prefix shared by all GUIDs of a participant."""
 _TOPIC = "nep_matches"
 _TYPE = "std_msgs/msg/UInt8MultiArray"
-_MOST_PAIRS, _MOST_PARTICIPANTS = 100_000, 4096
+_MAX_PAIRS, _MAX_PARTICIPANTS = 100_000, 4096
 
 
 def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds is not typed
     """Return the GUIDs matched by a writer or reader."""
     if hasattr(entity, "get_matched_subscriptions"):
-        handles, look = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
+        handles, get_data = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
     else:
-        handles, look = entity.get_matched_publications(), entity.get_matched_publication_data
-    return frozenset(data.key.bytes for data in map(look, handles) if data is not None)
+        handles, get_data = entity.get_matched_publications(), entity.get_matched_publication_data
+    return frozenset(data.key.bytes for data in map(get_data, handles) if data is not None)
 
 
 class Matches:
@@ -43,51 +43,51 @@ class Matches:
         )
         self._followed: dict[bytes, Any] = {}
         self._found: dict[bytes, frozenset[bytes]] = {}
-        self._told = b""
-        self._has_news = False
+        self._published = b""
+        self._has_changes = False
         self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
         self._sample_class = topics.sample_class(_TYPE)
         self._writer = topics.state_writer(_TOPIC, _TYPE)
         self.reader = topics.state_reader(_TOPIC, _TYPE)
 
-    def follow(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+    def add(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Add a writer or reader of this program."""
         entity.set_status_mask(self._mask[not hasattr(entity, "get_matched_subscriptions")])
         self._followed[entity.guid.bytes] = entity
         self._found[entity.guid.bytes] = frozenset()
 
-    def forget(self, gid: bytes) -> None:
+    def remove(self, gid: bytes) -> None:
         """Remove a closed writer or reader."""
         self._followed.pop(gid, None)
         self._found.pop(gid, None)
-        self._has_news = True
+        self._has_changes = True
 
-    def look(self) -> None:
+    def publish_changes(self) -> None:
         """Publish the own matches if they have changed."""
         for gid, entity in self._followed.items():
             if entity.take_status():
                 found = matched_gids(entity)
                 self._found[gid] = frozenset(each for each in found if not self._is_own(each))
-                self._has_news = True
-        if not self._has_news:
+                self._has_changes = True
+        if not self._has_changes:
             return
-        self._has_news = False
+        self._has_changes = False
         pairs = sorted(own + other for own, found in self._found.items() for other in found)
-        told = b"".join((self._gid, *pairs[:_MOST_PAIRS]))
-        if told != self._told:
-            self._writer.write(sample_of(self._sample_class, self._types.encode(_TYPE, {"data": told})))
-            self._told = told
+        data = b"".join((self._gid, *pairs[:_MAX_PAIRS]))
+        if data != self._published:
+            self._writer.write(sample_of(self._sample_class, self._types.encode(_TYPE, {"data": data})))
+            self._published = data
 
     def _is_own(self, gid: bytes) -> bool:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
 
-    def hear(self, cdr: bytes) -> None:
+    def process(self, cdr: bytes) -> None:
         """Process the matches of another program; malformed data is ignored."""
         try:
-            told = self._types.decode(_TYPE, cdr)
+            decoded = self._types.decode(_TYPE, cdr)
         except DecodeError:
             return
-        data = told["data"] if isinstance(told, dict) else b""
+        data = decoded["data"] if isinstance(decoded, dict) else b""
         sender, pairs = data[:GID_BYTES], data[GID_BYTES:]
         if len(sender) < GID_BYTES or len(pairs) % (2 * GID_BYTES) or self._is_own(sender):
             return
@@ -96,7 +96,7 @@ class Matches:
             for at in range(0, len(pairs), 2 * GID_BYTES)
         )
         self._confirmed.pop(sender, None)
-        if len(self._confirmed) >= _MOST_PARTICIPANTS:
+        if len(self._confirmed) >= _MAX_PARTICIPANTS:
             self._confirmed.pop(next(iter(self._confirmed)))
         self._confirmed[sender] = frozenset(
             pair

@@ -248,9 +248,9 @@ def message_types() -> MessageTypes:
     release = distribution(os.environ)
     with _types_lock:
         if release not in _types:
-            made = MessageTypes(release)
+            types = MessageTypes(release)
             for folder in os.environ.get(FOLDERS, "").split(os.pathsep):
                 if folder:
-                    made.add_folder(Path(folder))
-            _types[release] = made
+                    types.add_folder(Path(folder))
+            _types[release] = types
         return _types[release]

@@ -13,9 +13,9 @@ from nep.backends.ros2.participant import DdsEndpoint
 from nep.i18n import _
 from nep.protocol.graph_view import Alert
 
-_NAMES = 3
+_MAX_NAMES = 3
 """Maximum number of nodes named in an alert."""
-_MOST = 100
+_MAX_ENDPOINTS = 100
 """Maximum number of a topic's writers, and of its readers, that are compared."""
 
 
@@ -29,10 +29,10 @@ class Party:
 
 def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Iterator[Alert]:
     """Yield alerts for readers that can't receive from a writer of the topic."""
-    readers, writers = tuple(_once(readers[:_MOST])), writers[:_MOST]
+    readers, writers = tuple(_unique(readers[:_MAX_ENDPOINTS])), writers[:_MAX_ENDPOINTS]
     kinds: tuple[tuple[Callable[[DdsEndpoint, DdsEndpoint], bool], Callable[..., Alert]], ...] = (
         (lambda writer, reader: writer.type != reader.type, _other_type),
-        (_are_defined_otherwise, _other_definition),
+        (_have_different_definitions, _other_definition),
         (lambda writer, reader: reader.is_reliable and not writer.is_reliable, _unreliable),
         (lambda writer, reader: reader.is_latched and not writer.is_latched, _not_latched),
     )
@@ -44,28 +44,28 @@ def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -
             yield alert(topic, [one for one, _other in pairs], [other for _one, other in pairs])
 
 
-def _once(readers: Iterable[Party]) -> Iterator[Party]:
+def _unique(readers: Iterable[Party]) -> Iterator[Party]:
     # A subscriber of nep may have two readers; keep the one with the weaker requirements.
     known: dict[str, Party] = {}
     for each in readers:
-        said = each.endpoint.told.get("nepid") or each.endpoint.gid.hex()
-        other = known.get(said)
+        key = each.endpoint.announced.get("nepid") or each.endpoint.gid.hex()
+        other = known.get(key)
         is_latched = each.endpoint.is_latched and (other is None or other.endpoint.is_latched)
-        known[said] = replace(each, endpoint=replace(each.endpoint, is_latched=is_latched))
+        known[key] = replace(each, endpoint=replace(each.endpoint, is_latched=is_latched))
     yield from known.values()
 
 
-def _are_defined_otherwise(writer: DdsEndpoint, reader: DdsEndpoint) -> bool:
-    hashes = writer.told.get("typehash", ""), reader.told.get("typehash", "")
+def _have_different_definitions(writer: DdsEndpoint, reader: DdsEndpoint) -> bool:
+    hashes = writer.announced.get("typehash", ""), reader.announced.get("typehash", "")
     return writer.type == reader.type and all(hashes) and hashes[0] != hashes[1]
 
 
 def _named(parties: Iterable[Party]) -> str:
-    said = sorted({each.node for each in parties})
-    names = ", ".join(f"“{name}”" for name in said[:_NAMES])
-    if len(said) <= _NAMES:
+    unique_names = sorted({each.node for each in parties})
+    names = ", ".join(f"“{name}”" for name in unique_names[:_MAX_NAMES])
+    if len(unique_names) <= _MAX_NAMES:
         return names
-    return _("{names} and {count} more").format(names=names, count=len(said) - _NAMES)
+    return _("{names} and {count} more").format(names=names, count=len(unique_names) - _MAX_NAMES)
 
 
 def _type_of(parties: Sequence[Party]) -> str:

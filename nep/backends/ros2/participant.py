@@ -39,14 +39,14 @@ from nep.system.descriptors import check_room
 _logger = logging.getLogger("nep")
 _INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _INFO_TOPIC = "ros_discovery_info"
-_MOST_PARTICIPANTS = 4096
+_MAX_PARTICIPANTS = 4096
 """Maximum number of other participants remembered."""
-_FILES = 16
+_PARTICIPANT_FILES = 16
 """File descriptors per participant."""
 _SETTLE_S = 0.3
 """Seconds after which a new participant knows the existing ones, which respond within milliseconds."""
-_LOOK_S = 0.01
-_AT_ONCE = 10_000
+_POLL_S = 0.01
+_READ_MAX = 10_000
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class RosNode:
 
 @dataclass(frozen=True)
 class DdsEndpoint:
-    """Discovered writer or reader, possibly of this program. `told` has the entries of its USER_DATA."""
+    """Discovered writer or reader, possibly of this program. `announced` has the entries of its USER_DATA."""
 
     gid: bytes
     participant: bytes
@@ -67,11 +67,11 @@ class DdsEndpoint:
     type: str
     is_latched: bool
     is_reliable: bool
-    told: dict[str, str]
+    announced: dict[str, str]
 
     def is_of(self, kind: str, type_hash: str) -> bool:
         """Return True if it has this type, and announces no other definition of it."""
-        return self.type == kind and self.told.get("typehash", type_hash) == type_hash
+        return self.type == kind and self.announced.get("typehash", type_hash) == type_hash
 
 
 class Local(Protocol):
@@ -98,7 +98,7 @@ class Local(Protocol):
     def load(self) -> float | None:
         """Return the CPU load of the process, as a share of one core."""
 
-    def look(self) -> None:
+    def endpoints_changed(self) -> None:
         """Process changed endpoints. Runs in the participant's thread, with its lock held."""
 
 
@@ -176,10 +176,10 @@ class Participant:
         self._members: dict[str, _Member] = {}
         self._others: dict[bytes, tuple[RosNode, ...]] = {}
         self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
-        self._is_closing = self._has_news = self._is_settled = False
-        check_room(_FILES, "a participant of ROS 2")
+        self._is_closing = self._has_changes = self._is_settled = False
+        check_room(_PARTICIPANT_FILES, "a participant of ROS 2")
         try:
-            self._begin()
+            self._open()
         except self.dds.core.DDSException as error:
             if self._domain is not None:
                 _delete(self._domain)
@@ -193,7 +193,7 @@ class Participant:
         self._thread = threading.Thread(target=self._run, name="nep-ros2", daemon=True)
         self._thread.start()
 
-    def _begin(self) -> None:
+    def _open(self) -> None:
         core, builtin = self.dds.core, self.dds.builtin
         self._domain: Any = None
         settings = configuration(os.environ)
@@ -224,15 +224,15 @@ class Participant:
             news = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.NotRead | core.InstanceState.Any
             )
-            self.watch(reader, news, partial(self._read_news, reader, news))
+            self.watch(reader, news, partial(self._note_changes, reader, news))
         self._info_writer = self.topics.state_writer(_INFO_TOPIC, _INFO)
         self.matches = Matches(self.dds, self.types, self.topics, self.gid)
-        for state, hear in (
-            (self.topics.state_reader(_INFO_TOPIC, _INFO), self._hear_info),
-            (self.matches.reader, self.matches.hear),
+        for state, process in (
+            (self.topics.state_reader(_INFO_TOPIC, _INFO), self._process_info),
+            (self.matches.reader, self.matches.process),
         ):
             ready = core.ReadCondition(state, any_state | core.InstanceState.Any)
-            self.watch(state, ready, partial(_read_states, state, ready, hear))
+            self.watch(state, ready, partial(_read_states, state, ready, process))
 
     def _own_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         try:
@@ -255,7 +255,7 @@ class Participant:
                 self.changed.wait(left)
             deadline = time.monotonic() + HANDSHAKE_S
             while not self._is_complete() and (left := deadline - time.monotonic()) > 0.0:
-                self.changed.wait(min(left, _LOOK_S))
+                self.changed.wait(min(left, _POLL_S))
             self._is_settled = True
 
     def _is_complete(self) -> bool:
@@ -274,14 +274,14 @@ class Participant:
         """Add a node of this process."""
         with self.changed:
             self._members[local.node.id] = _Member(local)
-            self._tell()
+            self._publish_nodes_locked()
 
     def remove(self, node_id: str) -> bool:
         """Remove a node; return True if it was the last."""
         with self.changed:
             self._members.pop(node_id, None)
             if self._members:
-                self._tell()
+                self._publish_nodes_locked()
             return not self._members
 
     def assign(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
@@ -289,8 +289,8 @@ class Participant:
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].add(entity.guid.bytes)
-                self._tell()
-            self.matches.follow(entity)
+                self._publish_nodes_locked()
+            self.matches.add(entity)
             self._waitset.attach(entity)
 
     def withdraw(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
@@ -298,12 +298,12 @@ class Participant:
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].discard(entity.guid.bytes)
-                self._tell()
-            self.matches.forget(entity.guid.bytes)
+                self._publish_nodes_locked()
+            self.matches.remove(entity.guid.bytes)
             self._waitset.detach(entity)
             _delete(entity)
 
-    def _tell(self) -> None:
+    def _publish_nodes_locked(self) -> None:
         # Publishes the nodes of this process. Call with the lock held.
         entries = []
         for member in self._members.values():
@@ -323,18 +323,18 @@ class Participant:
     def _gid_field(self, gid: bytes) -> dict[str, bytes]:
         return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
 
-    def _read_news(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        reader.read(_AT_ONCE, news)
-        self._has_news = True
+    def _note_changes(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+        reader.read(_READ_MAX, news)
+        self._has_changes = True
 
-    def _hear_info(self, cdr: bytes) -> None:
+    def _process_info(self, cdr: bytes) -> None:
         try:
             info: Any = self.types.decode(_INFO, cdr)
         except DecodeError as error:
             _logger.debug("malformed message on ros_discovery_info: %s", error)
             return
         gid = info["gid"]["data"][:16]
-        if gid == self.gid or (gid not in self._others and len(self._others) >= _MOST_PARTICIPANTS):
+        if gid == self.gid or (gid not in self._others and len(self._others) >= _MAX_PARTICIPANTS):
             return
         self._others[gid] = tuple(
             RosNode(
@@ -385,12 +385,13 @@ class Participant:
             alive = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
-            found = reader.read(_AT_ONCE, alive)
-        told = policy(self.dds).Userdata
+            found = reader.read(_READ_MAX, alive)
+        announced = policy(self.dds).Userdata
         return frozenset(
             each.key.bytes
             for each in found
-            if not with_nodes or (told in each.qos and "enclave" in user_data_of(each.qos[told].data))
+            if not with_nodes
+            or (announced in each.qos and "enclave" in user_data_of(each.qos[announced].data))
         )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
@@ -399,7 +400,7 @@ class Participant:
             if self._is_closing:
                 return []
             reader, alive = self._alive[kind]
-            found = reader.read(_AT_ONCE, alive)
+            found = reader.read(_READ_MAX, alive)
         return [
             self.described(each)
             for each in found
@@ -443,12 +444,12 @@ class Participant:
                     return
                 for _reader, condition, read in list(self._reads.values()):
                     if condition.is_triggered():
-                        _tried(read)
-                _tried(self.matches.look)
-                if self._has_news:
-                    self._has_news = False
+                        _run_logged(read)
+                _run_logged(self.matches.publish_changes)
+                if self._has_changes:
+                    self._has_changes = False
                     for member in list(self._members.values()):
-                        _tried(member.local.look)
+                        _run_logged(member.local.endpoints_changed)
                 self.changed.notify_all()
 
     def _ends(self) -> bool:
@@ -483,7 +484,7 @@ class Participant:
                     _delete(entity)
 
 
-def _tried(step: Callable[[], None]) -> None:
+def _run_logged(step: Callable[[], None]) -> None:
     # The thread continues whatever it receives.
     try:
         step()
@@ -491,11 +492,11 @@ def _tried(step: Callable[[], None]) -> None:
         _logger.exception("error while processing ROS 2 data")
 
 
-def _read_states(reader: Any, ready: Any, hear: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
+def _read_states(reader: Any, ready: Any, process: Callable[[bytes], None]) -> None:  # noqa: ANN401 - see above
     for sample in reader.take(100, ready):
         cdr = getattr(sample, "cdr", None)
         if cdr is not None:
-            hear(cdr)
+            process(cdr)
 
 
 def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed

@@ -12,7 +12,7 @@ from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type, user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant
-from nep.backends.ros2.quality import depth_of, qualities
+from nep.backends.ros2.quality import depth_of, policies_of
 from nep.backends.ros2.topics import sample_of
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.errors import ClosedError, WireError
@@ -21,13 +21,13 @@ from nep.messages.encoded import Encoded
 from nep.protocol.requests import PublisherCount, PublisherRecord
 
 _logger = logging.getLogger("nep")
-_PLAIN = re.compile(r"[\w./-]{1,100}", re.ASCII)
-_GREETING_S = 0.1
+_PLAIN_TYPE = re.compile(r"[\w./-]{1,100}", re.ASCII)
+_READY_DELAY_S = 0.1
 """Seconds that programs without nep need to get ready after discovery on both sides."""
-_LOOK_S = 0.01
+_POLL_S = 0.01
 
 
-def wait_for_others(
+def wait_for_matches(
     participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
 ) -> tuple[str, ...]:
     """Wait until `known` endpoints and ours are matched; return the names of nodes that aren't.
@@ -40,25 +40,25 @@ def wait_for_others(
         entities: Returns our writers or readers.
     """
     deadline = time.monotonic() + HANDSHAKE_S
-    expected = [(each.gid, each.participant, "nepid" in each.told) for each in known]
+    expected = [(each.gid, each.participant, "nepid" in each.announced) for each in known]
     with participant.changed:
         while (unready := participant.matches.unready(entities(), expected)) and (
             left := deadline - time.monotonic()
         ) > 0.0:
-            participant.changed.wait(min(left, _LOOK_S))
-        if any(each.participant != participant.gid and "nepid" not in each.told for each in known):
-            ready_at = time.monotonic() + _GREETING_S
+            participant.changed.wait(min(left, _POLL_S))
+        if any(each.participant != participant.gid and "nepid" not in each.announced for each in known):
+            ready_at = time.monotonic() + _READY_DELAY_S
             while (left := ready_at - time.monotonic()) > 0.0:
                 participant.changed.wait(left)
         return participant.names_of(unready)
 
 
-def told_of(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
+def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
     """Return the USER_DATA of a writer or reader: entries for ROS 2 and for nep."""
-    told = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
-    if _PLAIN.fullmatch(spec.msg_type):
-        told["neptype"] = spec.msg_type
-    return user_data(told)
+    announced = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
+    if _PLAIN_TYPE.fullmatch(spec.msg_type):
+        announced["neptype"] = spec.msg_type
+    return user_data(announced)
 
 
 class Ros2Publisher:
@@ -85,7 +85,7 @@ class Ros2Publisher:
         library = participant.dds
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
         type_hash = participant.types.type_hash(ros_type)
-        told = told_of(type_hash, node_id, spec)
+        announced = announcement(type_hash, node_id, spec)
         depth = depth_of(spec.qos, spec.codec.name)
         with participant.changed:
             self._kind = participant.topics.sample_class(ros_type)
@@ -93,12 +93,12 @@ class Ros2Publisher:
                 participant.entity,
                 participant.topics.topic(name, ros_type),
                 participant.qos(
-                    *qualities(
+                    *policies_of(
                         library,
                         spec.qos,
                         depth,
                         is_latched=spec.is_latched,
-                        told=told,
+                        announced=announced,
                         history=spec.history,
                     )
                 ),
@@ -113,7 +113,7 @@ class Ros2Publisher:
             and (spec.is_latched or not each.is_latched)
         ]
         try:
-            self.missing = wait_for_others(participant, wanted, lambda: [self._writer])
+            self.missing = wait_for_matches(participant, wanted, lambda: [self._writer])
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.finish(0.0)
             raise
@@ -143,8 +143,8 @@ class Ros2Publisher:
 
     def _id_of(self, handle: int) -> str:
         data = self._writer.get_matched_subscription_data(handle)
-        told = {} if data is None else self._participant.described(data).told
-        return told.get("nepid") or f"handle {handle}"
+        announced = {} if data is None else self._participant.described(data).announced
+        return announced.get("nepid") or f"handle {handle}"
 
     @property
     def is_heard(self) -> bool:

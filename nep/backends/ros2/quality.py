@@ -22,19 +22,19 @@ QUALITIES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
 _BLOCKING_NS = 100_000_000
 """Maximum time that a message waits for room before it is lost: the default of DDS."""
-_DEPTHS = {"image": 16, "bytes": 200, CDR: 200}
-_DEPTH = 8192
+_DEPTH_BY_CODEC = {"image": 16, "bytes": 200, CDR: 200}
+_DEFAULT_DEPTH = 8192
 """ROS 2's default of 10 would lose bursts of small messages."""
-_NO_LIMIT = -1
+_UNLIMITED = -1
 
 
 def depth_of(quality: str, codec: str) -> int:
     """Return the queue depth in messages."""
-    return _SENSOR_DEPTH if quality == "sensor" else _DEPTHS.get(codec, _DEPTH)
+    return _SENSOR_DEPTH if quality == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
 
 
-def qualities(
-    library: Dds, quality: str, depth: int, *, is_latched: bool, told: bytes, history: int = 1
+def policies_of(
+    library: Dds, quality: str, depth: int, *, is_latched: bool, announced: bytes, history: int = 1
 ) -> tuple[Any, ...]:
     """Return the policies of a writer or reader; `history` messages are kept for late readers."""
     policies = policy(library)
@@ -44,9 +44,9 @@ def qualities(
         policies.Durability.TransientLocal if is_latched else policies.Durability.Volatile,
         policies.History.KeepLast(max(depth, history)),
         policies.DataRepresentation(use_cdrv0_representation=True),
-        policies.Userdata(told),
+        policies.Userdata(announced),
     ]
     if is_latched:
         last = policies.History.KeepLast(max(1, history))
-        found.append(policies.DurabilityService(0, last, _NO_LIMIT, _NO_LIMIT, _NO_LIMIT))
+        found.append(policies.DurabilityService(0, last, _UNLIMITED, _UNLIMITED, _UNLIMITED))
     return tuple(found)

@@ -19,8 +19,8 @@ from nep.backends.base import SubscriberSpec, SubscriberTransport
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
-from nep.backends.ros2.publisher import told_of, wait_for_others
-from nep.backends.ros2.quality import depth_of, qualities
+from nep.backends.ros2.publisher import announcement, wait_for_matches
+from nep.backends.ros2.quality import depth_of, policies_of
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.backends.waking import WakingSubscriber
 from nep.errors import WireError
@@ -33,14 +33,14 @@ from nep.system.log_rarely import is_logged
 _logger = logging.getLogger("nep")
 _BATCH = 256
 _BATCH_BYTES = 64 * 2**20
-_MOST_SOURCES = 4096
+_MAX_SOURCES = 4096
 """Maximum number of publishers remembered."""
 
 
-def id_of(gid: bytes, told: str | None) -> int:
+def id_of(gid: bytes, announced: str | None) -> int:
     """Return the id of a publisher or subscriber: the announced one, or one derived from its GUID."""
     try:
-        number = int(told or "", 16)
+        number = int(announced or "", 16)
     except ValueError:
         number = 0
     if 0 < number < 2**63:
@@ -104,38 +104,40 @@ class Ros2Subscriber(WakingSubscriber):
             and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
         ]
         with participant.changed:
-            self._add_reader(is_latched=False)
+            self._add_reader_locked(is_latched=False)
             if any(each.is_latched for each in writers):
-                self._add_reader(is_latched=True)
+                self._add_reader_locked(is_latched=True)
         try:
-            wait_for_others(participant, writers, lambda: self._readers)
+            wait_for_matches(participant, writers, lambda: self._readers)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.close()
             raise
 
-    def _add_reader(self, *, is_latched: bool) -> None:
+    def _add_reader_locked(self, *, is_latched: bool) -> None:
         # Call with the participant's lock held.
         participant, spec = self._participant, self.spec
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
-        told = told_of(self._type_hash, self._transport.node.id, spec)
+        announced = announcement(self._type_hash, self._transport.node.id, spec)
         depth = max(depth_of(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,
             participant.topics.topic(self._name, self._mapping.ros_type),
-            participant.qos(*qualities(library, spec.qos, depth, is_latched=is_latched, told=told)),
+            participant.qos(
+                *policies_of(library, spec.qos, depth, is_latched=is_latched, announced=announced)
+            ),
         )
         self._readers.append(reader)
         participant.assign(self._transport.node.id, "reader", reader)
         ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
         participant.watch(reader, ready, lambda: self._read(reader, ready))
 
-    def look_for_latched(self) -> None:
+    def update_latched_reader(self) -> None:
         """Add a second reader if a latching publisher has appeared. Runs in the participant's thread."""
         if not self._has_latched and not self.is_closed:
             for handle in self._readers[0].get_matched_publications():
                 if self._source(self._readers[0], handle).kind.is_latched:
-                    self._add_reader(is_latched=True)
+                    self._add_reader_locked(is_latched=True)
                     return
 
     # ---- receiving
@@ -143,16 +145,16 @@ class Ros2Subscriber(WakingSubscriber):
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         # Runs in the participant's thread, with its lock held.
         while samples := reader.take(_BATCH, ready):
-            came = [each for sample in samples for each in self._messages(reader, sample)]
-            if came:
-                self._put(came)
+            messages = [each for sample in samples for each in self._messages(reader, sample)]
+            if messages:
+                self._put(messages)
             if len(samples) < _BATCH:
                 return
 
     def _messages(self, reader: Any, sample: Any) -> list[Message]:  # noqa: ANN401 - see above
         cdr = getattr(sample, "cdr", None)
         if cdr is None:
-            return self._last_of(sample.sample_info.publication_handle)
+            return self._release_held(sample.sample_info.publication_handle)
         info = sample.sample_info
         source = self._source(reader, info.publication_handle)
         try:
@@ -168,44 +170,44 @@ class Ros2Subscriber(WakingSubscriber):
         message = arrived(source.kind, data, info.source_timestamp, 0, source.id)
         message.seq = None  # DDS doesn't expose its sequence numbers
         if source.kind.is_latched:
-            return self._in_order(reader, source, message, info.source_timestamp)
+            return self._merge_history(reader, source, message, info.source_timestamp)
         return [message]
 
-    def _in_order(self, reader: Any, source: _Source, message: Message, stamp_ns: int) -> list[Message]:  # noqa: ANN401 - see above
+    def _merge_history(self, reader: Any, source: _Source, message: Message, stamp_ns: int) -> list[Message]:  # noqa: ANN401 - see above
         # Merges the messages of a latching publisher: the history first, then the others, without duplicates.
         # Messages of the first reader are held until the second one has received the history.
         if reader is not self._readers[0] or not self._has_latched:
-            came: list[tuple[int, Message]] = []
+            messages: list[tuple[int, Message]] = []
             if self._has_latched:
                 source.is_caught_up = True
                 if source.held and stamp_ns >= source.held[0][0]:
-                    came, source.held = source.held, []
-            came.append((stamp_ns, message))
+                    messages, source.held = source.held, []
+            messages.append((stamp_ns, message))
         elif source.is_caught_up:
             return []
         else:
             source.held.append((stamp_ns, message))
             if len(source.held) <= MAX_HISTORY:
                 return []
-            came, source.held = source.held, []
-        return self._newer(source, came)
+            messages, source.held = source.held, []
+        return self._without_duplicates(source, messages)
 
-    def _newer(self, source: _Source, came: list[tuple[int, Message]]) -> list[Message]:
+    def _without_duplicates(self, source: _Source, messages: list[tuple[int, Message]]) -> list[Message]:
         # Drops duplicates.
         new = []
-        for stamp_ns, each in came:
+        for stamp_ns, each in messages:
             if stamp_ns > source.newest_ns:
                 source.newest_ns = stamp_ns
                 new.append(each)
         return new
 
-    def _last_of(self, handle: int) -> list[Message]:
+    def _release_held(self, handle: int) -> list[Message]:
         # A publisher has disappeared: deliver its held messages.
         source = self._sources.get(handle)
         if source is None or not source.held:
             return []
-        came, source.held = source.held, []
-        return self._newer(source, came)
+        messages, source.held = source.held, []
+        return self._without_duplicates(source, messages)
 
     def _source(self, reader: Any, handle: int) -> _Source:  # noqa: ANN401 - see above
         known = self._sources.get(handle)
@@ -217,11 +219,11 @@ class Ros2Subscriber(WakingSubscriber):
         source = _Source(
             id_of(handle.to_bytes(8, "little", signed=handle < 0), None)
             if described is None
-            else id_of(described.gid, described.told.get("nepid")),
+            else id_of(described.gid, described.announced.get("nepid")),
             self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
         )
         if described is not None:
-            if len(self._sources) >= _MOST_SOURCES:
+            if len(self._sources) >= _MAX_SOURCES:
                 self._sources.pop(next(iter(self._sources)))
             self._sources[handle] = source
         return source

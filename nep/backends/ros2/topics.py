@@ -14,7 +14,7 @@ from nep.backends.ros2.message_types import MessageTypes
 from nep.backends.ros2.names import dds_type, user_data
 
 _BLOCKING_NS = 100_000_000
-_NAMES = {"byte": "uint8"}
+_IDL_NAMES = {"byte": "uint8"}
 
 
 class DdsTopics:
@@ -45,26 +45,26 @@ class DdsTopics:
         """Create a writer whose last sample is kept for late readers."""
         policies = self._dds.qos.Policy
         last = policies.History.KeepLast(1)
-        kept = (last, policies.DurabilityService(0, last, -1, -1, -1))
+        history = (last, policies.DurabilityService(0, last, -1, -1, -1))
         return self._dds.pub.DataWriter(
-            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, *kept)
+            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, *history)
         )
 
     def state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         """Create a reader for the samples of state writers."""
-        kept = self._dds.qos.Policy.History.KeepLast(1000)
+        history = self._dds.qos.Policy.History.KeepLast(1000)
         return self._dds.sub.DataReader(
-            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, kept)
+            self._entity, self.topic(name, ros_type), self._state_qos(ros_type, history)
         )
 
-    def _state_qos(self, ros_type: str, *kept: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+    def _state_qos(self, ros_type: str, *history: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         policies = self._dds.qos.Policy
         return self._dds.qos.Qos(
             policies.Reliability.Reliable(_BLOCKING_NS),
             policies.Durability.TransientLocal,
             policies.DataRepresentation(use_cdrv0_representation=True),
             policies.Userdata(user_data({"typehash": self._types.type_hash(ros_type)})),
-            *kept,
+            *history,
         )
 
     def service_class(self, ros_type: str) -> Any:  # noqa: ANN401 - created dynamically
@@ -82,10 +82,10 @@ class DdsTopics:
     def _class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
         if ros_type not in self._classes:
             members = head | {each.name: self._member(each) for each in self._types.fields(ros_type)}
-            made = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
-            made.serialize = _serialize
-            made.deserialize = classmethod(_deserialize)
-            self._classes[ros_type] = made
+            created = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
+            created.serialize = _serialize
+            created.deserialize = classmethod(_deserialize)
+            self._classes[ros_type] = created
         return self._classes[ros_type]
 
     def _member(self, field: RosField) -> Any:  # noqa: ANN401 - a type
@@ -95,9 +95,9 @@ class DdsTopics:
         elif field.kind == "bool":
             item = bool
         elif field.kind == "string":
-            item = hints.bounded_str[field.text_most] if field.text_most else str
+            item = hints.bounded_str[field.max_text_bytes] if field.max_text_bytes else str
         else:
-            item = getattr(hints, _NAMES.get(field.kind, field.kind))
+            item = getattr(hints, _IDL_NAMES.get(field.kind, field.kind))
         if field.length is None:
             return item
         if field.length >= 0:
@@ -111,9 +111,9 @@ class DdsTopics:
 
 def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
     """Return a sample with this content."""
-    made = kind.__new__(kind)
-    made.cdr = cdr
-    return made
+    created = kind.__new__(kind)
+    created.cdr = cdr
+    return created
 
 
 def _serialize(sample: Any, *_arguments: object, **_options: object) -> bytes:  # noqa: ANN401 - see above

@@ -51,7 +51,7 @@ class Ros2Transport:
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
 
-    def _joined(self, configuration: Configuration) -> Participant:
+    def _join_domain(self, configuration: Configuration) -> Participant:
         if not isinstance(configuration, Hybrid):
             raise NepError(
                 _(
@@ -79,7 +79,7 @@ class Ros2Transport:
             raise ClosedError(f"node '{self.node.name}'")
 
     @contextmanager
-    def _unless_closed(self) -> Iterator[None]:
+    def _closed_errors(self) -> Iterator[None]:
         # Converts errors of Cyclone DDS to `ClosedError` if the node was closed meanwhile.
         try:
             yield
@@ -87,15 +87,15 @@ class Ros2Transport:
             self._check_open()
             raise
 
-    def look(self) -> None:
+    def endpoints_changed(self) -> None:
         """Process changed endpoints. Runs in the participant's thread, with its lock held."""
         for each in self._subscribers:
-            each.look_for_latched()
+            each.update_latched_reader()
 
     def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
         """Create a writer; returns when it is matched with the known readers."""
-        with self._unless_closed():
-            participant = self._joined(spec.configuration)
+        with self._closed_errors():
+            participant = self._join_domain(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
         with self._lock:
             if not self._closing.is_set():
@@ -106,8 +106,8 @@ class Ros2Transport:
 
     def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
         """Create a reader; returns when it is matched with the known writers."""
-        with self._unless_closed():
-            participant = self._joined(spec.configuration)
+        with self._closed_errors():
+            participant = self._join_domain(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
         with self._lock:
             if not self._closing.is_set():
@@ -123,8 +123,8 @@ class Ros2Transport:
 
     def server(self, spec: ServerSpec) -> Ros2Server:
         """Create a server; returns when it is matched with the known clients."""
-        with self._unless_closed():
-            participant = self._joined(spec.configuration)
+        with self._closed_errors():
+            participant = self._join_domain(spec.configuration)
             server = Ros2Server(participant, self.node.id, spec, self._forget_service)
         with self._lock:
             if not self._closing.is_set() and not self._is_closing:
@@ -135,8 +135,8 @@ class Ros2Transport:
 
     def client(self, spec: ClientSpec) -> Ros2Client:
         """Create a client; returns when it is matched with the known servers."""
-        with self._unless_closed():
-            participant = self._joined(spec.configuration)
+        with self._closed_errors():
+            participant = self._join_domain(spec.configuration)
             client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._forget_service)
         with self._lock:
             if not self._closing.is_set() and not self._is_closing:
@@ -168,14 +168,17 @@ class Ros2Transport:
         calls: Sequence[CallQueue] = (),
     ) -> None:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
-        mine = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
+        own_subscribers = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         before = self._wakes
         with woken_by(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
                 self.changed.wait_for(
-                    lambda: self._wakes != before or any(len(each.inbox) or each.is_closed for each in mine),
+                    lambda: (
+                        self._wakes != before
+                        or any(len(each.inbox) or each.is_closed for each in own_subscribers)
+                    ),
                     timeout_s,
                 )
 
@@ -187,8 +190,8 @@ class Ros2Transport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
         """Return the graph of discovered endpoints."""
-        with self._unless_closed():
-            return graph_of(self._joined(configuration))
+        with self._closed_errors():
+            return graph_of(self._join_domain(configuration))
 
     @property
     def publishers(self) -> tuple[Ros2Publisher, ...]:

@@ -32,13 +32,13 @@ from nep.protocol.wire import extension_part
 
 CDR = "cdr"
 """Codec of messages that are ROS messages for their readers."""
-_STRING = "std_msgs/msg/String"
-_BYTES = "std_msgs/msg/UInt8MultiArray"
-_IMAGE = "sensor_msgs/msg/CompressedImage"
-_HEAD = b"\0\1\0\0"
+_STRING_TYPE = "std_msgs/msg/String"
+_BYTES_TYPE = "std_msgs/msg/UInt8MultiArray"
+_IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
+_CDR_HEADER = b"\0\1\0\0"
 """Encapsulation header of little-endian CDR."""
-_FILES = ("jpeg", "png")
-_MOST = 2**32 - 64
+_FILE_ENCODINGS = ("jpeg", "png")
+_MAX_CDR_BYTES = 2**32 - 64
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ def mapping_for(msg_type: str) -> TypeMapping:
         return _ros_mapping(message_types().checked(msg_type))
     codec = codecs.codec_for(msg_type)
     if codec.name == "image":
-        return TypeMapping(_IMAGE, replace(codec, encode=_encode_image), _pack_image, _unpack_image)
+        return TypeMapping(_IMAGE_TYPE, replace(codec, encode=_encode_image), _pack_image, _unpack_image)
     if codec.name in ("bytes", "msgpack"):
-        return TypeMapping(_BYTES, codec, _pack_bytes, _unpack_bytes)
+        return TypeMapping(_BYTES_TYPE, codec, _pack_bytes, _unpack_bytes)
     if codec.name == "string":
         codec = replace(codec, encode=_encode_text)
-    return TypeMapping(_STRING, codec, _pack_text, _unpack_text)
+    return TypeMapping(_STRING_TYPE, codec, _pack_text, _unpack_text)
 
 
 # ---- ROS message types by name
@@ -86,7 +86,7 @@ def _ros_mapping(name: str) -> TypeMapping:
     def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
         return types.decode(name, data)
 
-    return TypeMapping(name, Codec(CDR, 0, encode, decode, dict, partial(_check_map, name)), _as_it_is, bytes)
+    return TypeMapping(name, Codec(CDR, 0, encode, decode, dict, partial(_check_map, name)), _pack_cdr, bytes)
 
 
 def _check_map(name: str, payload: object) -> None:
@@ -96,8 +96,8 @@ def _check_map(name: str, payload: object) -> None:
         )
 
 
-def _as_it_is(made: Encoded) -> bytes:
-    data = _plain(made)
+def _pack_cdr(encoded: Encoded) -> bytes:
+    data = _plain_data(encoded)
     if len(data) < 4 or data[:1] != b"\0" or data[1] > 1:
         raise WireError(_("the bytes of a ROS message begin with CDR's four"), len(data))
     return data
@@ -106,64 +106,64 @@ def _as_it_is(made: Encoded) -> bytes:
 # ---- nep message types
 
 
-def _plain(made: Encoded) -> bytes:
+def _plain_data(encoded: Encoded) -> bytes:
     # ROS messages can't carry extensions. Raises `WireError` as other back ends do.
-    if made.extension:
-        extension_part(made.extension)
-    data = made.data if isinstance(made.data, bytes) else bytes(made.data)
-    if len(data) > _MOST:
+    if encoded.extension:
+        extension_part(encoded.extension)
+    data = encoded.data if isinstance(encoded.data, bytes) else bytes(encoded.data)
+    if len(data) > _MAX_CDR_BYTES:
         raise WireError(_("a message of ROS has less than 4 GB"), len(data))
     return data
 
 
 def _encode_text(payload: object) -> Encoded:
     # Rejects zero bytes, which end a string in ROS. Raises `EncodeError`.
-    made = codecs.STRING.encode(payload)
-    if 0 in made.data:
+    encoded = codecs.STRING.encode(payload)
+    if 0 in encoded.data:
         raise EncodeError("string", "str", _zero_reason())
-    return made
+    return encoded
 
 
 def _zero_reason() -> str:
     return _("it holds a zero byte, which ends a string of ROS; use the type 'bytes'")
 
 
-def _pack_text(made: Encoded) -> bytes:
-    data = _plain(made)
+def _pack_text(encoded: Encoded) -> bytes:
+    data = _plain_data(encoded)
     if 0 in data:
         raise WireError(_zero_reason(), len(data))
-    return b"".join((_HEAD, struct.pack("<I", len(data) + 1), data, b"\0"))
+    return b"".join((_CDR_HEADER, struct.pack("<I", len(data) + 1), data, b"\0"))
 
 
 def _unpack_text(cdr: bytes) -> memoryview:
-    (size,) = _numbers(cdr, "I", 4)
+    (size,) = _read_numbers(cdr, "I", 4)
     if not 0 < size <= len(cdr) - 8 or cdr[7 + size] != 0:
         raise WireError(_("it is no text of ROS"), len(cdr))
     return memoryview(cdr)[8 : 7 + size]
 
 
-def _pack_bytes(made: Encoded) -> bytes:
-    data = _plain(made)
-    return b"".join((_HEAD, struct.pack("<III", 0, 0, len(data)), data))
+def _pack_bytes(encoded: Encoded) -> bytes:
+    data = _plain_data(encoded)
+    return b"".join((_CDR_HEADER, struct.pack("<III", 0, 0, len(data)), data))
 
 
 def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
-    dimensions, _offset, size = _numbers(cdr, "III", 4)
+    dimensions, _offset, size = _read_numbers(cdr, "III", 4)
     if dimensions:
-        return _from_field(_BYTES, cdr)
+        return _data_field(_BYTES_TYPE, cdr)
     if size > len(cdr) - 16:
         raise WireError(_("it is no array of bytes of ROS"), len(cdr))
     return memoryview(cdr)[16 : 16 + size]
 
 
-def _numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
+def _read_numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
     # The header has the byte order. Raises `WireError`.
     if len(cdr) < at + 4 * len(form) or cdr[0] != 0 or cdr[1] > 1:
         raise WireError(_("it is no message of ROS"), len(cdr))
     return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
 
 
-def _from_field(name: str, cdr: bytes) -> bytes:
+def _data_field(name: str, cdr: bytes) -> bytes:
     # Raises `WireError`.
     try:
         decoded = message_types().decode(name, cdr)
@@ -175,10 +175,10 @@ def _from_field(name: str, cdr: bytes) -> bytes:
 
 def _encode_image(payload: object) -> Encoded:
     # Rejects raw images. Raises `EncodeError`.
-    made = image_codec.encode(payload)
-    if (made.extension or {}).get("encoding") not in _FILES:
+    encoded = image_codec.encode(payload)
+    if (encoded.extension or {}).get("encoding") not in _FILE_ENCODINGS:
         raise EncodeError("image", type(payload).__name__, _raw_reason())
-    return made
+    return encoded
 
 
 def _raw_reason() -> str:
@@ -188,8 +188,8 @@ def _raw_reason() -> str:
     )
 
 
-def _pack_image(made: Encoded) -> bytes:
-    data = _plain(made)
+def _pack_image(encoded: Encoded) -> bytes:
+    data = _plain_data(encoded)
     try:
         kind = examine(data).kind
     except DecodeError as error:
@@ -199,8 +199,8 @@ def _pack_image(made: Encoded) -> bytes:
     head = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
     name = kind.encode() + b"\0"
     named = struct.pack("<I", len(name)) + name + bytes(-len(name) % 4)
-    return b"".join((_HEAD, head, named, struct.pack("<I", len(data)), data))
+    return b"".join((_CDR_HEADER, head, named, struct.pack("<I", len(data)), data))
 
 
 def _unpack_image(cdr: bytes) -> bytes:
-    return _from_field(_IMAGE, cdr)
+    return _data_field(_IMAGE_TYPE, cdr)

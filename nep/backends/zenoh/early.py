@@ -18,7 +18,7 @@ from nep.protocol.wire import Header
 __all__ = ["EarlyMessages"]
 
 T = TypeVar("T")
-_LONGEST_S = 15.0
+_MAX_QUEUED_S = 15.0
 """Maximum time in seconds that a message is queued; greetings take ten seconds at most."""
 
 
@@ -31,7 +31,7 @@ class EarlyMessages(Generic[T]):
         self._sources = sources
         self._max_messages = max_messages
         self._clock = clock
-        self._kept: dict[int, list[tuple[int, T, int]]] = {}
+        self._queued: dict[int, list[tuple[int, T, int]]] = {}
         self._until: dict[int, float] = {}
         self._bytes = 0
 
@@ -41,21 +41,21 @@ class EarlyMessages(Generic[T]):
         if source is None or source.remote is None or source.has_echoed:
             return False
         now = self._clock()
-        if now >= self._until.setdefault(header.publisher, now + _LONGEST_S) or not self._has_room(header):
+        if now >= self._until.setdefault(header.publisher, now + _MAX_QUEUED_S) or not self._has_room(header):
             return False
-        self._kept.setdefault(header.publisher, []).append((header.seq, message, size_bytes))
+        self._queued.setdefault(header.publisher, []).append((header.seq, message, size_bytes))
         self._bytes += size_bytes
         return True
 
     def _has_room(self, header: Header) -> bool:
-        count = len(self._kept.get(header.publisher, ()))
+        count = len(self._queued.get(header.publisher, ()))
         return count < self._max_messages and self._bytes < HISTORY_BYTES
 
     def take(self, publisher: int) -> list[T]:
         """Remove and return a publisher's queued messages that weren't received since, in order."""
         self._until.pop(publisher, None)
-        kept = self._kept.pop(publisher, [])
-        self._bytes -= sum(size_bytes for _seq, _message, size_bytes in kept)
+        queued = self._queued.pop(publisher, [])
+        self._bytes -= sum(size_bytes for _seq, _message, size_bytes in queued)
         source = self._sources.find(publisher)
         last = 0 if source is None or source.last is None else source.last
-        return [message for seq, message, _size in sorted(kept, key=itemgetter(0)) if seq > last]
+        return [message for seq, message, _size in sorted(queued, key=itemgetter(0)) if seq > last]

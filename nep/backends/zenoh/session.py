@@ -467,8 +467,10 @@ def _requests_in(key: str, answer: bytes) -> tuple[Request, ...]:
         return ()
     if not isinstance(bodies, list) or not all(isinstance(each, bytes) for each in bodies):
         return ()
-    said = [decode_request(each).request for each in bodies]
+    decoded = [decode_request(each).request for each in bodies]
     allowed = requests.Join | requests.Renew | requests.ReportMissing
     return tuple(
-        each for each in said if isinstance(each, allowed) and key == call_key(requests.node_of(each) or "")
+        each
+        for each in decoded
+        if isinstance(each, allowed) and key == call_key(requests.node_of(each) or "")
     )

@@ -190,7 +190,7 @@ class ZenohSubscriber(WakingSubscriber):
 
     def _append(self, message: Message | None) -> None:
         if message is not None:
-            self._sources.dropped(self._inbox.put(message))
+            self._sources.count_dropped(self._inbox.put(message))
             self.notify_waiting()
 
     def _release_early(self, publisher: int) -> None:
@@ -208,7 +208,7 @@ class ZenohSubscriber(WakingSubscriber):
         with self._inboxes.changed:
             for old in self._sources.replaced_by(remote):
                 self._sources.pop(old)
-            self._sources.listed(remote).is_silent = False
+            self._sources.add_listed(remote).is_silent = False
 
     def mark_silent(self, publisher: int) -> None:
         """Mark a publisher as silent; it is kept, because it may only be unreachable."""
@@ -216,7 +216,7 @@ class ZenohSubscriber(WakingSubscriber):
             source = self._sources.find(publisher)
             if source is not None:
                 source.is_silent = True
-            for each in self._sources.ended(0.0):
+            for each in self._sources.expired(0.0):
                 self._sources.pop(each)
 
     def bye(self, publisher: int, last_seq: int) -> None:
@@ -225,7 +225,7 @@ class ZenohSubscriber(WakingSubscriber):
             source = self._sources.find(publisher)
             if source is not None:
                 if source.last is not None:
-                    self._sources.reached(publisher, last_seq)
+                    self._sources.advance_to(publisher, last_seq)
                 self._sources.pop(publisher)
 
     def _leave(self, publisher: int) -> None:

@@ -202,9 +202,11 @@ class ZenohTransport:
         if pending_flush is not None:
             wanted = frozenset(call_key(each.node_id) for each in pending_flush.expected)
             silent = pending_flush.query.wait(wanted, deadline)
-            there = {each.id for each in pending_flush.session.roster.subscribers_of(publisher.spec.topic)}
+            listed_ids = {
+                each.id for each in pending_flush.session.roster.subscribers_of(publisher.spec.topic)
+            }
             undelivered = sum(
-                call_key(each.node_id) in silent and each.id in there for each in pending_flush.expected
+                call_key(each.node_id) in silent and each.id in listed_ids for each in pending_flush.expected
             )
             if undelivered:
                 _logger.warning(
@@ -227,11 +229,11 @@ class ZenohTransport:
         calls: Sequence[CallQueue] = (),
     ) -> None:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
-        mine = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
+        own_subscribers = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
         before = self._inboxes.wakes
         with woken_by(calls, self.wake) as is_empty:
             if is_empty:
-                self._inboxes.wait(mine, timeout_s, before)
+                self._inboxes.wait(own_subscribers, timeout_s, before)
 
     def wake(self) -> None:
         """End all waits in progress."""

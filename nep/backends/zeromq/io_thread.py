@@ -256,27 +256,27 @@ class IoThread:
             heapq.heappop(self._timers)
         return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
 
-    def _probe(self, served: Pollable, wanted: int) -> None:
+    def _probe(self, served: Pollable, mask: int) -> None:
         # Windows' select reports a broken descriptor only while polling, and then for the whole set.
         with self._new_selector() as trial:
-            trial.register(served.fd, wanted)
+            trial.register(served.fd, mask)
             trial.select(0)
         self._suspects.discard(served)
 
-    def _poll(self, served: Pollable, wanted: int) -> None:
+    def _poll(self, served: Pollable, mask: int) -> None:
         polled = self._polled.get(served)
         if polled is None:
-            if wanted:
+            if mask:
                 if served in self._suspects:
-                    self._probe(served, wanted)
-                self._selector.register(served.fd, wanted, (served,))
-                self._polled[served] = (served.fd, wanted)
-        elif not wanted:
+                    self._probe(served, mask)
+                self._selector.register(served.fd, mask, (served,))
+                self._polled[served] = (served.fd, mask)
+        elif not mask:
             del self._polled[served]
             self._selector.unregister(polled[0])
-        elif wanted != polled[1]:
-            self._selector.modify(polled[0], wanted, (served,))
-            self._polled[served] = (polled[0], wanted)
+        elif mask != polled[1]:
+            self._selector.modify(polled[0], mask, (served,))
+            self._polled[served] = (polled[0], mask)
 
     def _unregister(self, served: Pollable) -> None:
         self._served.discard(served)

@@ -106,7 +106,7 @@ class PublisherTracker:
         if source.last is None:
             source.last = 0
 
-    def listed(self, remote: RemotePublisher) -> TrackedPublisher:
+    def add_listed(self, remote: RemotePublisher) -> TrackedPublisher:
         """Return the state of a publisher that the master lists; create it if needed."""
         source = self.get(remote.publisher.id)
         source.remote = remote
@@ -114,7 +114,7 @@ class PublisherTracker:
         self._unlisted.pop(remote.publisher.id, None)
         return source
 
-    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+    def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, by node id."""
         self._clocks = clocks
         for source in self.by_id.values():
@@ -142,7 +142,7 @@ class PublisherTracker:
         """Number of publishers that have confirmed this subscriber with an echo."""
         return sum(source.has_echoed for source in self.by_id.values())
 
-    def arrived(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
+    def count_message(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
         """Count a message; return False for a duplicate.
 
         Duplicates are possible with messages sent to this subscriber alone (latched). Raises `WireError` if
@@ -188,7 +188,7 @@ class PublisherTracker:
             source.early_until = now + EARLY_MESSAGES_S
         return now < source.early_until
 
-    def reached(self, publisher: int, seq: int) -> bool:
+    def advance_to(self, publisher: int, seq: int) -> bool:
         """Process an echo or bye: all messages up to `seq` were sent before it on the same connection.
 
         Returns False, and counts nothing, if the gap exceeds `GAP_MAX`.
@@ -203,7 +203,7 @@ class PublisherTracker:
             source.last = seq
         return True
 
-    def promised(self, publisher: int, seq: int) -> None:
+    def expect_up_to(self, publisher: int, seq: int) -> None:
         """Process the master's report that `seq` was sent. Call only when the socket is empty.
 
         Messages reported one renewal ago and not received since are counted as lost; if they arrive after
@@ -220,32 +220,32 @@ class PublisherTracker:
             source.last = source.late_to = source.promised
         source.promised = seq
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count received messages that were dropped for lack of room."""
         self.received -= count
         self.lost += count
 
-    def closing(self, publisher: int, final: int, now: float) -> None:
+    def mark_closing(self, publisher: int, final: int, now: float) -> None:
         """Note that a publisher unregistered or was replaced; `final` is its last message, 0 if unknown."""
         source = self.by_id.get(publisher)
         if source is not None and source.ends_at is None:
             source.ends_at = now + BYE_TIMEOUT_S
             source.promised = max(source.promised, final)
 
-    def lapsed(self, publisher: int, final: int) -> None:
+    def mark_silent(self, publisher: int, final: int) -> None:
         """Note that a publisher is no longer listed; `final` is the newest message known to the master."""
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_silent = True
             source.promised = max(source.promised, final)
 
-    def settle(self, publisher: int) -> None:
+    def count_missing(self, publisher: int) -> None:
         """Count the missing messages of a publisher that is about to be removed as lost."""
         source = self.by_id.get(publisher)
         if source is not None and source.last is not None:
-            self.reached(publisher, source.promised)
+            self.advance_to(publisher, source.promised)
 
-    def ended(self, now: float) -> list[int]:
+    def expired(self, now: float) -> list[int]:
         """Return publishers to remove.
 
         These are unregistered ones whose bye is overdue, and the oldest silent ones beyond `UNLISTED_MAX`.

@@ -101,7 +101,7 @@ class SessionSubscriber(Protocol):
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to further publishers."""
 
-    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
+    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """Process the removal of a publisher."""
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
@@ -405,12 +405,12 @@ class MasterSession:
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
 
-    def _handle_publisher_added(self, came: PublisherCame) -> None:
-        remotes = self._select_endpoints((came.publisher,))
+    def _handle_publisher_added(self, added: PublisherCame) -> None:
+        remotes = self._select_endpoints((added.publisher,))
         can_be_heard = any(is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints)
-        for subscriber in self._subscribers_of(came.publisher.publisher.topic):
-            if came.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
-                subscriber.expect_all_of(came.publisher.publisher.id)
+        for subscriber in self._subscribers_of(added.publisher.publisher.topic):
+            if added.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
+                subscriber.expect_all_of(added.publisher.publisher.id)
             subscriber.connect(remotes)
 
     def _handle_publisher_removed(self, gone: PublisherGone) -> None:
@@ -419,7 +419,7 @@ class MasterSession:
                 if isinstance(each, PatternSubscriber):
                     each.note_early_close(gone.id)
         for subscriber in self._subscribers_of(gone.topic, may_create=False):
-            subscriber.gone(gone.id, gone.last_seq, is_closed=gone.is_closed)
+            subscriber.publisher_removed(gone.id, gone.last_seq, is_closed=gone.is_closed)
 
     def _renew(self) -> None:
         if self._epoch == 0:
@@ -471,9 +471,9 @@ class MasterSession:
     def _differences_in(self, answer: Renewed) -> Mapping[str, ClockDifference]:
         known_at_ns = time.monotonic_ns()
         found = {
-            node_id: ClockDifference(*told, known_at_ns)
-            for node_id, told in answer.clocks.items()
-            if len(told) == 2 and is_clock(told[0] // 2, told[1] // 2)
+            node_id: ClockDifference(*clock_times, known_at_ns)
+            for node_id, clock_times in answer.clocks.items()
+            if len(clock_times) == 2 and is_clock(clock_times[0] // 2, clock_times[1] // 2)
         }
         if len(found) < len(answer.clocks):
             self._calls.refusals.add(_("a clock differs as no clock can"))

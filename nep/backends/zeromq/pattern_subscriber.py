@@ -197,10 +197,10 @@ class PatternSubscriber(WakingSubscriber):
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
         """Wait until these publishers have sent their echo; see `NativeSubscriber.wait_for`."""
-        wanted = tuple(publishers)
+        ids = tuple(publishers)
         deadline = time.monotonic() + timeout_s
         members = list(self._members.values())
-        return all(each.wait_for(wanted, max(0.0, deadline - time.monotonic()), waker) for each in members)
+        return all(each.wait_for(ids, max(0.0, deadline - time.monotonic()), waker) for each in members)
 
     @property
     def topics(self) -> tuple[str, ...]:

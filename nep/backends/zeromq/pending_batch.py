@@ -85,7 +85,7 @@ class PendingBatch:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
     def publish_function(
-        self, asked: QuickPublish, path: SendPath, lock: threading.Lock
+        self, hooks: QuickPublish, path: SendPath, lock: threading.Lock
     ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
@@ -96,24 +96,24 @@ class PendingBatch:
             way: Sending end.
             lock: Lock of `path`.
         """
-        owner, kind, ordinary, look, slowly = asked
+        owner, kind, encode, on_null, fallback = hooks
         batch, pending, put, send_now = self, self.pending, self.pending.append, path.send_now
 
         def publish(payload: Any, *, strict: bool = False) -> None:  # noqa: ANN401 - as `Publisher.publish`
             if strict:
-                slowly(payload, strict=True)
+                fallback(payload, strict=True)
                 return
             stamp_ns = _time_ns()
             if owner.is_closed or path.problem or not path.is_heard or type(payload) is Encoded:
-                slowly(payload)
+                fallback(payload)
                 return
             try:
-                data: Any = payload if type(payload) is kind else ordinary(payload)
-            except Exception:  # noqa: BLE001 - a payload may be of any class; `slowly` sends or reports it
-                slowly(payload)
+                data: Any = payload if type(payload) is kind else encode(payload)
+            except Exception:  # noqa: BLE001 - a payload may be of any class; `fallback` sends or reports it
+                fallback(payload)
                 return
-            if look is not None and data.rfind(NULL) >= 0:
-                look(payload)
+            if on_null is not None and data.rfind(NULL) >= 0:
+                on_null(payload)
             if stamp_ns >= batch.until_ns or len(data) >= MAX_BATCHED_BYTES:
                 send_now(data)
                 return

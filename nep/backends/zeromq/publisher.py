@@ -523,8 +523,8 @@ class NativePublisher(GreetedPublisher):
 
     def _greet_locked(self, own: bytes) -> None:
         # The history, then the echo: from here on the subscriber counts losses.
-        for kept in self._history:
-            self._send_parts_locked(own, kept)
+        for message in self._history:
+            self._send_parts_locked(own, message)
         if self._history:
             hello = parse_hello(own)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None

@@ -141,7 +141,7 @@ class CarefulParser:
     def _notice(self, header: Header) -> None:
         source = self._sources.get(header.publisher)
         last = source.last
-        is_possible = self._sources.reached(header.publisher, header.seq)
+        is_possible = self._sources.advance_to(header.publisher, header.seq)
         if header.flags & BYE:
             self._leave(header.publisher)
         elif header.flags & OFFER:
@@ -165,7 +165,7 @@ class CarefulParser:
             raise unknown_codec(header.codec)
         if not is_alone and self._sources.is_early(header.publisher):
             return None
-        if not self._sources.arrived(header.publisher, header.seq, is_alone=is_alone):
+        if not self._sources.count_message(header.publisher, header.seq, is_alone=is_alone):
             return None
         shared: bytes | memoryview | None = None
         if header.flags & SHARED:
@@ -175,7 +175,7 @@ class CarefulParser:
                 )
             shared = self._shared.take(header.publisher, payload, may_copy=codec.name == "bytes")
             if shared is None:
-                self._sources.dropped(1)
+                self._sources.count_dropped(1)
                 return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
@@ -260,7 +260,7 @@ class SubSocket:
         """Connect to a publisher (idempotent). Silent publishers that it replaces are removed later."""
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         self._disconnect_replaced(remote, endpoint)
-        source = self.sources.listed(remote)
+        source = self.sources.add_listed(remote)
         source.form = 0  # its message type may have changed
         source.is_silent = False
         source.ends_at = None
@@ -277,13 +277,13 @@ class SubSocket:
     def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
         # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
         for old in self.sources.replaced_by(remote):
-            self.sources.closing(old, 0, time.monotonic())
+            self.sources.mark_closing(old, 0, time.monotonic())
         known = self.sources.find(remote.publisher.id)
         if not endpoint or (known is not None and known.endpoint == endpoint):
             return
         for old, source in self.sources.items():
             if source.endpoint == endpoint:
-                self.sources.settle(old)
+                self.sources.count_missing(old)
                 self.leave(old)
 
     def _connect(self, source: TrackedPublisher, endpoint: str) -> None:
@@ -357,7 +357,13 @@ class SubSocket:
                 raise
 
     def read_into(
-        self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False, first: bytes | None = None
+        self,
+        into: MessageBuffer,
+        max_messages: int,
+        max_bytes: int,
+        *,
+        may_wait: bool = False,
+        first: bytes | None = None,
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
@@ -366,16 +372,16 @@ class SubSocket:
 
         Args:
             into: Container to append to.
-            most: Maximum number of messages.
-            room: Maximum number of bytes.
+            max_messages: Maximum number of messages.
+            max_bytes: Maximum number of bytes.
             may_wait: True to wait for the first message.
             first: First part, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
         cut, body = self._topic_length, self._body
-        count, others, flags = 0, 0, 0 if may_wait else _DONTWAIT
+        count, uncounted, flags = 0, 0, 0 if may_wait else _DONTWAIT
         try:
-            while count < most and room > 0:
+            while count < max_messages and max_bytes > 0:
                 if first is None:
                     first = recv(flags)
                     flags = _DONTWAIT  # all parts of a message are available with its first one
@@ -396,16 +402,16 @@ class SubSocket:
                         message.decoded = UNDECODED
                         append(message)
                         count += 1
-                        room -= size
+                        max_bytes -= size
                         first = None
                         continue
                     if form & BATCH_FORM:
                         got, new = self._read_batch(first, into)
                         # a rejected batch returns 0, so the caller waits as for an empty socket
-                        count, others, room, first = (
+                        count, uncounted, max_bytes, first = (
                             count + got,
-                            others + got - new,
-                            room - (len(first) if got else 0),
+                            uncounted + got - new,
+                            max_bytes - (len(first) if got else 0),
                             None,
                         )
                         continue
@@ -416,11 +422,11 @@ class SubSocket:
                 if other is not None:
                     append(other)
                     count += 1
-                    others += 1
-                    room -= other.size_bytes
+                    uncounted += 1
+                    max_bytes -= other.size_bytes
         except zmq.Again:
             pass  # the socket is empty
-        self.sources.received += count - others
+        self.sources.received += count - uncounted
         return count
 
     def _read_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
@@ -611,7 +617,7 @@ class SubSocket:
 
     def dropped(self, count: int) -> None:
         """Count received messages that were dropped for lack of room."""
-        self.sources.dropped(count)
+        self.sources.count_dropped(count)
 
     def close(self) -> None:
         """Close the socket."""

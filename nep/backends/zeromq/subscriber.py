@@ -76,13 +76,15 @@ class Readable(Protocol):
     def has_input(self) -> bool:
         """True if a message can be read. Also processes connects and disconnects."""
 
-    def read_into(self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False) -> int:
+    def read_into(
+        self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
+    ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
         Args:
             into: Container to append to.
-            most: Maximum number of messages.
-            room: Maximum number of bytes.
+            max_messages: Maximum number of messages.
+            max_bytes: Maximum number of bytes.
             may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
         """
 
@@ -106,16 +108,18 @@ class UnbatchedReader:
         """Return the next message, see `Readable.read`."""
         raise NotImplementedError
 
-    def read_into(self, into: MessageBuffer, most: int, room: int, *, may_wait: bool = False) -> int:
+    def read_into(
+        self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
+    ) -> int:
         """Read messages one by one, see `Readable.read_into`."""
         count = 0
-        while count < most and room > 0:
+        while count < max_messages and max_bytes > 0:
             message = self.read(into, may_wait=may_wait and not count)
             if message is None:
                 break
             into.append(message)
             count += 1
-            room -= message.size_bytes
+            max_bytes -= message.size_bytes
         return count
 
 
@@ -408,8 +412,8 @@ class SocketSubscriber(Generic[R]):
                     self._ahead.begin()
                 message = self._read(self.ready, may_wait=may_wait)
                 return self._bounded_locked(message) if self.ready else message
-            most = self._ahead.more()
-            if self._read_into(self.ready, most, _AHEAD_BYTES, may_wait=may_wait) < most:
+            max_messages = self._ahead.more()
+            if self._read_into(self.ready, max_messages, _AHEAD_BYTES, may_wait=may_wait) < max_messages:
                 self._ahead.begin()
         if self.ready:
             return self._bounded_locked(self.ready.popleft())
@@ -431,10 +435,10 @@ class SocketSubscriber(Generic[R]):
             self._readable.dropped(over)
         return message
 
-    def _fill_locked(self, most: int = _BATCH_MESSAGES) -> int:
+    def _fill_locked(self, max_messages: int = _BATCH_MESSAGES) -> int:
         # Reads into the inbox until the socket is empty or a batch is full; returns the number of messages.
         messages: list[Message] = []
-        count = self._read_into(messages, most, _BATCH_BYTES)
+        count = self._read_into(messages, max_messages, _BATCH_BYTES)
         dropped = sum(map(self._inbox.put, messages))
         if dropped:
             self._readable.dropped(dropped)
@@ -535,7 +539,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             if not self.is_closed:
                 self._fill_locked()
                 self._wake_waiters_locked()
-                self._readable.reconnect_remote()
+                self._readable.reconnect()
                 self._after_use_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
@@ -548,20 +552,20 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 if each not in listed and source.remote is not None:
                     source.is_silent = True
 
-    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:
+    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """Process the removal of a publisher. Its connection stays until the bye, or until it is replaced."""
         with self._requested_lock():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
             if is_closed:
-                self._readable.sources.closing(publisher, final, time.monotonic())
+                self._readable.sources.mark_closing(publisher, final, time.monotonic())
             else:
-                self._readable.sources.lapsed(publisher, final)
+                self._readable.sources.mark_silent(publisher, final)
 
     def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, by node id."""
         with self._requested_lock():
-            self._readable.sources.correct(clocks)
+            self._readable.sources.set_clock_differences(clocks)
 
     def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Process a renewal: remove publishers that closed without a bye, and update the losses.
@@ -572,13 +576,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             if self.is_closed:
                 return
             sources = self._readable.sources
-            for publisher in sources.ended(now):
-                sources.settle(publisher)
+            for publisher in sources.expired(now):
+                sources.count_missing(publisher)
                 self._readable.leave(publisher)
             if not self._readable.has_input:
                 # libzmq never connects again after a failed handshake, as with another program's PULL.
                 for publisher in sources.silent(now):
                     self._readable.reconnect(publisher)
                 for publisher, seq in last_seqs:
-                    sources.promised(publisher, seq)
+                    sources.expect_up_to(publisher, seq)
             self._after_use_locked()

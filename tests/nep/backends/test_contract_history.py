@@ -237,9 +237,9 @@ def test_what_comes_before_the_echo_is_left_out_only_where_it_comes_again(
     monkeypatch.setattr("nep.backends.zeromq.loss.time.monotonic", lambda: now[0])
     sources = PublisherTracker()
     assert not sources.is_early(5)
-    sources.listed(_remote(1))
+    sources.add_listed(_remote(1))
     assert not sources.is_early(5)
-    sources.listed(_remote(2))
+    sources.add_listed(_remote(2))
     assert sources.is_early(5)
     now[0] += EARLY_MESSAGES_S
     assert not sources.is_early(5), "it greets nobody"
@@ -254,11 +254,11 @@ def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
     sources = PublisherTracker()
     early: EarlyMessages[bytes] = EarlyMessages(sources, 3, lambda: now[0])
     assert not early.keep(Header(1, 1, 7, 0, 5), b"7", 2), "nobody has met it"
-    sources.listed(_remote(2))
+    sources.add_listed(_remote(2))
     for seq in (9, 7, 8):
         assert early.keep(Header(1, 1, seq, 0, 5), b"%d" % seq, 2)
     assert not early.keep(Header(1, 1, 10, 0, 5), b"10", 2), "there is room for three"
-    assert sources.arrived(5, 7, is_alone=True)
+    assert sources.count_message(5, 7, is_alone=True)
     assert early.take(5) == [b"8", b"9"], "those that the history had are left out"
     assert early.take(5) == []
     sources.get(5).has_echoed = True

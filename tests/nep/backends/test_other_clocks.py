@@ -192,13 +192,13 @@ def test_a_master_that_talks_nonsense_of_clocks_is_counted_and_heard_on(
 def test_differences_are_those_that_were_told_last() -> None:
     far = RemotePublisher(PublisherRecord(7, "t", "json", "json", ("tcp://10.0.0.9:1",)), "n", "far", "far")
     sources = PublisherTracker()
-    source = sources.listed(far)
+    source = sources.add_listed(far)
     assert source.clock.difference is None
     known = ClockDifference(5, 6, 7)
-    sources.correct({"n": known, "m": ClockDifference(1, 1, 1)})
+    sources.set_clock_differences({"n": known, "m": ClockDifference(1, 1, 1)})
     assert source.clock.difference is known
-    assert sources.listed(far).clock.difference is known, "it is listed again when its address changes"
-    sources.correct({})
+    assert sources.add_listed(far).clock.difference is known, "it is listed again when its address changes"
+    sources.set_clock_differences({})
     assert source.clock.difference is None
 
 

@@ -38,45 +38,45 @@ def new_publisher(history: int = 0) -> PublisherTracker:
     """Losses of a subscriber that was registered when publisher 5 was created."""
     sources = PublisherTracker()
     sources.expect_all_of(5)
-    sources.listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
+    sources.add_listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
     return sources
 
 
 def test_messages_before_the_first_received_one_are_lost() -> None:
     sources = new_publisher()
-    assert sources.arrived(5, 8, is_alone=False)
+    assert sources.count_message(5, 8, is_alone=False)
     assert (sources.received, sources.lost) == (1, 7)
 
 
 def test_messages_before_the_echo_are_lost() -> None:
     sources = new_publisher()
-    assert sources.reached(5, 21975)
+    assert sources.advance_to(5, 21975)
     assert sources.lost == 21975
 
 
 def test_no_message_is_lost_if_the_first_one_arrives() -> None:
     sources = new_publisher()
-    assert sources.reached(5, 0)
-    assert sources.arrived(5, 1, is_alone=False)
+    assert sources.advance_to(5, 0)
+    assert sources.count_message(5, 1, is_alone=False)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_losses_grow_with_each_renewal_while_the_publisher_is_not_reached() -> None:
     sources = new_publisher()
-    sources.promised(5, 100)
+    sources.expect_up_to(5, 100)
     assert sources.lost == 0
-    sources.promised(5, 250)
+    sources.expect_up_to(5, 250)
     assert sources.lost == 100
-    sources.settle(5)
+    sources.count_missing(5)
     assert sources.lost == 250
 
 
 def test_a_message_that_was_counted_as_lost_and_comes_late_is_counted_as_received() -> None:
     sources = new_publisher()
-    sources.promised(5, 2)
-    sources.promised(5, 2)
+    sources.expect_up_to(5, 2)
+    sources.expect_up_to(5, 2)
     assert sources.lost == 2
-    assert sources.arrived(5, 2, is_alone=False)
+    assert sources.count_message(5, 2, is_alone=False)
     assert (sources.received, sources.lost) == (1, 1)
 
 
@@ -84,19 +84,19 @@ def test_messages_older_than_the_history_are_lost() -> None:
     sources = new_publisher(history=3)
     assert sources.is_early(5), "its history brings this message again"
     for seq in (8, 9, 10):
-        assert sources.arrived(5, seq, is_alone=True)
-    assert sources.reached(5, 10)
+        assert sources.count_message(5, seq, is_alone=True)
+    assert sources.advance_to(5, 10)
     assert (sources.received, sources.lost) == (3, 7)
 
 
 def test_a_history_that_arrives_after_its_messages_were_promised_is_received() -> None:
     sources = new_publisher(history=3)
-    sources.promised(5, 9)
-    sources.promised(5, 9)
+    sources.expect_up_to(5, 9)
+    sources.expect_up_to(5, 9)
     assert sources.lost == 9
     assert sources.is_early(5), "its history brings this message again"
     for seq in (8, 9, 10):
-        assert sources.arrived(5, seq, is_alone=True)
+        assert sources.count_message(5, seq, is_alone=True)
     assert (sources.received, sources.lost) == (3, 7)
 
 
@@ -124,16 +124,16 @@ def test_a_pattern_that_is_not_registered_yet_expects_nothing_of_a_new_publisher
 
 def test_a_publisher_that_was_there_before_counts_from_its_first_received_message() -> None:
     sources = PublisherTracker()
-    sources.promised(5, 100)
-    sources.promised(5, 100)
-    assert sources.arrived(5, 101, is_alone=False)
+    sources.expect_up_to(5, 100)
+    sources.expect_up_to(5, 100)
+    assert sources.count_message(5, 101, is_alone=False)
     sources.expect_all_of(5)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_an_impossible_first_number_is_rejected_and_counts_nothing() -> None:
     sources = new_publisher()
-    assert not sources.reached(5, GAP_MAX + 1)
+    assert not sources.advance_to(5, GAP_MAX + 1)
     assert sources.lost == 0
 
 

@@ -233,7 +233,7 @@ def test_one_bad_endpoint_keeps_nobody_from_hearing_the_others(
             assert "of 'bad' cannot be connected to" in transport.counts().problem
             assert "\x1b" not in transport.counts().problem + caplog.text
             for each in bad:
-                transport.gone(each.publisher.id, 0, is_closed=False)
+                transport.publisher_removed(each.publisher.id, 0, is_closed=False)
             socket.refusals = type(socket.refusals)()
             assert transport.counts().problem == ""
 

@@ -59,40 +59,40 @@ def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
 
 def test_gaps_are_losses_counted_from_the_echo() -> None:
     sources = PublisherTracker()
-    sources.reached(1, 10)
+    sources.advance_to(1, 10)
     for seq in (11, 12, 15):
-        assert sources.arrived(1, seq, is_alone=False)
+        assert sources.count_message(1, seq, is_alone=False)
     assert (sources.received, sources.lost) == (3, 2)
-    sources.reached(1, 17)  # it reconnected: two were published meanwhile
+    sources.advance_to(1, 17)  # it reconnected: two were published meanwhile
     assert sources.lost == 4
 
 
 def test_counting_starts_at_the_first_message_when_there_is_no_echo_yet() -> None:
     sources = PublisherTracker()
-    assert sources.arrived(1, 100, is_alone=False)
-    sources.reached(1, 100)
+    assert sources.count_message(1, 100, is_alone=False)
+    sources.advance_to(1, 100)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_a_latched_message_that_is_sent_again_is_dropped() -> None:
     sources = PublisherTracker()
-    assert sources.arrived(1, 5, is_alone=True)
-    assert not sources.arrived(1, 5, is_alone=True)
+    assert sources.count_message(1, 5, is_alone=True)
+    assert not sources.count_message(1, 5, is_alone=True)
     assert (sources.received, sources.lost) == (1, 0)
 
 
 def test_losses_at_the_tail_are_found_one_renewal_later_and_taken_back_if_late() -> None:
     sources = PublisherTracker()
-    sources.reached(1, 0)
+    sources.advance_to(1, 0)
     sources.get(1).has_echoed = True
-    sources.arrived(1, 1, is_alone=False)
-    sources.promised(1, 3)
+    sources.count_message(1, 1, is_alone=False)
+    sources.expect_up_to(1, 3)
     assert sources.lost == 0  # they may be on their way
-    sources.promised(1, 3)
+    sources.expect_up_to(1, 3)
     assert sources.lost == 2
-    assert sources.arrived(1, 2, is_alone=False)
+    assert sources.count_message(1, 2, is_alone=False)
     assert (sources.received, sources.lost) == (2, 1)
-    sources.promised(99, 5)  # nobody we know
+    sources.expect_up_to(99, 5)  # nobody we know
 
 
 def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
@@ -102,8 +102,8 @@ def test_a_publisher_that_starts_again_replaces_the_silent_one() -> None:
     sources.get(1).is_silent = True
     assert sources.replaced_by(remote(2)) == [1]
     assert sources.replaced_by(remote(2, name="other")) == []
-    sources.closing(1, 7, now=10.0)
-    assert (sources.ended(12.9), sources.ended(13.0)) == ([], [1])
+    sources.mark_closing(1, 7, now=10.0)
+    assert (sources.expired(12.9), sources.expired(13.0)) == ([], [1])
 
 
 def test_back_ends_are_found() -> None:
@@ -293,33 +293,33 @@ def test_the_public_names_are_there() -> None:
 
 def test_a_leap_that_cannot_be_is_refused_and_counts_no_losses() -> None:
     sources = PublisherTracker()
-    sources.reached(1, 0)
-    assert sources.arrived(1, 1, is_alone=False)
+    sources.advance_to(1, 0)
+    assert sources.count_message(1, 1, is_alone=False)
     with pytest.raises(nep.errors.WireError, match="its sequence number jumps from 1 to 184467440737095516"):
-        sources.arrived(1, 2**64 - 1, is_alone=False)
-    assert not sources.reached(1, 2**64 - 1)
+        sources.count_message(1, 2**64 - 1, is_alone=False)
+    assert not sources.advance_to(1, 2**64 - 1)
     sources.get(1).has_echoed = True
     for _ in range(3):
-        sources.promised(1, 2**64 - 1)
-    assert sources.arrived(1, 3, is_alone=False)
+        sources.expect_up_to(1, 2**64 - 1)
+    assert sources.count_message(1, 3, is_alone=False)
     assert (sources.received, sources.lost, sources.get(1).last) == (2, 1, 3)
 
 
 def test_a_publisher_that_goes_on_behind_a_leap_is_heard_again() -> None:
     sources = PublisherTracker()
-    assert sources.arrived(1, 1, is_alone=False)
+    assert sources.count_message(1, 1, is_alone=False)
     far = 1 + 2**32 + 1
     with pytest.raises(nep.errors.WireError):
-        sources.arrived(1, far, is_alone=False)
-    assert sources.arrived(1, far + 1, is_alone=False)
-    assert sources.arrived(1, far + 3, is_alone=False)
+        sources.count_message(1, far, is_alone=False)
+    assert sources.count_message(1, far + 1, is_alone=False)
+    assert sources.count_message(1, far + 3, is_alone=False)
     assert (sources.received, sources.lost) == (3, 1)
 
 
 def test_the_largest_gap_that_can_be_is_counted() -> None:
     sources = PublisherTracker()
-    assert sources.arrived(1, 1, is_alone=False)
-    assert sources.arrived(1, 1 + 2**32, is_alone=False)
+    assert sources.count_message(1, 1, is_alone=False)
+    assert sources.count_message(1, 1 + 2**32, is_alone=False)
     assert sources.lost == 2**32 - 1
 
 
@@ -414,13 +414,13 @@ def test_an_io_thread_that_is_held_up_is_waited_for_once() -> None:
 def test_publishers_that_nobody_lists_are_remembered_up_to_a_bound() -> None:
     sources = PublisherTracker()
     for number in range(1, 11):
-        sources.listed(remote(number))
+        sources.add_listed(remote(number))
     for number in range(100, 5000):
-        assert sources.arrived(number, 2**64 - 1, is_alone=False)
+        assert sources.count_message(number, 2**64 - 1, is_alone=False)
     assert len(sources.by_id) == UNLISTED_MAX + 10
     assert all(sources.find(number) is not None for number in (*range(1, 11), 4999))
     assert (sources.received, sources.lost) == (4900, 0)
-    sources.listed(remote(4999))
+    sources.add_listed(remote(4999))
     sources.pop(4998)
     for number in range(10_000, 20_000):
         sources.get(number)
@@ -459,45 +459,45 @@ def test_a_batch_of_a_sink_has_a_bound() -> None:
 def test_publishers_that_died_and_do_not_come_back_are_left_beyond_a_bound() -> None:
     sources = PublisherTracker()
     for number in range(1, UNLISTED_MAX + 11):
-        sources.listed(remote(number, name=f"N{number}")).is_silent = number != 5
-    assert sources.ended(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
+        sources.add_listed(remote(number, name=f"N{number}")).is_silent = number != 5
+    assert sources.expired(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
 
 
 def test_what_was_written_off_is_found_again_only_if_it_was_really_missing() -> None:
     sources = PublisherTracker()
     for seq in (1, 2, 3):
-        assert sources.arrived(1, seq, is_alone=False)
+        assert sources.count_message(1, seq, is_alone=False)
     for _ in range(2):
-        sources.promised(1, 5)
+        sources.expect_up_to(1, 5)
     assert (sources.received, sources.lost) == (3, 2)
     # A connection was made anew, and the publisher sends its whole history.
-    told = [seq for seq in (1, 2, 3, 4, 5) if sources.arrived(1, seq, is_alone=True)]
+    told = [seq for seq in (1, 2, 3, 4, 5) if sources.count_message(1, seq, is_alone=True)]
     assert told == [4, 5]
-    assert not sources.arrived(1, 5, is_alone=True), "once"
+    assert not sources.count_message(1, 5, is_alone=True), "once"
     assert (sources.received, sources.lost) == (5, 0)
 
 
 def test_what_comes_behind_what_was_written_off_settles_it() -> None:
     sources = PublisherTracker()
-    sources.arrived(1, 1, is_alone=False)
+    sources.count_message(1, 1, is_alone=False)
     for _ in range(2):
-        sources.promised(1, 4)
-    assert sources.arrived(1, 3, is_alone=False)
+        sources.expect_up_to(1, 4)
+    assert sources.count_message(1, 3, is_alone=False)
     assert (sources.received, sources.lost) == (2, 2), "2 was overtaken, 4 may still come"
-    assert sources.arrived(1, 6, is_alone=False)
+    assert sources.count_message(1, 6, is_alone=False)
     assert (sources.received, sources.lost) == (3, 3), "4 and 5 were overtaken"
-    assert not sources.arrived(1, 4, is_alone=True)
+    assert not sources.count_message(1, 4, is_alone=True)
     assert sources.received + sources.lost == 6
 
 
 def test_a_publisher_that_is_left_settles_what_was_promised() -> None:
     sources = PublisherTracker()
-    sources.arrived(1, 1, is_alone=False)
-    sources.lapsed(1, 3)
+    sources.count_message(1, 1, is_alone=False)
+    sources.mark_silent(1, 3)
     assert sources.lost == 0, "it may only be out of reach"
-    sources.settle(1)
+    sources.count_missing(1)
     assert (sources.received, sources.lost) == (1, 2)
-    sources.closing(2, 5, now=0.0)  # nobody we know
-    sources.lapsed(2, 5)
-    sources.settle(2)
+    sources.mark_closing(2, 5, now=0.0)  # nobody we know
+    sources.mark_silent(2, 5)
+    sources.count_missing(2)
     assert sources.lost == 2

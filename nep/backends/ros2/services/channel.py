@@ -29,10 +29,10 @@ _HEAD_BYTES, _CDR_BYTES = 20, 4
 _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILED = struct.Struct("<QqB")
 _BATCH = 256
-_MOST_WRITERS = 1024
+_MAX_WRITERS = 1024
 """Maximum number of clients remembered."""
 _BLOCKING_NS = 100_000_000
-_GREETING_S = 0.1
+_READY_DELAY_S = 0.1
 """Seconds that programs without nep need to get ready after discovery on both sides."""
 _KINDS = (CallKind.ERROR, CallKind.REFUSED)
 
@@ -44,7 +44,7 @@ class CallId(NamedTuple):
     number: int
 
 
-class HeardPart(NamedTuple):
+class ReceivedPart(NamedTuple):
     """Request or response: its CDR without the id, and its writer; None if the writer has disappeared."""
 
     id: CallId
@@ -75,15 +75,15 @@ class ServiceChannel:
         entry_id: int,
         *,
         guid: int | None = None,
-        hear: Callable[[HeardPart], None],
-        failed: Callable[[CallId, Reply], None] | None = None,
+        on_part: Callable[[ReceivedPart], None],
+        on_failure: Callable[[CallId, Reply], None] | None = None,
     ) -> None:
         self.kind = kind
         self.participant = participant
         self.is_closed = False
         self.node_id = node_id
-        self._hear = hear
-        self._failed = failed
+        self._on_part = on_part
+        self._on_failure = on_failure
         self._is_server = is_server = guid is None
         self._guid = guid
         self._ready: frozenset[bytes] = frozenset()
@@ -93,9 +93,9 @@ class ServiceChannel:
         self._first_seen: dict[bytes, float] = {}
         rq, rr = dds_service(service)
         types = participant.types
-        word = ".".join(f"{each:x}" for each in secrets.token_bytes(16))
-        self._told = {
-            "serviceid" if is_server else "clientid": word,
+        pair_id = ".".join(f"{each:x}" for each in secrets.token_bytes(16))
+        self._user_data = {
+            "serviceid" if is_server else "clientid": pair_id,
             "nepnode": node_id,
             "nepid": f"{entry_id:x}",
         }
@@ -105,10 +105,10 @@ class ServiceChannel:
         self._readers: list[Any] = []
         self._writers: list[Any] = []
         with participant.changed:
-            (out, out_type), (into, into_type) = self._topics
+            (out_topic, out_type), (in_topic, in_type) = self._topics
             self._sample_class = participant.topics.service_class(out_type)
-            self._add_writer(participant.topics.service_topic(out, out_type), out_type)
-            self._add_reader(participant.topics.service_topic(into, into_type), into_type, self._read)
+            self._add_writer(participant.topics.service_topic(out_topic, out_type), out_type)
+            self._add_reader(participant.topics.service_topic(in_topic, in_type), in_type, self._read)
             if not kind.is_nep:
                 self._add_failures(rq)
 
@@ -131,14 +131,14 @@ class ServiceChannel:
             policies.Durability.Volatile,
             policies.History.KeepLast(CALLS_MAX),
             policies.DataRepresentation(use_cdrv0_representation=True),
-            policies.Userdata(user_data({"typehash": type_hash} | self._told)),
+            policies.Userdata(user_data({"typehash": type_hash} | self._user_data)),
         )
 
     def _add_writer(self, topic: Any, ros_type: str) -> None:  # noqa: ANN401 - cyclonedds is not typed
         participant = self.participant
-        made = participant.dds.pub.DataWriter(participant.entity, topic, self._qos(ros_type))
-        self._writers.append(made)
-        participant.assign(self.node_id, "writer", made)
+        writer = participant.dds.pub.DataWriter(participant.entity, topic, self._qos(ros_type))
+        self._writers.append(writer)
+        participant.assign(self.node_id, "writer", writer)
 
     def _add_reader(
         self,
@@ -147,11 +147,11 @@ class ServiceChannel:
         read: Callable[[Any, Any], None],
     ) -> None:
         participant, core = self.participant, self.participant.dds.core
-        made = participant.dds.sub.DataReader(participant.entity, topic, self._qos(ros_type))
-        self._readers.append(made)
-        participant.assign(self.node_id, "reader", made)
-        ready = core.ReadCondition(made, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
-        participant.watch(made, ready, lambda: read(made, ready))
+        reader = participant.dds.sub.DataReader(participant.entity, topic, self._qos(ros_type))
+        self._readers.append(reader)
+        participant.assign(self.node_id, "reader", reader)
+        ready = core.ReadCondition(reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Any)
+        participant.watch(reader, ready, lambda: read(reader, ready))
 
     # ---- receiving, in the participant's thread, with its lock held
 
@@ -165,7 +165,7 @@ class ServiceChannel:
                 call = CallId(guid, number)
                 if self._is_wanted(call):
                     writer = self._writer_of(reader, sample.sample_info.publication_handle)
-                    self._hear(HeardPart(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
+                    self._on_part(ReceivedPart(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
             if len(samples) < _BATCH:
                 return
 
@@ -179,7 +179,7 @@ class ServiceChannel:
             found = reader.get_matched_publication_data(handle)
             if found is None:
                 return None
-            if len(self._known_writers) >= _MOST_WRITERS:
+            if len(self._known_writers) >= _MAX_WRITERS:
                 self._known_writers.pop(next(iter(self._known_writers)))
             known = self._known_writers[handle] = self.participant.described(found)
         return known
@@ -187,18 +187,18 @@ class ServiceChannel:
     def _read_failures(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         for sample in reader.take(_BATCH, ready):
             cdr = getattr(sample, "cdr", None)
-            if cdr is None or self._failed is None:
+            if cdr is None or self._on_failure is None:
                 continue  # a disposed writer
             try:
-                told: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
+                announced: Any = self.participant.types.decode(_FAILURE_TYPE, cdr)
             except DecodeError:
                 continue
-            data: bytes = told["data"]
+            data: bytes = announced["data"]
             if len(data) >= _FAILED.size:
                 guid, number, kind = _FAILED.unpack_from(data)
                 found = next((each for each in _KINDS if each == kind), None)
                 if found is not None and self._is_wanted(CallId(guid, number)):
-                    self._failed(CallId(guid, number), Reply(found, data[_FAILED.size :]))
+                    self._on_failure(CallId(guid, number), Reply(found, data[_FAILED.size :]))
 
     # ---- sending, without the participant's lock
 
@@ -225,9 +225,9 @@ class ServiceChannel:
     @property
     def known(self) -> list[DdsEndpoint]:
         """Discovered endpoints of the other side."""
-        (out, out_type), (into, into_type) = self._topics
-        found = [(each, out_type) for each in self.participant.endpoints("reader", out)] + [
-            (each, into_type) for each in self.participant.endpoints("writer", into)
+        (out_topic, out_type), (in_topic, in_type) = self._topics
+        found = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [
+            (each, in_type) for each in self.participant.endpoints("writer", in_topic)
         ]
         return [each for each, ros_type in found if each.is_of(dds_type(ros_type), self._hashes[ros_type])]
 
@@ -238,19 +238,19 @@ class ServiceChannel:
 
     def _matched(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
         if hasattr(entity, "get_matched_subscriptions"):
-            handles, look = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
+            handles, get_data = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
         else:
-            handles, look = entity.get_matched_publications(), entity.get_matched_publication_data
-        return [self.participant.described(data) for data in map(look, handles) if data is not None]
+            handles, get_data = entity.get_matched_publications(), entity.get_matched_publication_data
+        return [self.participant.described(data) for data in map(get_data, handles) if data is not None]
 
     def ready_servers(self) -> frozenset[bytes]:
         """Return the response writers of callable servers. For clients."""
         if self.is_closed:
             return frozenset()
-        there = self._handles()
-        if there != self._ready_there:
+        found_here = self._handles()
+        if found_here != self._ready_there:
             self._ready = self._find_ready()
-            self._ready_there = there if self._is_all_ready else ()
+            self._ready_there = found_here if self._is_all_ready else ()
         return self._ready
 
     def _handles(self) -> tuple[int, ...]:
@@ -267,8 +267,8 @@ class ServiceChannel:
         for reader in readers:
             found = [each for each in writers if each.participant == reader.participant]
             since = self._first_seen.setdefault(reader.gid, now) if found else now
-            if "nepid" not in reader.told:
-                is_ready = bool(found) and (now - since >= _GREETING_S or self._is_own(reader))
+            if "nepid" not in reader.announced:
+                is_ready = bool(found) and (now - since >= _READY_DELAY_S or self._is_own(reader))
             else:
                 is_ready = bool(found) and self._is_confirmed(reader, writers, failing)
             self._is_all_ready = self._is_all_ready and is_ready
@@ -299,11 +299,15 @@ class ServiceChannel:
         """Return the response writers of all matched servers. For clients."""
         return frozenset() if self.is_closed else frozenset(e.gid for e in self._matched(self._readers[0]))
 
-    def hears_us(self, client: DdsEndpoint) -> bool:
+    def can_reply_to(self, client: DdsEndpoint) -> bool:
         """Return True if the client with this request writer can be answered. For servers."""
-        there = [each for each in self._matched(self._writers[0]) if each.participant == client.participant]
-        word = client.told.get("clientid")
-        return any(word is None or each.told.get("clientid") in {None, word} for each in there)
+        found_here = [
+            each for each in self._matched(self._writers[0]) if each.participant == client.participant
+        ]
+        pair_id = client.announced.get("clientid")
+        return any(
+            pair_id is None or each.announced.get("clientid") in {None, pair_id} for each in found_here
+        )
 
     # ---- closing
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from nep.backends.deadlines import Deadlines
 from nep.backends.ros2.names import dds_service, ros_service, service_type_name, service_type_of
 from nep.backends.ros2.participant import Participant
-from nep.backends.ros2.publisher import wait_for_others
-from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.publisher import wait_for_matches
+from nep.backends.ros2.services.channel import CallId, ReceivedPart, ServiceChannel
 from nep.backends.ros2.services.definitions import known_service
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
@@ -26,7 +26,7 @@ from nep.protocol.requests import SubscriberCount, SubscriberRecord, as_count
 from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
-_SEEK_S, _WATCH_S = 0.02, 0.1
+_DISCOVERY_POLL_S, _SERVER_CHECK_S = 0.02, 0.1
 """Intervals for discovering a server, and for checking that it still exists."""
 
 Then = Callable[[Outcome], None]
@@ -69,14 +69,14 @@ class Ros2Client(ClientCalls[_Call]):
         self._requests, _answers = dds_service(spec.service)
         self._guid = secrets.randbits(63)
         self._channel: ServiceChannel | None = None
-        told = service_type_name(spec.msg_type)
-        self._told = None if told is None else known_service(participant.types, told)
+        given_name = service_type_name(spec.msg_type)
+        self._given_type = None if given_name is None else known_service(participant.types, given_name)
         try:
             channel: ServiceChannel | None = None
             with contextlib.suppress(NepError):  # reported by calls: another server may appear meanwhile
                 channel = self._open_channel()
             if channel is not None:
-                wait_for_others(participant, channel.known, lambda: channel.entities)
+                wait_for_matches(participant, channel.known, lambda: channel.entities)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self.close()
             raise
@@ -89,9 +89,11 @@ class Ros2Client(ClientCalls[_Call]):
                 for each in self._participant.endpoints("reader", self._requests)
                 if (name := service_type_of(each.type)) is not None
             ]
-            wanted = self._told.name if self._told is not None else next(iter(sorted(found)), "")
+            type_name = (
+                self._given_type.name if self._given_type is not None else next(iter(sorted(found)), "")
+            )
             channel = self._channel
-            if not wanted or self.is_closed or (channel is not None and channel.kind.name == wanted):
+            if not type_name or self.is_closed or (channel is not None and channel.kind.name == type_name):
                 return channel
             if channel is not None:
                 channel.close()
@@ -99,11 +101,11 @@ class Ros2Client(ClientCalls[_Call]):
                 self._participant,
                 self._node_id,
                 self.spec.service,
-                self._told or known_service(self._participant.types, wanted),
+                self._given_type or known_service(self._participant.types, type_name),
                 self.spec.id,
                 guid=self._guid,
-                hear=self._heard,
-                failed=self._told_failure,
+                on_part=self._handle_part,
+                on_failure=self._handle_failure,
             )
             return self._channel
 
@@ -141,25 +143,25 @@ class Ros2Client(ClientCalls[_Call]):
             self._calls[call.number] = call
             self._bytes += len(data)
         self._send_waiting()
-        self._deadlines.add(min(deadline, time.monotonic() + _SEEK_S))
+        self._deadlines.add(min(deadline, time.monotonic() + _DISCOVERY_POLL_S))
         return call
 
     def _send_waiting(self) -> None:
-        wrong: NepError | None = None
+        type_error: NepError | None = None
         with self._participant.changed:
             channel, servers = self._channel, self._ready_servers()
             if not servers:  # only without a ready server: listing all endpoints is slow
                 try:
                     channel, servers = self._open_channel(), self._ready_servers()
                 except NepError as error:  # the server's type is unknown here
-                    wrong = error
+                    type_error = error
             with self._lock:
                 waiting = [each for each in self._calls.values() if each.servers is None]
                 for call in waiting if servers else ():
                     call.servers = servers
-        if wrong is not None:
+        if type_error is not None:
             for call in waiting:
-                self._end(call, wrong)
+                self._finish(call, type_error)
         elif servers and channel is not None:
             for call in waiting:
                 self._send(channel, call)
@@ -173,37 +175,37 @@ class Ros2Client(ClientCalls[_Call]):
             cdr = channel.kind.body_of_call(self.spec.codec, call.data, left_s)
             channel.send(CallId(self._guid, call.number), cdr)
         except NepError as error:
-            self._end(call, error)
+            self._finish(call, error)
         except self._participant.dds.core.DDSException as error:
             if not self.is_closed:
                 reason = _("the call cannot be sent: {reason}").format(reason=error)
-                self._end(call, NepError(reason))
+                self._finish(call, NepError(reason))
 
     # ---- outcomes
 
-    def _heard(self, heard: HeardPart) -> None:
+    def _handle_part(self, part: ReceivedPart) -> None:
         # Runs in the participant's thread.
         channel = self._channel
         if channel is None:
             return
         try:
-            outcome: Outcome = channel.kind.reply_in(heard.cdr, self.spec.codec)
+            outcome: Outcome = channel.kind.reply_in(part.cdr, self.spec.codec)
         except NepError as error:
             outcome = error
-        self._end_numbered(heard.id.number, outcome)
+        self._finish_numbered(part.id.number, outcome)
 
-    def _told_failure(self, call: CallId, reply: Reply) -> None:
+    def _handle_failure(self, call: CallId, reply: Reply) -> None:
         # Runs in the participant's thread: an error from a nep server.
-        self._end_numbered(call.number, reply)
+        self._finish_numbered(call.number, reply)
 
-    def _end_numbered(self, number: int, outcome: Outcome) -> None:
+    def _finish_numbered(self, number: int, outcome: Outcome) -> None:
         with self._lock:
             call = self._calls.get(number)
             self.late += call is None
         if call is not None:
-            self._end(call, outcome)
+            self._finish(call, outcome)
 
-    def _end(self, call: _Call, outcome: Outcome) -> None:
+    def _finish(self, call: _Call, outcome: Outcome) -> None:
         with self._lock:
             if not self._remove_locked(call):
                 return
@@ -218,18 +220,18 @@ class Ros2Client(ClientCalls[_Call]):
         if is_waiting:
             self._send_waiting()
         with self._participant.changed:
-            there = self._channel.servers() if self._channel is not None else frozenset()
+            existing = self._channel.servers() if self._channel is not None else frozenset()
         with self._lock:
             calls = tuple(self._calls.values())
         for call in calls:
-            if call.servers is not None and not call.servers & there:
-                self._end(call, ServerGoneError(self.spec.service))
+            if call.servers is not None and not call.servers & existing:
+                self._finish(call, ServerGoneError(self.spec.service))
             elif call.deadline <= now:
                 kind = NoServerError if call.servers is None else ServiceTimeoutError
-                self._end(call, kind(self.spec.service, call.timeout_s or 0.0))
+                self._finish(call, kind(self.spec.service, call.timeout_s or 0.0))
         with self._lock:
             dues = [
-                min(each.deadline, now + (_SEEK_S if each.servers is None else _WATCH_S))
+                min(each.deadline, now + (_DISCOVERY_POLL_S if each.servers is None else _SERVER_CHECK_S))
                 for each in self._calls.values()
             ]
         return min(dues, default=math.inf)

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 
 from nep.backends.ros2.participant import Participant
-from nep.backends.ros2.publisher import wait_for_others
-from nep.backends.ros2.services.channel import CallId, HeardPart, ServiceChannel
+from nep.backends.ros2.publisher import wait_for_matches
+from nep.backends.ros2.services.channel import CallId, ReceivedPart, ServiceChannel
 from nep.backends.ros2.services.definitions import served_type
 from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
 from nep.backends.zeromq.sockets import RejectionLog
@@ -17,9 +17,9 @@ from nep.protocol.requests import PublisherCount, PublisherRecord
 from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, failure, topic_of
 
 _logger = logging.getLogger("nep")
-_MEET_S = 1.0
+_MATCH_TIMEOUT_S = 1.0
 """Seconds that a response waits for the match with the client's reader."""
-_LOOK_S = 0.01
+_POLL_S = 0.01
 
 
 class Ros2Server:
@@ -42,10 +42,10 @@ class Ros2Server:
         self._refusals = RejectionLog()
         self._type = served_type(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
-            participant, node_id, spec.service, self._type, spec.id, hear=self._asked
+            participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request
         )
         try:
-            wait_for_others(participant, self._channel.known, lambda: self._channel.entities)
+            wait_for_matches(participant, self._channel.known, lambda: self._channel.entities)
         except BaseException:  # also Ctrl+C: the caller would have nothing to close
             self._channel.close()
             raise
@@ -63,23 +63,23 @@ class Ros2Server:
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
-    def _asked(self, heard: HeardPart) -> None:
+    def _handle_request(self, part: ReceivedPart) -> None:
         # Runs in the participant's thread, with its lock held.
         try:
-            asked = self._type.call_in(heard.cdr)
+            request = self._type.call_in(part.cdr)
         except NepError as error:
             if self._refusals.add(str(error)):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
-            self._answer(heard, failure(CallKind.REFUSED, "", str(error)))
+            self._answer(part, failure(CallKind.REFUSED, "", str(error)))
             return
-        deadline = None if asked.timeout_s is None else time.monotonic() + asked.timeout_s
+        deadline = None if request.timeout_s is None else time.monotonic() + request.timeout_s
         incoming = IncomingCall(
-            asked.data, asked.codec, deadline, lambda reply: self._answer(heard, fitting(reply))
+            request.data, request.codec, deadline, lambda reply: self._answer(part, fitting(reply))
         )
         if not self.calls.put(incoming):
             incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, heard: HeardPart, reply: Reply) -> bool:
+    def _answer(self, part: ReceivedPart, reply: Reply) -> bool:
         cdr: bytes | None = None
         if self._type.is_nep or reply.kind == CallKind.ANSWER:
             try:
@@ -89,9 +89,9 @@ class Ros2Server:
         self.tally.add(reply)
         if self._channel.is_closed:
             return False
-        self._meet(heard)
+        self._wait_for_match(part)
         try:
-            self._write(heard.id, cdr, reply)
+            self._write(part.id, cdr, reply)
         except (NepError, self._participant.dds.core.DDSException) as error:
             _logger.warning("can't send a reply of '%s': %s", self.spec.service, error)
             return False
@@ -103,17 +103,17 @@ class Ros2Server:
         else:  # ROS has no form for errors: its clients wait until their timeout
             self._channel.send_failure(call, reply)
 
-    def _meet(self, heard: HeardPart) -> None:
+    def _wait_for_match(self, part: ReceivedPart) -> None:
         # The client's reader may be discovered later than its writer.
-        if heard.writer is None or "nepid" in heard.writer.told:
+        if part.writer is None or "nepid" in part.writer.announced:
             return  # disconnected, or a nep client, which waits for the match itself
-        deadline = time.monotonic() + _MEET_S
+        deadline = time.monotonic() + _MATCH_TIMEOUT_S
         with self._participant.changed:
-            while not self._channel.is_closed and not self._channel.hears_us(heard.writer):
+            while not self._channel.is_closed and not self._channel.can_reply_to(part.writer):
                 left = deadline - time.monotonic()
                 if left <= 0.0 or self._participant.is_in_its_thread():
                     return
-                self._participant.changed.wait(min(left, _LOOK_S))
+                self._participant.changed.wait(min(left, _POLL_S))
 
     # ---- closing
 

@@ -257,7 +257,7 @@ class SocketClient:
             return bool(remote.publisher.endpoints) and self.spec.codec.name == "json"
         return bool(remote.publisher.endpoints)
 
-    def gone(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
+    def publisher_removed(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
         """Process the removal of a server. Without `is_closed` it may only be suspended."""
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:

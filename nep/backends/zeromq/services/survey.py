@@ -129,7 +129,7 @@ class SurveyClient:
     def _remove_respondent(self, respondent: int) -> None:
         client = self._clients.pop(respondent, None)
         if client is not None:
-            client.gone(0, 0, is_closed=True)
+            client.publisher_removed(0, 0, is_closed=True)
             self._leaving.append(client)
 
     def reconnect_remote(self) -> None:
@@ -138,7 +138,7 @@ class SurveyClient:
             for client in self._clients.values():
                 client.reconnect_remote()
 
-    def gone(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
+    def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
         """Process the removal of a respondent."""
         with self._lock:
             self._remove_respondent(publisher)
