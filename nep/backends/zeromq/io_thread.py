@@ -59,7 +59,7 @@ class PollState(NamedTuple):
     """Next wake-up condition of a socket's owner.
 
     Attributes:
-        is_quiet: True to pause reading until `due`.
+        pause_reading: True to pause reading until `due`.
         due: Time (`time.monotonic`) at which to serve it again; None to wait for input only.
         sends: True to serve it also when its descriptor is writable. Not for ZeroMQ sockets.
     """

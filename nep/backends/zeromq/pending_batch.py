@@ -92,8 +92,8 @@ class PendingBatch:
         It is one closure because nearly all of the time for a small message is spent here.
 
         Args:
-            asked: Functions for encoding and for the slow path.
-            way: Sending end.
+            hooks: Functions for encoding and for the slow path.
+            path: Sending end.
             lock: Lock of `path`.
         """
         owner, kind, encode, on_null, fallback = hooks

@@ -71,7 +71,7 @@ class Subscriptions:
         Args:
             event: Event from the XPUB socket.
             count: Number of messages published so far.
-            came_by: Returns the connection of the event if it comes from another computer.
+            connection_of: Returns the connection of the event if it comes from another computer.
 
         Returns:
             First part that addresses a subscriber to greet, or None.

@@ -62,8 +62,8 @@ class ServiceChannel:
         kind: Service type.
         entry_id: Id of the server or client.
         guid: Id in the calls of a client; None for a server.
-        hear: Called with requests or responses, in the participant's thread.
-        failed: Called with errors, in the participant's thread.
+        on_part: Called with requests or responses, in the participant's thread.
+        on_failure: Called with errors, in the participant's thread.
     """
 
     def __init__(

@@ -99,7 +99,7 @@ class SocketClient:
         connect_to: Creates a connection to an endpoint.
         spec: Settings.
         framing: Wire format.
-        soon: Asks the I/O thread to serve this client.
+        serve_soon: Asks the I/O thread to serve this client.
         closer: Closes this client.
         known_services: Queries the master for the names of services; None without a master.
         endpoint: Endpoint of the server, without a master.
