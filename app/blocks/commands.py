@@ -159,7 +159,7 @@ wait = _runtime.wait
 wait_until = _runtime.wait_until
 write = _runtime.write
 
-LOOK_S = 3.0
+ROBOT_DISCOVERY_S = 3.0
 STOP_ANSWER_S = 1.0
 
 
@@ -174,7 +174,7 @@ def run(name: str) -> None:
     """
     prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:
-        found = find_robots(node, LOOK_S)
+        found = find_robots(node, ROBOT_DISCOVERY_S)
         for claim in found.claims:
             _say(claim)
         owners = {robot: owner.node_id for robot, owner in found.owners.items()}

@@ -21,14 +21,14 @@ _ICONS = {
 }
 GROUPS = tuple(_ICONS)
 """Titles of groups in display order; a description may add more."""
-_TITLES = {
+_GROUP_TITLES = {
     "": "Movement",
     "actions": "Movement",
     "control": "Movement",
     "motion": "Movement",
     "looks": "Face and lights",
 }
-_TELLS = ("boolean", "number", "integer", "text", "choice")
+_SIMPLE_KINDS = ("boolean", "number", "integer", "text", "choice")
 _NUMBERS = ("number", "integer")
 
 
@@ -63,11 +63,13 @@ def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
 
 
 def _group_title(action: Action) -> str:
-    return _TITLES.get(action.category.lower(), action.category)
+    return _GROUP_TITLES.get(action.category.lower(), action.category)
 
 
 def _has_block(sensor: Sensor) -> bool:
-    return bool(sensor.text) and (sensor.kind in _TELLS or (sensor.kind == "object" and bool(sensor.fields)))
+    return bool(sensor.text) and (
+        sensor.kind in _SIMPLE_KINDS or (sensor.kind == "object" and bool(sensor.fields))
+    )
 
 
 def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
@@ -78,7 +80,7 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         for parameter in action.parameters
         if parameter.name in parts.shown
     ]
-    returns = _returned(robot, action)
+    returns = _returned_field(robot, action)
     called = [action.name, action.title, *_types(robot, "actions", action.name)]
     called += [parameter.name for parameter in action.parameters]
     found = words_of_action(called, action.uses)
@@ -173,7 +175,7 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
 
 
 def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
-    told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _TELLS]
+    told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS]
     numbers = [sensor for sensor in told if sensor.kind in _NUMBERS]
     hats = []
     if told:
@@ -223,7 +225,7 @@ def _sensor_field(sensors: Sequence[Sensor]) -> ChoiceField:
     return ChoiceField("SENSOR", tuple((sensor.title or sensor.name, sensor.name) for sensor in sensors))
 
 
-def _returned(robot: Robot, action: Action) -> str | None:
+def _returned_field(robot: Robot, action: Action) -> str | None:
     look = _member(robot, "actions", action.name).get("rb:block")
     returns = look.get("returns") if isinstance(look, Mapping) else None
     return returns if isinstance(returns, str) and returns else None

@@ -47,7 +47,7 @@ COMMANDS = frozenset(
 RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
 
 
-class _Uses:
+class _UsedResources:
     """Robots, sensors, events and topics that the blocks use, in the order of the blocks."""
 
     def __init__(self) -> None:
@@ -85,7 +85,7 @@ def _first_robot(block: Block) -> str:
     return str(field.read(None)) if isinstance(field, ChoiceField) else ""
 
 
-class _Skip(Exception):  # noqa: N818 (control flow, not an error)
+class _SkippedBlock(Exception):  # noqa: N818 (control flow, not an error)
     """Block that can't be compiled: its problem is reported, and the block around it is skipped, too."""
 
 
@@ -120,12 +120,12 @@ class _Compiler:
         self._calls: set[str] = set()  # blocks that call a function
         self._variables: dict[str, str] = {}  # Blockly's id -> Python's name
         self._marks: dict[ast.AST, str] = {}
-        self._notes = ProblemCollector(catalogue, workspace)
+        self._problems = ProblemCollector(catalogue, workspace)
         self._readings: dict[str, str] = {}
         self._labels: dict[str, str] = {}
         self._breakpoints: dict[str, None] = {}
-        self._uses = _Uses()
-        self._ends = LooseEnds()
+        self._uses = _UsedResources()
+        self._loose_ends = LooseEnds()
         self._in_message = False
         self._numbers: set[str] = set()  # blocks that must return a number
 
@@ -134,12 +134,12 @@ class _Compiler:
         functions = [
             function for script in self._workspace.scripts if (function := self._script(script)) is not None
         ]
-        self._notes.check_starts(len(functions))
-        self._ends.tell(self._notes, self._workspace)
-        self._notes.check_unknown()
-        self._notes.check_names()
+        self._problems.check_starts(len(functions))
+        self._loose_ends.tell(self._problems, self._workspace)
+        self._problems.check_unknown()
+        self._problems.check_names()
         for found in ConflictFinder(self._workspace, self._catalogue, self._shaping.called).conflicts():
-            self._notes.conflict(found)
+            self._problems.conflict(found)
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
             *own,
@@ -163,9 +163,9 @@ class _Compiler:
             labels=self._labels,
             variables=self._all_variables(),
             breakpoints=tuple(self._breakpoints),
-            problems=self._notes.problems(),
+            problems=self._problems.problems(),
             starts=len(functions),
-            absent=self._notes.absent_blocks(),
+            absent=self._problems.absent_blocks(),
         )
 
     def _all_variables(self) -> tuple[Variable, ...]:
@@ -179,22 +179,22 @@ class _Compiler:
         first = script[0]
         if not first.enabled:
             return None
-        block = self._known(first)
+        block = self._usable_block(first)
         if block is None or block.shape == "definition":
             return None
         if block.shape != "hat":
-            self._notes.unattached(first, block)
+            self._problems.unattached(first, block)
             return None
-        if self._notes.missing(first, block) is not None:
+        if self._problems.missing(first, block) is not None:
             return None
         self._in_message = bool(block.parameters)
         try:
             expressions = self._expressions(first, block)
-        except _Skip:
+        except _SkippedBlock:
             return None
         decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
         self._uses.remember(first, block)
-        self._ends.remember(first, block)
+        self._loose_ends.remember(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
@@ -202,7 +202,7 @@ class _Compiler:
             {"BODY": self._statements(script[1:])},
         )
         if isinstance(function, ast.FunctionDef):
-            function.name = self._names.new(self._read(first), "script")
+            function.name = self._names.new(self._store_reading(first), "script")
             self._declare(function)
         self._marks[function] = first.id
         return function
@@ -211,14 +211,14 @@ class _Compiler:
         made: list[ast.stmt] = []
         for script in self._workspace.scripts:
             self._function = self._shaping.function(script[0])
-            if self._function is not None and self._known(script[0]) is not None:
+            if self._function is not None and self._usable_block(script[0]) is not None:
                 made.append(self._definition(script[0], self._function))
         self._function = None
         return made
 
     def _definition(self, placed: Placed, function: Function) -> ast.stmt:
         self._in_message = False
-        self._read(placed)
+        self._store_reading(placed)
         body = self._statements(placed.inputs.get("BODY", ()) if placed.enabled else ())
         if function.gives:
             body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
@@ -250,25 +250,25 @@ class _Compiler:
     def _statement(self, placed: Placed) -> list[ast.stmt]:
         if placed.pauses:
             self._breakpoints[placed.id] = None
-        block = self._known(placed)
+        block = self._usable_block(placed)
         if block is None:
             return []
         if block.shape not in ("statement", "cap") or not self._is_at_home(block):
-            self._notes.misplaced(placed, block)
+            self._problems.misplaced(placed, block)
             return []
-        self._read(placed)
-        missing = self._notes.missing(placed, block)
+        self._store_reading(placed)
+        missing = self._problems.missing(placed, block)
         if missing is not None:
             return self._marked(statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed)
         try:
             expressions = self._expressions(placed, block)
-        except _Skip:
+        except _SkippedBlock:
             return []
         self._uses.remember(placed, block)
-        self._ends.remember(placed, block)
-        self._notes.look(placed, block)
+        self._loose_ends.remember(placed, block)
+        self._problems.look(placed, block)
         if block.publishes:
-            self._move(placed, block)
+            self._note_motion(placed, block)
         bodies = {
             argument.name: self._statements(placed.inputs.get(argument.name, ()))
             for argument in block.arguments
@@ -281,13 +281,13 @@ class _Compiler:
             self._calls.add(placed.id)
         return self._marked(made, placed)
 
-    def _move(self, placed: Placed, block: Block) -> None:
+    def _note_motion(self, placed: Placed, block: Block) -> None:
         topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
         for topic in (str(saved_value(block, placed, name)) for name in topics):
             names = moved_by(topic, self._catalogue.connected.values())
             self._uses.robots |= dict.fromkeys(names)
             self._uses.moves |= dict.fromkeys(names)
-            self._notes.moves(placed, block, topic, names)
+            self._problems.moves(placed, block, topic, names)
 
     def _is_at_home(self, block: Block) -> bool:
         if not block.needs_function:
@@ -314,23 +314,23 @@ class _Compiler:
         if not inner or not inner[0].enabled:
             return literal(argument.default)
         placed = inner[0]
-        block = self._known(placed, holder)
+        block = self._usable_block(placed, holder)
         if block is None:
-            raise _Skip
+            raise _SkippedBlock
         if block.shape not in ("value", "boolean"):
-            self._notes.misplaced(placed, block)
-            raise _Skip
+            self._problems.misplaced(placed, block)
+            raise _SkippedBlock
         if block.needs_message and not self._in_message:
-            self._notes.no_message(placed, block)
+            self._problems.no_message(placed, block)
             return literal(None)
-        self._read(placed)
-        missing = self._notes.missing(placed, block)
+        self._store_reading(placed)
+        missing = self._problems.missing(placed, block)
         expressions = self._expressions(placed, block)
         if missing is not None:
             made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
             self._uses.remember(placed, block)
-            self._ends.remember(placed, block)
+            self._loose_ends.remember(placed, block)
             made = expression(self._template(block, placed), expressions, keywords(block, expressions))
         if block.fails or missing is not None:
             self._marks[made] = placed.id
@@ -344,8 +344,8 @@ class _Compiler:
         try:
             value = field.read(placed.fields.get(field.name))
         except FieldError as error:
-            self._notes.wrong_field(placed, block, error)
-            raise _Skip from None
+            self._problems.wrong_field(placed, block, error)
+            raise _SkippedBlock from None
         if isinstance(field, InputField):
             return self._input(placed, block, str(value))
         if isinstance(field, VariableField):
@@ -355,8 +355,8 @@ class _Compiler:
     def _input(self, placed: Placed, block: Block, id: str) -> ast.expr:
         name = self._function.parameters.get(id) if self._function is not None else None
         if name is None:
-            self._notes.no_input(placed, block)
-            raise _Skip
+            self._problems.no_input(placed, block)
+            raise _SkippedBlock
         return ast.Name(name, ast.Load())
 
     def _variable(self, id: str) -> str:
@@ -368,25 +368,25 @@ class _Compiler:
 
     # ---- block look-up
 
-    def _known(self, placed: Placed, holder: Placed | None = None) -> Block | None:
+    def _usable_block(self, placed: Placed, holder: Placed | None = None) -> Block | None:
         if placed.too_deep:
-            self._notes.too_deep(placed)
+            self._problems.too_deep(placed)
             return None
         block = self._catalogue.blocks.get(placed.type)
-        if self._notes.absent(placed, block, holder):
+        if self._problems.absent(placed, block, holder):
             return None
         if block is not None and block.undefined:
-            self._notes.undefined(placed, block)
+            self._problems.undefined(placed, block)
         return block
 
     def _template(self, block: Block, placed: Placed) -> str:
         return template(block, placed, in_function=self._function is not None)
 
-    def _read(self, placed: Placed) -> str:
+    def _store_reading(self, placed: Placed) -> str:
         words = reading(placed, self._catalogue.blocks, self._workspace.variables)
         self._readings[placed.id] = words
         block = self._catalogue.blocks.get(placed.type)
-        self._labels[placed.id] = self._notes.label(placed, block)
+        self._labels[placed.id] = self._problems.label(placed, block)
         return words
 
 
@@ -394,8 +394,8 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
     """Return keyword arguments; names that aren't valid identifiers are passed as ``**{"a-b": …}``."""
     made: dict[str, list[ast.keyword]] = {}
     for hole, pairs in block.keywords.items():
-        plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_plain(name)]
-        odd = [(literal(name), expressions[at]) for at, name in pairs if not _is_plain(name)]
+        plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_keyword_name(name)]
+        odd = [(literal(name), expressions[at]) for at, name in pairs if not _is_keyword_name(name)]
         if odd:
             table = ast.Dict([key for key, _ in odd], [value for _, value in odd])
             plain.append(ast.keyword(None, table))
@@ -413,7 +413,7 @@ def template(block: Block, placed: Placed, *, in_function: bool) -> str:
     return block.python[str(chosen)]
 
 
-def _is_plain(name: str) -> bool:
+def _is_keyword_name(name: str) -> bool:
     return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
 
 

@@ -17,10 +17,10 @@ from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
 
 STARTED = "events_started"
-AT_ONCE, LATER, PERHAPS = range(3)
+IMMEDIATE, LATER, UNCERTAIN = range(3)
 _ENDLESS = frozenset({"control_forever", "control_while"})
 _CONDITIONS = frozenset({"control_if", "control_if_else"})
-_WAITS = {"control_wait": LATER, "control_wait_until": PERHAPS, "control_wait_until_at_most": PERHAPS}
+_WAITS = {"control_wait": LATER, "control_wait_until": UNCERTAIN, "control_wait_until_at_most": UNCERTAIN}
 _REPLACES = "replace"
 
 
@@ -68,7 +68,7 @@ class ConflictFinder:
         for one, other in itertools.combinations(range(len(scripts)), 2):
             told: set[tuple[str, str]] = set()
             for first, second in itertools.product(used[one], used[other]):
-                for part in _fought_for(first, second):
+                for part in _shared_parts(first, second):
                     if (first.robot, part) not in told:
                         told.add((first.robot, part))
                         yield Conflict(first, second, part, self._order(scripts[one], scripts[other]))
@@ -76,7 +76,7 @@ class ConflictFinder:
     def _used(
         self,
         chain: Sequence[Placed],
-        when: int = AT_ONCE,
+        when: int = IMMEDIATE,
         *,
         endless: bool = False,
         deep: tuple[str, ...] = (),
@@ -92,7 +92,9 @@ class ConflictFinder:
             is_condition = placed.type.partition(":")[0] in _CONDITIONS
             loops = endless or placed.type in _ENDLESS
             for inner in placed.inputs.values():
-                inside, after = self._used(inner, PERHAPS if is_condition else when, endless=loops, deep=deep)
+                inside, after = self._used(
+                    inner, UNCERTAIN if is_condition else when, endless=loops, deep=deep
+                )
                 used += inside
                 when = max(when, (LATER if inside else when) if is_condition else after)
             called = self._function(placed)
@@ -100,7 +102,7 @@ class ConflictFinder:
                 body = called.placed.inputs.get("BODY", ())
                 inside, when = self._used(body, when, endless=endless, deep=(*deep, called.placed.id))
                 used += inside
-            when = max(when, _WAITS.get(placed.type, AT_ONCE))
+            when = max(when, _WAITS.get(placed.type, IMMEDIATE))
         return used, when
 
     def _part(self, placed: Placed) -> tuple[str, Action] | None:
@@ -122,7 +124,7 @@ class ConflictFinder:
         return block is None or block.shape == "cap"
 
 
-def _fought_for(first: UsedPart, second: UsedPart) -> Sequence[str]:
+def _shared_parts(first: UsedPart, second: UsedPart) -> Sequence[str]:
     if first.robot != second.robot or not _at_same_time(first, second):
         return ()
     if not any(
@@ -134,11 +136,11 @@ def _fought_for(first: UsedPart, second: UsedPart) -> Sequence[str]:
 
 
 def _at_same_time(first: UsedPart, second: UsedPart) -> bool:
-    if PERHAPS in (first.when, second.when):
+    if UNCERTAIN in (first.when, second.when):
         return False
-    if first.when == second.when == AT_ONCE:
+    if first.when == second.when == IMMEDIATE:
         return True
     if LATER in (first.when, second.when) and first.when != second.when:
-        early = first if first.when == AT_ONCE else second
+        early = first if first.when == IMMEDIATE else second
         return early.endless
     return first.endless and second.endless

@@ -30,12 +30,12 @@ class LooseEnds:
                 if inner and inner[0].type == _READS:
                     self._as_list.add(_variable(inner[0]))
             elif isinstance(argument, VariableField) and not isinstance(argument, InputField):
-                self._name_variable(placed, block)
+                self._add_variable(placed, block)
             elif isinstance(argument, BroadcastField):
                 both = self._received if block.type == _RECEIVES else self._sent
-                both.setdefault(_said(argument, placed), (placed, block))
+                both.setdefault(_broadcast_name(argument, placed), (placed, block))
 
-    def _name_variable(self, placed: Placed, block: Block) -> None:
+    def _add_variable(self, placed: Placed, block: Block) -> None:
         id = _variable(placed)
         if block.type == _READS:
             self._read.setdefault(id, (placed, block))
@@ -65,7 +65,7 @@ def _variable(placed: Placed) -> str:
         return ""
 
 
-def _said(field: BroadcastField, placed: Placed) -> str:
+def _broadcast_name(field: BroadcastField, placed: Placed) -> str:
     try:
         return str(field.read(placed.fields.get(field.name)))
     except FieldError:

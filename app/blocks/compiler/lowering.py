@@ -21,7 +21,7 @@ from nep.i18n import _
 PLAIN, RESULT = "functions_define", "functions_define_result"
 CALL, CALL_RESULT = "functions_call", "functions_result"
 END = "functions_end"
-_GIVES = {PLAIN: False, RESULT: True}
+_HAS_RESULT = {PLAIN: False, RESULT: True}
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class Lowering:
         self.variables = workspace.variables  # excludes inputs of functions
         self._by_id: dict[str, Function] = {}
         for script in workspace.scripts:
-            if script[0].type in _GIVES and script[0].enabled:
+            if script[0].type in _HAS_RESULT and script[0].enabled:
                 self._by_id[script[0].id] = _function(script[0], names)
         self._by_name = {function.name: function for function in reversed(self._by_id.values())}
-        scripts = tuple(tuple(map(self._shaped, script)) for script in workspace.scripts)
+        scripts = tuple(tuple(map(self._lowered, script)) for script in workspace.scripts)
         shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
         self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
 
@@ -69,19 +69,23 @@ class Lowering:
         found = found or self._by_name.get(name_of(placed))
         return None if found is None or (placed.type == CALL_RESULT and not found.gives) else found
 
-    def _shaped(self, placed: Placed) -> Placed:
-        inner = {name: tuple(map(self._shaped, chain)) for name, chain in placed.inputs.items()}
+    def _lowered(self, placed: Placed) -> Placed:
+        inner = {name: tuple(map(self._lowered, chain)) for name, chain in placed.inputs.items()}
         placed = replace(placed, inputs=inner)
         block = self._catalogue.blocks.get(placed.type)
         if block is None or not block.mutator:
             return placed
         if block.mutator == "items":
-            return self._listed(placed, block)
+            return self._lower_list(placed, block)
         if block.mutator == "branches":
-            return self._branched(placed, block)
-        return self._call(placed, block) if block.mutator == "call" else self._defined(placed, block)
+            return self._lower_branches(placed, block)
+        return (
+            self._lower_call(placed, block)
+            if block.mutator == "call"
+            else self._lower_definition(placed, block)
+        )
 
-    def _listed(self, placed: Placed, block: Block) -> Placed:
+    def _lower_list(self, placed: Placed, block: Block) -> Placed:
         growing = next(argument for argument in block.arguments if isinstance(argument, Items))
         gaps = growing.gaps(placed.extra)
         holes = [f"%{gap.name}" for gap in gaps]
@@ -93,9 +97,9 @@ class Lowering:
             python=str(block.python).replace(hole, ", ".join(holes)),
             arguments=gaps,
         )
-        return self._as(placed, made)
+        return self._with_type(placed, made)
 
-    def _branched(self, placed: Placed, block: Block) -> Placed:
+    def _lower_branches(self, placed: Placed, block: Block) -> Placed:
         branches = Branches.of(placed.extra, has_else=block.argument("ELSE") is not None)
         text, python = block.text.partition("%BODY")[0] + "%BODY", "if %CONDITION:\n    %BODY"
         for number in range(1, branches.else_ifs + 1):
@@ -112,25 +116,29 @@ class Lowering:
             python=python,
             arguments=(*first, *branches.arguments()),
         )
-        return self._as(placed, made)
+        return self._with_type(placed, made)
 
-    def _defined(self, placed: Placed, block: Block) -> Placed:
+    def _lower_definition(self, placed: Placed, block: Block) -> Placed:
         shown = " ".join(each.name for each in inputs_of(placed.extra))
-        text = block.text.replace("%NAME", _plain(name_of(placed))).replace("%INPUTS", _plain(shown))
+        text = block.text.replace("%NAME", _without_holes(name_of(placed))).replace(
+            "%INPUTS", _without_holes(shown)
+        )
         kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
         if placed.type == RESULT:
             result = tuple(argument for argument in kept if argument.name == "RESULT")
             self._catalogue.blocks[f"{END}:{placed.id}"] = replace(
                 block, shape="statement", text="give back %RESULT", python="return %RESULT", arguments=result
             )
-        return self._as(placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept))
+        return self._with_type(
+            placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept)
+        )
 
-    def _call(self, placed: Placed, block: Block) -> Placed:
+    def _lower_call(self, placed: Placed, block: Block) -> Placed:
         function = self._called(placed)
         inputs = inputs_of(placed.extra) if function is None else function.inputs
-        name = _plain(name_of(placed) if function is None else function.name)
+        name = _without_holes(name_of(placed) if function is None else function.name)
         gaps, filled = _gaps(placed, inputs)
-        text = " ".join((name, *(f"{_plain(each.name)} %{gap.name}" for each, gap in gaps)))
+        text = " ".join((name, *(f"{_without_holes(each.name)} %{gap.name}" for each, gap in gaps)))
         made = replace(block, type=f"{block.type}:{placed.id}", text=text)
         if function is None:
             sentence = _("The function “{name}” is missing. Define it, or delete this block.").format(
@@ -146,9 +154,9 @@ class Lowering:
                 made, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
                 trees={"X_FUNCTION": ast.Name(function.python, ast.Load())}, calls=True,
             )  # fmt: skip
-        return self._as(replace(placed, inputs=filled), made)
+        return self._with_type(replace(placed, inputs=filled), made)
 
-    def _as(self, placed: Placed, block: Block) -> Placed:
+    def _with_type(self, placed: Placed, block: Block) -> Placed:
         self._catalogue.blocks[block.type] = block
         return replace(placed, type=block.type)
 
@@ -158,7 +166,7 @@ def _function(placed: Placed, names: Names) -> Function:
     name = name_of(placed)
     python = names.new(name, "function")
     parameters = {each.id: names.new(each.name, "input") for each in inputs}
-    return Function(placed, name, python, parameters, inputs, _GIVES[placed.type])
+    return Function(placed, name, python, parameters, inputs, _HAS_RESULT[placed.type])
 
 
 def _gaps(
@@ -172,5 +180,5 @@ def _gaps(
     return gaps, filled
 
 
-def _plain(words: str) -> str:
+def _without_holes(words: str) -> str:
     return words.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)

@@ -57,7 +57,7 @@ class ProblemCollector:
         if starts or not self._workspace.scripts:
             return
         subject = pgettext("block", "when started")
-        self._note(
+        self._add(
             "warning", None, None, subject,
             _("These blocks have no start. Put “{start}” above them.").format(start=subject),
             mend=_("Add “when started”"), mend_action=f"add:{_STARTER}",
@@ -68,23 +68,23 @@ class ProblemCollector:
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
             words = _("{block} isn't used. Drag it into an empty slot of another block.")
-            self._note("info", placed, block, name, words.format(block=name))
+            self._add("info", placed, block, name, words.format(block=name))
             return
         sentence = _("{block} doesn't run. Put it below “{start}”.")
         start = pgettext("block", "when started")
-        self._note("info", placed, block, name, sentence.format(block=name, start=start))
+        self._add("info", placed, block, name, sentence.format(block=name, start=start))
 
     def misplaced(self, placed: Placed, block: Block) -> None:
         """Report a block in an impossible place; the editor prevents this, but a file may have it."""
         name = self.label(placed, block)
         sentence = _("{block} can't be used here. It is kept but skipped.")
-        self._note("warning", placed, block, name, sentence.format(block=name))
+        self._add("warning", placed, block, name, sentence.format(block=name))
 
     def too_deep(self, placed: Placed) -> None:
         """Report nesting that is too deep for Python."""
         block = self._catalogue.blocks.get(placed.type)
         name = self.label(placed, block)
-        self._note(
+        self._add(
             "error", placed, block, name,
             _(
                 "{block} is nested too deeply. Move inner blocks to variables or scripts of their own."
@@ -94,7 +94,7 @@ class ProblemCollector:
     def no_message(self, placed: Placed, block: Block) -> None:
         """Report the message block in a script that no message starts."""
         name = self.label(placed, block)
-        self._note(
+        self._add(
             "warning", placed, block, name,
             _("{block} only works below “when a message arrives”.").format(block=name),
         )  # fmt: skip
@@ -102,12 +102,12 @@ class ProblemCollector:
     def no_input(self, placed: Placed, block: Block) -> None:
         """Report an input of a function outside of it, or a removed one."""
         name = reading(placed, self._catalogue.blocks, self._workspace.variables)
-        sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
-        self._note("warning", placed, block, name, sentence)
+        sentence = _("“{name}” only works inside its own function. It is kept and skipped.").format(name=name)
+        self._add("warning", placed, block, name, sentence)
 
     def undefined(self, placed: Placed, block: Block) -> None:
         """Report a call of an undefined function."""
-        self._note(
+        self._add(
             "error", placed, block, self.label(placed, block), block.undefined,
             mend=_("Define it"), mend_action=f"define:{placed.id}",
         )  # fmt: skip
@@ -115,7 +115,7 @@ class ProblemCollector:
     def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
         """Report a variable that is read but never set: it stays 0, and is not a list."""
         subject = f"“{name}”"
-        self._note(
+        self._add(
             "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
             mend=_("Set it to an empty list at the start") if is_list else _("Set it to 0 at the start"),
             mend_action=f"begin:{'list' if is_list else 'number'}:{id}",
@@ -124,7 +124,7 @@ class ProblemCollector:
     def never_received(self, placed: Placed, block: Block, name: str) -> None:
         """Report a broadcast that no script receives."""
         subject = f"“{name}”"
-        self._note(
+        self._add(
             "warning", placed, block, subject, _("Nothing receives {name}.").format(name=subject),
             mend=_("Add “when I receive”"), mend_action=f"receive:{name}",
         )  # fmt: skip
@@ -133,7 +133,7 @@ class ProblemCollector:
         """Report a script that waits for a broadcast that is never sent."""
         subject = f"“{name}”"
         sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
-        self._note("info", placed, block, subject, sentence)
+        self._add("info", placed, block, subject, sentence)
 
     def conflict(self, found: Conflict) -> None:
         """Report two scripts that use the same resource of a robot, at the second one's block."""
@@ -149,7 +149,7 @@ class ProblemCollector:
             action=found.first.action.title, other=name, robot=found.second.robot,
             part=_("the {part}").format(part=found.part) if part is None else _(part),
         )  # fmt: skip
-        self._note(
+        self._add(
             "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
             mend=_("Run one after the other") if found.put else None,
             mend_action=f"after:{':'.join(found.put)}" if found.put else None,
@@ -159,7 +159,7 @@ class ProblemCollector:
         """Report an invalid field value."""
         name = self.label(placed, block)
         sentence = _("{block} {what_is_wrong}. It is kept but skipped.")
-        self._note("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
+        self._add("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
     def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
         """Report a block that no connected robot supports; return whether it is one."""
@@ -175,7 +175,7 @@ class ProblemCollector:
             and placed.type.startswith("robot_")
         ):
             sentence = _("{robot} is not connected, so {block} will be skipped.")
-            self._note(
+            self._add(
                 "warning", placed, block, name, sentence.format(robot=robot, block=skipped),
                 mend=_("Show the robots"), mend_action=f"connect:{robot}", style="robot",
             )  # fmt: skip
@@ -185,7 +185,7 @@ class ProblemCollector:
             return True
         if isinstance(robot, str) and block.robot is not None and not self._can(robot, block):
             sentence = _("{robot} can't do this, so {block} will be skipped.")
-            self._note("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
+            self._add("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
             return True
         return False
 
@@ -196,23 +196,23 @@ class ProblemCollector:
             sentence = _(
                 "This file uses “{block}”, which no connected robot supports. It is kept but skipped."
             )
-            self._note("warning", placed, None, name, sentence.format(block=name), style="robot")
+            self._add("warning", placed, None, name, sentence.format(block=name), style="robot")
         elif own is not None:
             words = label(Placed("", own.type), own)
             sentence = _(
                 "“{block}” belongs to another program and can't run here. It is kept but skipped. "
                 "“{own_block}” does the same."
             )
-            self._note(
+            self._add(
                 "warning", placed, None, name, sentence.format(block=name, own_block=words),
                 mend=_("Show “{block}”").format(block=words), mend_action=f"point.block:{own.type}",
             )  # fmt: skip
         elif placed.type.partition("_")[0] in prefixes:
             sentence = _("“{block}” is not known to this version of NEP Studio. It is kept but skipped.")
-            self._note("warning", placed, None, name, sentence.format(block=name))
+            self._add("warning", placed, None, name, sentence.format(block=name))
         else:
             sentence = _("“{block}” belongs to another program and can't run here. It is kept but skipped.")
-            self._note("warning", placed, None, name, sentence.format(block=name))
+            self._add("warning", placed, None, name, sentence.format(block=name))
 
     def check_unknown(self) -> None:
         """Report unknown blocks inside blocks that are skipped themselves."""
@@ -241,7 +241,7 @@ class ProblemCollector:
                     continue
                 told.add(id)
                 name = self.label(placed, block)
-                self._note(
+                self._add(
                     "warning", placed, block, name,
                     _(
                         "The variable in “{block}” has no name in this file. Name it, or choose another "
@@ -286,15 +286,15 @@ class ProblemCollector:
             sentence = _("{block} needs {what}. Drag one into its slot.").format(
                 block=name, what=_(_NEEDS[argument.check])
             )
-            self._note("error", placed, block, name, sentence)
+            self._add("error", placed, block, name, sentence)
             return sentence
         return None
 
     def look(self, placed: Placed, block: Block) -> None:
         """Report hints about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
-            self._note(
-                "info", placed, block, self.label(placed, block), self._for_ever(placed, block),
+            self._add(
+                "info", placed, block, self.label(placed, block), self._wait_forever_sentence(placed, block),
                 mend=_("Add a time limit"), mend_action=f"limit:{placed.id}",
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
@@ -308,9 +308,9 @@ class ProblemCollector:
         if real:
             who, name = listed(real), self.label(placed, block)
             said = _("{block} on {topic} moves {robots}. Studio asks before it does, and Stop stops it.")
-            self._note("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
+            self._add("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
 
-    def _for_ever(self, placed: Placed, block: Block) -> str:
+    def _wait_forever_sentence(self, placed: Placed, block: Block) -> str:
         name = self.label(placed, block)
         condition = placed.inputs["CONDITION"][0]
         words = reading(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
@@ -321,7 +321,7 @@ class ProblemCollector:
     def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
         given: dict[str, object] = {}
         for at, name in block.keywords.get("X_INPUT", ()):
-            found = _written(placed, block, at)
+            found = _literal_value(placed, block, at)
             if found is not None:
                 given[name] = found
         # Skip problems that exist without these values: the missing ones are computed at run time.
@@ -329,9 +329,9 @@ class ProblemCollector:
         for problem in action.problems(action.complete(given)):
             if problem not in without:
                 name = self.label(placed, block)
-                self._note("error", placed, block, name, f"{name}: {problem.sentence}.")
+                self._add("error", placed, block, name, f"{name}: {problem.sentence}.")
 
-    def _note(
+    def _add(
         self,
         severity: Severity,
         placed: Placed | None,
@@ -373,7 +373,7 @@ def _variable(argument: Argument, placed: Placed) -> str:
         return ""
 
 
-def _written(placed: Placed, block: Block, name: str) -> object:
+def _literal_value(placed: Placed, block: Block, name: str) -> object:
     # None for a value that is computed at run time.
     argument = block.argument(name)
     if isinstance(argument, Field):

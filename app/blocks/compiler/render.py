@@ -21,7 +21,7 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
         parts += (_gap(before, statement), ast.unparse(statement).strip("\n"), "\n")
     text = "".join(parts)
     lines: dict[int, str] = {}
-    for ours, theirs in _together(body, parse_module(text).body):
+    for ours, theirs in _matched_statements(body, parse_module(text).body):
         if ours in marks:
             first = getattr(theirs, "decorator_list", None) or [theirs]
             for line in range(first[0].lineno, theirs.lineno + 1):
@@ -49,13 +49,15 @@ def _gap(before: ast.stmt | None, statement: ast.stmt) -> str:
     return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
 
 
-def _together(ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, ast.stmt]]:
+def _matched_statements(
+    ours: Sequence[ast.stmt], theirs: Sequence[ast.stmt]
+) -> Iterator[tuple[ast.stmt, ast.stmt]]:
     for one, other in zip(ours, theirs, strict=True):
         yield one, other
         for name in ("body", "orelse"):
             inner = getattr(one, name, None)
             if isinstance(inner, list):
-                yield from _together(inner, getattr(other, name))
+                yield from _matched_statements(inner, getattr(other, name))
 
 
 class _Stepper(ast.NodeTransformer):

@@ -30,29 +30,29 @@ def mend(workspace: Mapping[str, object], action: str) -> dict[str, object] | No
     if verb == "limit":
         for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") == "control_wait_until":
-                _limit(block)
+                _add_time_limit(block)
                 return made
     if verb == "define":
         for block in saved_blocks(made):
             if block.get("id") == object_ and block.get("type") in (CALL, CALL_RESULT):
-                return _defined(made, block)
-    return _of_scripts(made, verb, object_)
+                return _with_definition(made, block)
+    return _fix_scripts(made, verb, object_)
 
 
-def _of_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
+def _fix_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, object] | None:
     if verb == "begin":
         kind, _, variable = object_.partition(":")
-        return _begun(made, variable, is_list=kind == "list")
+        return _with_initial_value(made, variable, is_list=kind == "list")
     if verb == "receive":
-        return _added(made, {"type": "events_received", "fields": {"NAME": object_}})
+        return _with_script(made, {"type": "events_received", "fields": {"NAME": object_}})
     if verb == "after":
-        return _one_after_other(made, object_)
+        return _joined_scripts(made, object_)
     if verb == "add":
-        return _started(made, object_)
+        return _with_start(made, object_)
     return None
 
 
-def _begun(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
+def _with_initial_value(workspace: dict[str, object], variable: str, *, is_list: bool) -> dict[str, object]:
     empty: dict[str, object] = {"block": {"type": "lists_empty"}}
     zero: dict[str, object] = {"shadow": {"type": "values_number", "fields": {"NUMBER": 0}}}
     setting: dict[str, object] = {
@@ -66,7 +66,7 @@ def _begun(workspace: dict[str, object], variable: str, *, is_list: bool) -> dic
                 setting["next"] = top["next"]
             top["next"] = {"block": setting}
             return workspace
-    return _added(workspace, {"type": "events_started", "next": {"block": setting}})
+    return _with_script(workspace, {"type": "events_started", "next": {"block": setting}})
 
 
 def _tops(workspace: dict[str, object]) -> list[object]:
@@ -75,7 +75,7 @@ def _tops(workspace: dict[str, object]) -> list[object]:
     return tops if isinstance(tops, list) else []
 
 
-def _added(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
+def _with_script(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
     tops = _tops(workspace)
     places = [top.get("x") for top in tops if isinstance(top, dict)]
     right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - ASIDE)
@@ -83,14 +83,14 @@ def _added(workspace: dict[str, object], block: dict[str, object]) -> dict[str, 
     return workspace
 
 
-def _limit(block: dict[str, object]) -> None:
+def _add_time_limit(block: dict[str, object]) -> None:
     block["type"] = "control_wait_until_at_most"
     inputs = block.setdefault("inputs", {})
     if isinstance(inputs, dict):
         inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": LIMIT_S}}}
 
 
-def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
+def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
     extra = call.get("extraState")
     known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
     placed = Placed("", "", {}, extra=known)
@@ -110,7 +110,7 @@ def _defined(workspace: dict[str, object], call: Mapping[str, object]) -> dict[s
     return workspace
 
 
-def _one_after_other(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
+def _joined_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
     # Removes the hat, which then starts nothing. ``hats`` are two ids joined by a colon; ids may contain
     # colons.
     blocks = workspace.get("blocks")
@@ -131,7 +131,7 @@ def _one_after_other(workspace: dict[str, object], hats: str) -> dict[str, objec
     return workspace
 
 
-def _started(workspace: dict[str, object], block_type: str) -> dict[str, object]:
+def _with_start(workspace: dict[str, object], block_type: str) -> dict[str, object]:
     blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
     tops = blocks.get("blocks") if isinstance(blocks, dict) else None
     if not isinstance(tops, list):

@@ -18,7 +18,7 @@ from app.blocks.model.fields import (
 from app.blocks.model.workspace import Placed
 
 _PLACE = re.compile(r"%([A-Z][A-Z0-9_]*)")
-_LONGEST = 80
+_MAX_LENGTH = 80
 
 
 def reading(
@@ -53,7 +53,7 @@ def reading(
 
     is_text = block.shape == "value"
     words = " ".join(_PLACE.sub(place, block.text).split())
-    return words if len(words) <= _LONGEST else f"{words[: _LONGEST - 1]}…"
+    return words if len(words) <= _MAX_LENGTH else f"{words[: _MAX_LENGTH - 1]}…"
 
 
 def label(placed: Placed, block: Block) -> str:
@@ -92,7 +92,7 @@ def label_of_unknown(placed: Placed) -> str:
         for each in placed.fields.values()
         if isinstance(each, (str, int, float)) and not isinstance(each, bool)
     ]
-    return " ".join([words, *values])[:_LONGEST]
+    return " ".join([words, *values])[:_MAX_LENGTH]
 
 
 def _field(argument: Field, placed: Placed) -> str:

@@ -18,7 +18,7 @@ Say = Callable[[str | None, str], str]
 """(context, English) -> translation, see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
-_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _TOPIC_LIMIT = 200
 
 
@@ -280,7 +280,7 @@ class ColourField(Field):
     def read(self, saved: object) -> object:
         """Return a number sign and six digits."""
         colour = self.value if saved is None else str(saved)
-        if not _COLOUR.fullmatch(colour):
+        if not _HEX_COLOUR.fullmatch(colour):
             raise FieldError(_("needs a colour"))
         return colour.lower()
 

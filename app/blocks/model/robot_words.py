@@ -24,7 +24,7 @@ def _ability(names: str, words: str) -> _Ability:
 
 # Translators: other words that people may type to find a block that does this, with commas between.
 # Write what people say in your language; it need not be a translation, and may be shorter or longer.
-_DOES: Mapping[str, _Ability] = {
+_ACTION_ABILITIES: Mapping[str, _Ability] = {
     "say": _ability(
         "say speak talk tell speech speaking",
         plazy(
@@ -167,7 +167,7 @@ _DOES: Mapping[str, _Ability] = {
         ),
     ),
 }
-_TELLS: Mapping[str, _Ability] = {
+_SENSOR_ABILITIES: Mapping[str, _Ability] = {
     "listen": _ability(
         "listen hear hears heard word words speech",
         plazy(
@@ -254,7 +254,7 @@ _TELLS: Mapping[str, _Ability] = {
         ),
     ),
 }
-_USES: Mapping[str, str] = {
+_ABILITY_OF_RESOURCE: Mapping[str, str] = {
     "speech": "say",
     "base": "move",
     "wheels": "move",
@@ -293,14 +293,16 @@ def words_of_action(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWor
     `names` are its name, title and types, `uses` its resources.
     """
     parts = _parts(names)
-    found = _among(_DOES, parts) or [_DOES[_USES[part]] for part in uses if part in _USES]
+    found = _among(_ACTION_ABILITIES, parts) or [
+        _ACTION_ABILITIES[_ABILITY_OF_RESOURCE[part]] for part in uses if part in _ABILITY_OF_RESOURCE
+    ]
     return _found(parts, found)
 
 
 def words_of_sensor(names: Iterable[str]) -> SearchWords:
     """Return the search words of a sensor or event."""
     parts = _parts(names)
-    return _found(parts, _among(_TELLS, parts))
+    return _found(parts, _among(_SENSOR_ABILITIES, parts))
 
 
 def in_both(english: str) -> SearchWords:

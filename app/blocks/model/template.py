@@ -54,7 +54,7 @@ def statements(
     filled: list[ast.stmt] = []
     filler = _Filler(expressions, bodies or {}, keywords or {})
     for statement in _parsed(text).body:
-        made = filler.visit(_copied(statement))
+        made = filler.visit(_copy_node(statement))
         filled.extend(made if isinstance(made, list) else [made])
     return filled
 
@@ -81,13 +81,13 @@ def _parsed(text: str) -> ast.Module:
     return parse_module(_HOLE.sub(_PREFIX + r"\1", text))
 
 
-def _copied(node: Node) -> Node:
+def _copy_node(node: Node) -> Node:
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
-            fields[name] = [_copied(item) if isinstance(item, ast.AST) else item for item in value]
+            fields[name] = [_copy_node(item) if isinstance(item, ast.AST) else item for item in value]
         else:
-            fields[name] = _copied(value) if isinstance(value, ast.AST) else value
+            fields[name] = _copy_node(value) if isinstance(value, ast.AST) else value
     return type(node)(**fields)
 
 

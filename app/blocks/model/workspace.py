@@ -14,7 +14,7 @@ from app.blocks.model.names import Unique
 from nep.i18n import _
 
 MAX_DEPTH = 40
-_MANUAL = "MANUALLY_DISABLED"
+_DISABLED_BY_PERSON = "MANUALLY_DISABLED"
 
 
 @dataclass(frozen=True)
@@ -161,4 +161,4 @@ def is_enabled(saved: Mapping[str, object]) -> bool:
     """Return whether the block is enabled by the person; other reasons (an absent robot) are ignored."""
     if saved.get("enabled") is False:
         return False
-    return _MANUAL not in _list(saved.get("disabledReasons"))
+    return _DISABLED_BY_PERSON not in _list(saved.get("disabledReasons"))

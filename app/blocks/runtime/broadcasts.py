@@ -17,13 +17,13 @@ class Delivery:
 
     def __init__(self, over: Callable[[], None]) -> None:
         self.done = False
-        self._over = over
+        self._on_end = over
 
     def end(self) -> None:
         """Mark as done: the script has run, or another broadcast replaced this one."""
         if not self.done:
             self.done = True
-            self._over()
+            self._on_end()
 
 
 class Receiver:
@@ -57,7 +57,7 @@ class Broadcasts:
     """Receivers of one program."""
 
     def __init__(self, scheduler: Scheduler, began: Callable[[], None], over: Callable[[], None]) -> None:
-        self._scheduler, self._began, self._over = scheduler, began, over
+        self._scheduler, self._on_begin, self._on_end = scheduler, began, over
         self.receivers: list[Receiver] = []
 
     def send(self, name: str) -> tuple[Delivery, ...]:
@@ -65,8 +65,8 @@ class Broadcasts:
         return tuple(self._deliver(each) for each in self.receivers if each.name == name)
 
     def _deliver(self, receiver: Receiver) -> Delivery:
-        self._began()
-        delivery = Delivery(self._over)
+        self._on_begin()
+        delivery = Delivery(self._on_end)
         if receiver.waiting is not None:
             receiver.waiting.end()
         receiver.waiting = delivery

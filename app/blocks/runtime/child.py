@@ -140,7 +140,7 @@ class Run:
         )
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
-        self._began = time.monotonic()
+        self._started_at = time.monotonic()
         self._stop_answer_s = STOP_ANSWER_S
         self.set_pace(order)
         self._begins_paused = order.get("paused") is True
@@ -213,7 +213,7 @@ class Run:
             self._send_replaced()
             self._out.send_printed()
             self._send_variables()
-            elapsed_s = round(time.monotonic() - self._began, 3)
+            elapsed_s = round(time.monotonic() - self._started_at, 3)
             self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
             node.close(FLUSH_S if self._stop_answer_s == 0.0 else 2 * STOP_ANSWER_S)
         return error is None
@@ -234,22 +234,22 @@ class Run:
         if self._begins_paused:
             network.rest()
         try:
-            self._begin(network)
-            self._watch()
+            self._start_scripts(network)
+            self._report_until_finished()
         finally:
             self._runtime.scheduler.stop()
             silent = network.stop_robots(self._stop_answer_s)
             network.close()
         return silent if self._stop_answer_s else ()
 
-    def _begin(self, network: Network) -> None:
+    def _start_scripts(self, network: Network) -> None:
         names = self._runtime.namespace() | {"step": partial(self._step, network)}
         if self._program.shows_value:
             names["write"] = self._runtime.show
         self._variables = VariableWatch(names, self._program.variables)
         code = compile(self._program.runnable, "<behaviour>", "exec")
         exec(code, names)  # noqa: S102 (the compiler's own tree: texts of files are literals only)
-        self._began = time.monotonic()
+        self._started_at = time.monotonic()
         self._runtime.start(network, self._robots)
 
     def _step(self, network: Network, block: str) -> None:
@@ -280,7 +280,7 @@ class Run:
         if changes:
             self._out.send("variables", values=[value.to_json() for value in changes])
 
-    def _watch(self) -> None:
+    def _report_until_finished(self) -> None:
         runtime, saying, before = self._runtime, self._runtime.saying, None
         looks = itertools.count()
         while not runtime.finished.wait(SAMPLE_S):
@@ -332,7 +332,7 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
         return 0
     try:
         run = Run(order, out)
-        threading.Thread(target=_obey, args=(run, incoming), name="orders", daemon=True).start()
+        threading.Thread(target=_run_commands, args=(run, incoming), name="orders", daemon=True).start()
         return 0 if run.run() else 1
     except BehaviourError as error:
         out.send("error", block=error.block, sentence=error.sentence)
@@ -344,7 +344,7 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     return 1
 
 
-def _obey(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
+def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
     obeyed = run.orders()
     told: dict[str, Callable[[Mapping[str, object]], None]] = {
         "pace": run.set_pace,

@@ -112,22 +112,22 @@ def find_robots(
                 info = view.topics.get(robot.topics.command)
                 if robot.dialect == RIZE and info is not None and info.subscribers:
                     found.setdefault(robot.name, robot)
-            _follow(node, view, asked)
+            _update_topics(node, view, asked)
             senders.learn(view, asked)
             for topic, each in asked.items():
-                _hear(each, topic, senders)
+                _read_descriptions(each, topic, senders)
             there = found | {each.robot.name: each.robot for each in asked.values() if each.robot is not None}
             heard = sum(each.robot is not None or bool(each.wrong) for each in asked.values())
             missing = set(wanted) - there.keys() if wanted else heard < len(asked)
             if not missing or clock() >= until:
-                return _found(there, asked)
+                return _result(there, asked)
             wait(SLICE_S)
     finally:
         for each in asked.values():
             each.subscription.close()
 
 
-def _follow(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
+def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
     for topic, info in view.topics.items():
         nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
         if not nodes or (topic not in asked and len(asked) >= MOST_ROBOTS):
@@ -140,7 +140,7 @@ def _follow(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
         each.twins = tuple(identity_of(view, id).words for id in nodes if id != each.owner.node_id)
 
 
-def _hear(each: _Topic, topic: str, senders: Senders) -> None:
+def _read_descriptions(each: _Topic, topic: str, senders: Senders) -> None:
     message = each.subscription.receive(SLICE_S if each.robot is None else 0.0)
     while message is not None:
         each.told = [*each.told[1 - MOST_TOLD :], message]
@@ -159,7 +159,7 @@ def _hear(each: _Topic, topic: str, senders: Senders) -> None:
     each.robot = None if each.wrong else robot
 
 
-def _found(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobots:
+def _result(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobots:
     claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
     claims += [
         _(

@@ -41,11 +41,11 @@ class Motions:
     ) -> None:
         self._stop, self._stand, self._invoke = stop, stand, invoke
         self._lock = threading.Lock()
-        self._asked: dict[str, _Motion] = {}  # by command id, until it is answered
+        self._unanswered: dict[str, _Motion] = {}  # by command id, until it is answered
         self._motions: dict[tuple[str, str], _Motion] = {}  # by robot and action
-        self._resting = False
+        self._paused = False
         self._slow: set[int] = set()  # scripts waiting at a block
-        self._for = threading.local()
+        self._acting_for = threading.local()
 
     def asked(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
         """Note a new command: its resources no longer belong to an earlier motion."""
@@ -60,24 +60,24 @@ class Motions:
                 if known.robot.name != robot.name or not known.uses & motion.uses
             }
             if action.repeat_s is not None:
-                self._asked[call.id] = motion
+                self._unanswered[call.id] = motion
 
     def is_motion(self, call: RobotCall) -> bool:
         """Return whether an unanswered command starts a motion."""
         with self._lock:
-            return call.id in self._asked
+            return call.id in self._unanswered
 
     def ended(self, call: RobotCall) -> None:
         """Note the final answer of a command."""
         with self._lock:
-            motion = self._asked.pop(call.id, None)
+            motion = self._unanswered.pop(call.id, None)
             if motion is None:
                 return
             slow = motion.script in self._slow
             if call.state != "succeeded" and not (slow and call.state == "canceled"):
                 return
             self._motions[motion.robot.name, motion.action] = motion
-            rests = self._resting
+            rests = self._paused
         if rests:  # started by a single step of a paused program
             self._stop(motion.robot)
         elif slow:
@@ -86,7 +86,7 @@ class Motions:
     def rest(self) -> tuple[str, ...]:
         """Stop all motions because the program is paused; return the names of the stopped robots."""
         with self._lock:
-            self._resting = True
+            self._paused = True
             moving = {motion.robot.name: motion.robot for motion in self._motions.values()}
         for robot in moving.values():
             self._stop(robot)
@@ -95,11 +95,11 @@ class Motions:
     def go_on(self) -> None:
         """Resume all motions because the program continues."""
         with self._lock:
-            if not self._resting:
+            if not self._paused:
                 return
-            self._resting = False
+            self._paused = False
             motions = [each for each in self._motions.values() if each.script not in self._slow]
-        self._ask_again(motions)
+        self._resume(motions)
 
     @contextmanager
     def slow(self) -> Iterator[None]:
@@ -108,11 +108,11 @@ class Motions:
         with self._lock:
             moving = {
                 motion.robot.name: motion.robot
-                for motion in (*self._motions.values(), *self._asked.values())
+                for motion in (*self._motions.values(), *self._unanswered.values())
                 if motion.script == script
             }
             self._slow.add(script)
-            rests = self._resting
+            rests = self._paused
         for robot in moving.values():
             if not rests:
                 self._stand(robot)
@@ -120,19 +120,19 @@ class Motions:
         # Not reached if the program was stopped, so that nothing starts again.
         with self._lock:
             self._slow.discard(script)
-            rests = self._resting
+            rests = self._paused
             motions = [motion for motion in self._motions.values() if motion.script == script]
         if moving and not rests:
-            self._ask_again(motions)
+            self._resume(motions)
 
-    def _ask_again(self, motions: list[_Motion]) -> None:
+    def _resume(self, motions: list[_Motion]) -> None:
         for motion in motions:
-            self._for.script = motion.script
+            self._acting_for.script = motion.script
             try:
                 self._invoke(motion.robot.name, motion.action, motion.input)
             finally:
-                del self._for.script
+                del self._acting_for.script
 
     def _script(self) -> int:
         # Another script than the thread's own while motions are resumed.
-        return getattr(self._for, "script", None) or threading.get_ident()
+        return getattr(self._acting_for, "script", None) or threading.get_ident()

@@ -25,7 +25,7 @@ from nep.protocol.graph_view import GraphView
 from nep.system.log_rarely import SurvivedErrors
 from nep.text import bounded_str
 
-LOOK_S = 0.2
+LOOKUP_INTERVAL_S = 0.2
 """Minimum interval of graph queries for unknown publishers."""
 MOST_UNKNOWN = 32
 
@@ -111,11 +111,11 @@ class Network:
         self._owners = dict(owners or {})
         self._senders = Senders()
         self._view = GraphView(0, 0)
-        self._judging = threading.Lock()  # serializes the handling of answers
+        self._answers_lock = threading.Lock()  # serializes the handling of answers
         self._unknown = HeldMessages(per_publisher=MOST_UNKNOWN)
-        self._asks = threading.Event()
-        self._finder: threading.Thread | None = None
-        self._refused: dict[str, str] = {}
+        self._lookup_requested = threading.Event()
+        self._lookup_thread: threading.Thread | None = None
+        self._stop_errors: dict[str, str] = {}
         self._program = program
         self._robots = {robot.name: robot for robot in robots}
         self._robot_of = {sensor.topic: robot.name for robot in robots for sensor in robot.sensors}
@@ -129,7 +129,7 @@ class Network:
         self._told: dict[str, list[Told]] = {}
         self._subscribed: set[str] = set()
         self._publishers: dict[str, ProgramPublisher] = {}
-        self._poke: Callable[[], None] = _nothing
+        self._poke: Callable[[], None] = _do_nothing
         self._stopped_outside: Callable[[str], None] = _ignore
         self._arrived = threading.Condition()
         self._closed = threading.Event()
@@ -143,7 +143,7 @@ class Network:
         self, parts: Iterable[tuple[str, str]], publishes: Iterable[str], listens: Iterable[str]
     ) -> None:
         for robot in self._robots.values():
-            self._meet(robot)
+            self._open_robot(robot)
         for name, part in parts:
             self._subscribe(self._topic(name, part))
         for topic in publishes:
@@ -151,12 +151,12 @@ class Network:
         for topic in listens:
             self._subscribe(topic)
         with suppress(NepError):  # the master is down: owners are resolved later
-            self._look()
+            self._lookup()
         for robot in self._robots.values():
             if robot.dialect != "rize":
                 self._alive.beat(robot.name, self._publishers[robot.topics.command].publish)
 
-    def _meet(self, robot: Robot) -> None:
+    def _open_robot(self, robot: Robot) -> None:
         self._publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
         type_ = "json" if robot.dialect == "rize" else "robot/answer"
         with self._lock:
@@ -168,14 +168,14 @@ class Network:
     def close(self) -> None:
         """Stop the heartbeat; the node belongs to the caller."""
         self._closed.set()
-        self._asks.set()
+        self._lookup_requested.set()
         self._alive.close()
-        if self._finder is not None:
-            self._finder.join(timeout=3.0)
+        if self._lookup_thread is not None:
+            self._lookup_thread.join(timeout=3.0)
 
     def know(self, owners: Mapping[str, str]) -> None:
         """Update the nodes of robots that were restarted."""
-        with self._judging:
+        with self._answers_lock:
             self._owners |= owners
 
     # ---- Link
@@ -252,18 +252,18 @@ class Network:
     def _stand(self, robot: Robot) -> None:
         busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
         if all(self._motions.is_motion(call) for call in busy):
-            self._tell_stop(robot)
+            self._send_stop(robot)
 
     def _rest(self, robot: Robot) -> None:
         for call in list(self._calls.values()):
             call.held = call.held or call.robot == robot.name
-        self._tell_stop(robot)
+        self._send_stop(robot)
 
-    def _tell_stop(self, robot: Robot) -> None:
+    def _send_stop(self, robot: Robot) -> None:
         id = new_id("stop")
         with self._arrived:
             self._own_stops.add(id)
-            self._stops[id] = (robot.name, self._serving(robot))
+            self._stops[id] = (robot.name, self._stop_nodes(robot))
         self._send(robot, self._command(id, "stop", robot.safe_stop.action))
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
@@ -274,23 +274,23 @@ class Network:
         self._ending = True
         if timeout_s:
             with suppress(NepError):
-                self._look()
+                self._lookup()
         for robot in self._robots.values():
             if robot.dialect == "rize":
                 continue
-            self._tell_stop(robot)
+            self._send_stop(robot)
         with self._arrived:
             waiting = self._stops
             self._arrived.wait_for(
-                lambda: all(name in self._refused for name, _ in waiting.values()), timeout_s
+                lambda: all(name in self._stop_errors for name, _ in waiting.values()), timeout_s
             )
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
     def stop_words(self, name: str) -> str:
         """Return why a robot's stop is not confirmed, in its own words if it answered; without full stop."""
-        return self._refused.get(name) or _("{robot} did not respond").format(robot=name)
+        return self._stop_errors.get(name) or _("{robot} did not respond").format(robot=name)
 
-    def _serving(self, robot: Robot) -> set[str]:
+    def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.
         heard = set(hearing(self._view, robot.topics.command))
         others = heard & set(publishing(self._view, robot.topics.answer))
@@ -319,12 +319,12 @@ class Network:
             self._subscribed.add(topic)
         self._node.new_sub(topic, sink=self._messages)
 
-    def _look(self) -> None:
+    def _lookup(self) -> None:
         # Queries the graph and resolves senders. Never call it in the node's own thread, which it would
         # block.
         view = self._node.graph()
         topics = {robot.topics.answer for robot in self._robots.values()} | self._robot_of.keys()
-        with self._judging:
+        with self._answers_lock:
             self._view = view
             self._senders.learn(view, topics)
             for robot in self._robots.values():
@@ -333,25 +333,27 @@ class Network:
                     self._owners.setdefault(robot.name, first.node_id)
             for message in self._unknown.take():
                 if self._senders.node_of(message) is not None:
-                    self._judge(message)
+                    self._judge_locked(message)
         self._poke()
 
-    def _ask(self) -> None:
+    def _request_lookup(self) -> None:
         # Starts the query in a separate thread.
         with self._lock:
-            if self._finder is None and not self._closed.is_set():
-                self._finder = threading.Thread(target=self._find, name="program senders", daemon=True)
-                self._finder.start()
-        self._asks.set()
+            if self._lookup_thread is None and not self._closed.is_set():
+                self._lookup_thread = threading.Thread(
+                    target=self._run_lookup, name="program senders", daemon=True
+                )
+                self._lookup_thread.start()
+        self._lookup_requested.set()
 
-    def _find(self) -> None:
-        while self._asks.wait() and not self._closed.is_set():
-            self._asks.clear()
+    def _run_lookup(self) -> None:
+        while self._lookup_requested.wait() and not self._closed.is_set():
+            self._lookup_requested.clear()
             with self._errors, suppress(NepError):
-                self._look()
-            self._closed.wait(LOOK_S)
+                self._lookup()
+            self._closed.wait(LOOKUP_INTERVAL_S)
 
-    def _is_robots(self, message: Message) -> bool:
+    def _is_from_robot(self, message: Message) -> bool:
         # If the robot's own program publishes the topic, only its messages count; a camera may be another
         # program.
         robot = self._robot_of.get(message.topic)
@@ -360,7 +362,7 @@ class Network:
             return True
         node = self._senders.node_of(message)
         if node is None:
-            self._ask()
+            self._request_lookup()
         return node == own
 
     def _messages(self, messages: Sequence[Message]) -> None:
@@ -370,7 +372,7 @@ class Network:
         self._poke()
 
     def _take(self, message: Message) -> None:
-        if not self._is_robots(message):
+        if not self._is_from_robot(message):
             return
         self._newest[message.topic] = message
         for told in self._told.get(message.topic, ()):
@@ -379,14 +381,14 @@ class Network:
                 told(payload)
 
     def _answers(self, messages: Sequence[Message]) -> None:
-        with self._judging:
+        with self._answers_lock:
             for message in messages:
                 with self._errors:
-                    self._judge(message)
+                    self._judge_locked(message)
         self._poke()
 
-    def _judge(self, message: Message) -> None:
-        # Call with `_judging` held. The sender must be known before an answer is used.
+    def _judge_locked(self, message: Message) -> None:
+        # Call with `_answers_lock` held. The sender must be known before an answer is used.
         node = self._senders.node_of(message)
         native = any(
             robot.dialect != "rize" and robot.topics.answer == message.topic
@@ -394,15 +396,15 @@ class Network:
         )
         if native and (node is None or self._unknown.holds(message.publisher)):
             self._unknown.put(message)
-            self._ask()
+            self._request_lookup()
             return
-        if native and not self._serves(message.topic, node or ""):
+        if native and not self._is_stop_node(message.topic, node or ""):
             return  # skip decoding
         payload = payload_of(message)
         if isinstance(payload, Mapping):
             self._answer(message.topic, payload, node or "")
 
-    def _serves(self, topic: str, node: str) -> bool:
+    def _is_stop_node(self, topic: str, node: str) -> bool:
         # True for a robot's node, and for a node that must answer a stop.
         with self._arrived:
             must_answer = any(node in waiting for _name, waiting in self._stops.values())
@@ -417,7 +419,7 @@ class Network:
             self._stop_answered(topic, answer, node)
         if not any(self._is_own(robot, topic, node) for robot in self._robots.values()):
             return
-        self._hear(topic)
+        self._note_sign_of_life(topic)
         if answer.get("op") == "stop":
             return
         call = self._calls.get(bounded_str(answer.get("id")))
@@ -445,7 +447,7 @@ class Network:
             return False
         return robot.dialect == "rize" or self._owners.get(robot.name) == node
 
-    def _hear(self, topic: str) -> None:
+    def _note_sign_of_life(self, topic: str) -> None:
         now = time.monotonic()
         for call in list(self._calls.values()):
             if self._robots[call.robot].topics.answer == topic:
@@ -462,10 +464,10 @@ class Network:
             name, waiting = self._stops.get(id, ("", set()))
             if name in robots and node in waiting:
                 if answer["state"] == "failed":
-                    self._refused[name] = said_of_stop(name, answer.get("error"))
+                    self._stop_errors[name] = said_of_stop(name, answer.get("error"))
                 else:
                     waiting.discard(node)
-                    self._refused.pop(name, None)
+                    self._stop_errors.pop(name, None)
                 if not waiting:
                     del self._stops[id]
             self._arrived.notify_all()
@@ -482,7 +484,7 @@ class Network:
         self._publishers[robot.topics.command].publish(command)
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     return
 
 

@@ -65,11 +65,11 @@ class Questions:
 
     def _answer_to(self, words: str, choices: tuple[str, ...] = ()) -> str:
         question = ProgramQuestion(next(self._ids), words[:LONGEST_QUESTION], choices=choices)
-        self._change(self._waiting.append, question)
+        self._update_queue(self._waiting.append, question)
         try:
             self._scheduler.wait_until(lambda: question.answer is not None, None)
         finally:  # also if the script ends meanwhile
-            self._change(self._waiting.remove, question)
+            self._update_queue(self._waiting.remove, question)
         return question.answer or ""
 
     def answered(self, id: int, words: str) -> None:
@@ -79,7 +79,7 @@ class Questions:
                 if question.id == id:
                     question.answer = words[:LONGEST_ANSWER]
 
-    def _change(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
+    def _update_queue(self, change: Callable[[ProgramQuestion], None], question: ProgramQuestion) -> None:
         with self._lock:
             before = self._waiting[:1]
             change(question)

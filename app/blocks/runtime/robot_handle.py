@@ -28,7 +28,7 @@ FIRST_ANSWER_S = 3.0
 FIRST_VALUE_S = 2.0
 LONGEST_S = 60.0
 MARGIN_S = 2.0
-LOOK_S = 0.25
+COMMAND_CHECK_S = 0.25
 """Interval at which a pending command is checked: whether its robot is silent, whether it has started."""
 BEATS_MISSED, SHORTEST_SILENCE_S = 4, 2.0
 HOLD_S = 3.0
@@ -54,11 +54,11 @@ class StatusText:
 
     def tell(self, sentence: str) -> None:
         """Set what a robot does for the calling script's block; "" when it is done."""
-        _keep(self._told, self._block(), sentence)
+        _set_or_remove(self._told, self._block(), sentence)
 
     def warn(self, sentence: str) -> None:
         """Set a warning while the calling script is paused; "" when it continues."""
-        _keep(self._warned, self._block(), sentence)
+        _set_or_remove(self._warned, self._block(), sentence)
 
     def says(self, blocks: Sequence[str]) -> str:
         """Return the sentence for the run bar: a robot's activity, else the first block as text."""
@@ -73,7 +73,7 @@ class StatusText:
         return self._readings.get(block or "", "")
 
 
-def _keep(sentences: dict[str | None, str], block: str | None, sentence: str) -> None:
+def _set_or_remove(sentences: dict[str | None, str], block: str | None, sentence: str) -> None:
     if sentence:
         sentences[block] = sentence
     else:
@@ -271,7 +271,7 @@ class RobotHandle:
         action = robot.action(name)
         if action is None:
             raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
-        input = {key: _fitting(action, key, value) for key, value in given.items()}
+        input = {key: _converted_input(action, key, value) for key, value in given.items()}
         wrong = action.check(action.complete(input))
         if wrong:
             raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
@@ -284,7 +284,7 @@ class RobotHandle:
         if call.state == "failed":
             why = call.error or _("“{action}” failed").format(action=action.title)
             raise BehaviourError(
-                _ended(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=why))
+                _with_full_stop(_("{robot}: {what_it_said}").format(robot=self._name, what_it_said=why))
             )
         return call
 
@@ -293,7 +293,7 @@ class RobotHandle:
             call = self._runtime.linked().invoke(self._name, action.name, input)
             self._runtime.replaced.asked(call, action, self._runtime.scheduler.block())
             try:
-                self._await(robot, action, call, words)
+                self._wait_for_answer(robot, action, call, words)
             except EndScript:  # the program continues, but the robot must stop
                 self._runtime.linked().cancel(call)
                 raise
@@ -301,13 +301,13 @@ class RobotHandle:
                 self._runtime.replaced.ended(call, names_robot=self._runtime.robot_count > 1)
             if not call.held or call.state != "canceled":
                 return call
-            self._stay(action, is_unknown(action, input, call))
+            self._wait_while_paused(action, is_unknown(action, input, call))
             rest = rest_of(action, input, call)
             if rest is None:
                 return call
             input = rest
 
-    def _stay(self, action: Action, unknown: bool) -> None:
+    def _wait_while_paused(self, action: Action, unknown: bool) -> None:
         names = {"robot": self._name, "action": action.title}
         saying = self._runtime.saying
         ahead = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
@@ -318,28 +318,28 @@ class RobotHandle:
             done = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
             self._runtime.write(done.format(**names))
 
-    def _await(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
+    def _wait_for_answer(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
         scheduler = self._runtime.scheduler
         if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
             raise BehaviourError(
-                _("{name} is not responding. {check}").format(name=self._name, check=_check(robot))
+                _("{name} is not responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
         can_hold = action.cancellable and robot.dialect == "native"
         limit = action.timeout_s or LONGEST_S
         until = time.monotonic() + limit + MARGIN_S
         waits = bool(call.waits_for) and call.state == "accepted"
         if waits:
-            self._runtime.saying.tell(_waiting(robot, call))
+            self._runtime.saying.tell(_waiting_text(robot, call))
 
         def ready() -> bool:
             return call.done or (can_hold and scheduler.holds())
 
-        while not scheduler.wait_for(ready, min(LOOK_S, max(0.0, until - time.monotonic()))):
+        while not scheduler.wait_for(ready, min(COMMAND_CHECK_S, max(0.0, until - time.monotonic()))):
             if waits:  # the time limit starts with the action
                 until = time.monotonic() + limit + MARGIN_S
                 waits = not call.began
-                self._runtime.saying.tell(_waiting(robot, call) if waits else words)
-            said = self._broken(robot, call)
+                self._runtime.saying.tell(_waiting_text(robot, call) if waits else words)
+            said = self._silence_error(robot, call)
             if said is None and time.monotonic() >= until:
                 said = _("{name} did not finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=limit
@@ -348,17 +348,17 @@ class RobotHandle:
                 self._runtime.linked().cancel(call)
                 raise BehaviourError(said)
         if not call.done:
-            self._hold(call)
+            self._cancel_for_pause(call)
 
-    def _broken(self, robot: Robot, call: RobotCall) -> str | None:
+    def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
         if robot.beat_s is None:
             return None
         silence = time.monotonic() - call.heard_s
         if silence <= max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
-        return _("{name} stopped responding. {check}").format(name=self._name, check=_check(robot))
+        return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 
-    def _hold(self, call: RobotCall) -> None:
+    def _cancel_for_pause(self, call: RobotCall) -> None:
         call.held = True
         self._runtime.linked().cancel(call)
         if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
@@ -367,7 +367,7 @@ class RobotHandle:
             )
 
 
-def _waiting(robot: Robot, call: RobotCall) -> str:
+def _waiting_text(robot: Robot, call: RobotCall) -> str:
     found = [(robot.action(name), name) for name in dict.fromkeys(call.waits_for)]
     titles = [f"“{action.title if action is not None else name}”" for action, name in found]
     return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=listed(titles))
@@ -388,7 +388,7 @@ def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
     return " ".join(_PLACE.sub(place, action.says or action.text).split())
 
 
-def _fitting(action: Action, name: str, value: object) -> object:
+def _converted_input(action: Action, name: str, value: object) -> object:
     parameter = action.parameter(name)
     if parameter is None:
         return value
@@ -412,11 +412,11 @@ def _as_kind(parameter: Parameter, value: object) -> object:
     return value
 
 
-def _ended(words: str) -> str:
+def _with_full_stop(words: str) -> str:
     return words if words.endswith((".", "!", "?", "”")) else f"{words}."
 
 
-def _check(robot: Robot) -> str:
+def _check_hint(robot: Robot) -> str:
     if robot.virtual:
         return _("Start the virtual robot again.")
     return _("Check that it is switched on and on the same Wi-Fi.")

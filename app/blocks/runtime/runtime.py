@@ -26,15 +26,15 @@ from app.blocks.runtime.variables import brief_words
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
-_OWN = (
+_METHOD_NAMES = (
     "answer", "ask", "ask_with_choices", "broadcast", "broadcast_and_wait", "called", "fail", "newest",
     "number", "on_broadcast", "on_message", "on_start", "on_true", "publish", "reset_timer", "robot", "step",
     "stop_others", "stop_program", "timer", "value", "wait", "wait_until", "write",
 )  # fmt: skip
-_PURE = (
+_VALUE_NAMES = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
 )  # fmt: skip
-_PARTS: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
+_FUNCTION_MODULES: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
 """Modules whose ``__all__`` are names available to programs."""
 
 Script = Callable[..., None]
@@ -44,7 +44,7 @@ MESSAGES_WAITING = 16
 EVENTS_WAITING = 1
 MOST_DEEP = 200
 """Maximum depth of function calls."""
-_FRAMES = 6000  # recursion limit: one function call takes up to a dozen Python frames
+_RECURSION_LIMIT = 6000  # recursion limit: one function call takes up to a dozen Python frames
 
 
 def stop_script() -> None:
@@ -57,26 +57,26 @@ class Calls:
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
-        self._mine = threading.local()
+        self._local = threading.local()
 
     def begin(self) -> None:
         """Raise Python's recursion limit for the process of the program."""
-        sys.setrecursionlimit(max(sys.getrecursionlimit(), _FRAMES))
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), _RECURSION_LIMIT))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
         """Call a function. Raises BehaviourError if the calls are nested too deeply."""
-        depth = int(getattr(self._mine, "depth", 0))
+        depth = int(getattr(self._local, "depth", 0))
         if depth >= MOST_DEEP:
             raise BehaviourError(
                 _("“{name}” calls itself more than {count} times.").format(name=name, count=MOST_DEEP),
                 block,
             )
-        self._mine.depth = depth + 1
+        self._local.depth = depth + 1
         before = self._scheduler.block()
         try:
             result = call()
         finally:
-            self._mine.depth = depth
+            self._local.depth = depth
         self._scheduler.return_to(before)
         return result
 
@@ -117,16 +117,16 @@ class Runtime:
         self.replaced = Replacements()
         self._calls = Calls(self.scheduler)
         self.questions = Questions(self.scheduler, asked)
-        self._broadcasts = Broadcasts(self.scheduler, self._one_more, self._one_less)
+        self._broadcasts = Broadcasts(self.scheduler, self._add_running, self._remove_running)
         self.finished = threading.Event()
         self.error: BehaviourError | None = None
 
     def namespace(self) -> dict[str, object]:
         """Return the names available to the program: methods of this runtime, and pure functions."""
         return (
-            {name: getattr(self, name) for name in _OWN}
-            | {name: getattr(values, name) for name in _PURE}
-            | {name: getattr(part, name) for part in _PARTS for name in part.__all__}
+            {name: getattr(self, name) for name in _METHOD_NAMES}
+            | {name: getattr(values, name) for name in _VALUE_NAMES}
+            | {name: getattr(part, name) for part in _FUNCTION_MODULES for name in part.__all__}
             | {"stop_script": stop_script}
         )
 
@@ -152,18 +152,18 @@ class Runtime:
             # Not counted: without other running scripts, it can't receive a broadcast any more.
             self.scheduler.start(receiver.name, self._guarded(partial(receiver.serve, self.scheduler)))
         for script in self._starts:
-            body = self._guarded(partial(self._once, script), over=self._one_less)
+            body = self._guarded(partial(self._run_once, script), over=self._remove_running)
             self.scheduler.start(script.__name__, body, idle=False)
         for hat, script in self._hats:
-            body = self._guarded(partial(self._each, hat, script), over=self._one_less)
+            body = self._guarded(partial(self._run_for_events, hat, script), over=self._remove_running)
             self.scheduler.start(script.__name__, body)
 
-    def _once(self, script: Script) -> None:
+    def _run_once(self, script: Script) -> None:
         with suppress(EndScript):
             self.scheduler.begin()
             script()
 
-    def _each(self, hat: Hat, script: Script) -> None:
+    def _run_for_events(self, hat: Hat, script: Script) -> None:
         while True:
             arguments = hat.next(self.scheduler)
             with suppress(EndScript):
@@ -192,11 +192,11 @@ class Runtime:
 
         return run
 
-    def _one_more(self) -> None:
+    def _add_running(self) -> None:
         with self._count_lock:
             self._running += 1
 
-    def _one_less(self) -> None:
+    def _remove_running(self) -> None:
         with self._count_lock:
             self._running -= 1
             last = self._running == 0
@@ -271,7 +271,7 @@ class Runtime:
             at_most_s: Maximum wait in seconds; None waits forever.
         """
         limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
-        self.scheduler.wait_until(lambda: _is_so(condition), limit)
+        self.scheduler.wait_until(lambda: _is_true(condition), limit)
 
     def write(self, value: object) -> None:
         """Write a line to the console."""
@@ -359,7 +359,7 @@ class Runtime:
         """Decorate a script that runs each time the condition becomes true."""
 
         def decorate(script: Script) -> Script:
-            self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_so(condition)), script))
+            self._hats.append((Hat(_("when … becomes true"), condition=lambda: _is_true(condition)), script))
             return script
 
         return decorate
@@ -439,7 +439,7 @@ class Runtime:
         return self._link
 
 
-def _is_so(condition: Callable[[], object]) -> bool:
+def _is_true(condition: Callable[[], object]) -> bool:
     try:
         return bool(condition())
     except BehaviourError as error:

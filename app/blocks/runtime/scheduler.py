@@ -56,14 +56,14 @@ class Scheduler:
         self._clock = clock
         self._lock = threading.Lock()
         self._scripts: list[Script] = []
-        self._mine = threading.local()
+        self._local = threading.local()
         self._owner: Script | None = None
         self._parked: deque[Script] = deque()  # waiting before a block
         self._resuming: deque[Script] = deque()  # continuing a block after a wait
         self._opening = False  # no script gets the turn while scripts are being started
         self._paused = False
         self._paused_since_s = 0.0
-        self._stood_s = 0.0  # total duration of earlier pauses
+        self._paused_total_s = 0.0  # total duration of earlier pauses
         self.pace_s = 0.0  # see `set_pace`
         self._stepping: Script | None = None
         self._stopping = False
@@ -81,7 +81,7 @@ class Scheduler:
             self._scripts.append(script)
 
         def run() -> None:
-            self._mine.script = script
+            self._local.script = script
             try:
                 body()
             except Stopped:
@@ -101,14 +101,14 @@ class Scheduler:
         yield
         with self._lock:
             self._opening = False
-            self._grant()
+            self._grant_locked()
 
     def begin(self) -> None:
         """Take the turn to begin the script's run. Raises Stopped when the program ends."""
         script = self._script()
         with self._lock:
             script.idle = False
-            self._enter(script)
+            self._enter_locked(script)
 
     def look(self) -> None:
         """Take the turn to evaluate the condition of an idle script, not while paused; `rest` returns it."""
@@ -116,14 +116,14 @@ class Scheduler:
         with self._lock:
             while self._paused and not self._stopping:
                 script.wake.wait()
-            self._enter(script)
+            self._enter_locked(script)
 
     def rest(self) -> None:
         """End the script's run until its next event."""
         script = self._script()
         with self._lock:
             script.idle, script.block, script.ended = True, None, False
-            self._leave(script)
+            self._leave_locked(script)
 
     def step(self, block: str) -> None:
         """Note that the script reaches this block: others get their turn, and a pause holds it here.
@@ -137,13 +137,13 @@ class Scheduler:
             if self._stepping is script:
                 self._stepping = None
             if self.pace_s and not self._paused:
-                self._stay(script, lambda: self.pace_s, step_ends=True)
+                self._stay_locked(script, lambda: self.pace_s, step_ends=True)
             if self._stepping is script:
                 return  # a step was requested while it stayed here
             if not self._parked and not self._resuming and not self._paused:
                 return
-            self._leave(script, then_park=True)
-            self._await_turn(script)
+            self._leave_locked(script, then_park=True)
+            self._await_turn_locked(script)
 
     def me(self) -> Script:
         """Return the calling script."""
@@ -152,7 +152,7 @@ class Scheduler:
     def end_run(self, script: Script) -> None:
         """End a script's current run: EndScript is raised at its next call; an idle one is not affected."""
         with self._lock:
-            self._end_run(script)
+            self._end_run_locked(script)
 
     def end_others(self) -> None:
         """End the current runs of all scripts except the calling one."""
@@ -160,9 +160,9 @@ class Scheduler:
         with self._lock:
             for script in self._scripts:
                 if script is not mine:
-                    self._end_run(script)
+                    self._end_run_locked(script)
 
-    def _end_run(self, script: Script) -> None:
+    def _end_run_locked(self, script: Script) -> None:
         if not script.idle:
             script.ended = True
             script.wake.notify()
@@ -183,13 +183,13 @@ class Scheduler:
             slice_s = remaining if condition is None else POLL_S
             if remaining is not None and slice_s is not None:
                 slice_s = min(slice_s, remaining)
-            used = self._doze(script, slice_s)
+            used = self._wait_slice(script, slice_s)
             remaining = None if remaining is None else remaining - used
         return True
 
-    def _doze(self, script: Script, seconds: float | None) -> float:
+    def _wait_slice(self, script: Script, seconds: float | None) -> float:
         with self._lock:
-            return self._stay(script, lambda: seconds)
+            return self._stay_locked(script, lambda: seconds)
 
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
@@ -202,8 +202,8 @@ class Scheduler:
         until = None if timeout_s is None else self._clock() + timeout_s
         with self._lock:
             script.busy = not idle
-            self._leave(script)
-            while not self._over(script) and not ready():
+            self._leave_locked(script)
+            while not self._is_over(script) and not ready():
                 left = None if until is None else until - self._clock()
                 if left is not None and left <= 0:
                     break
@@ -211,7 +211,7 @@ class Scheduler:
             script.busy = False
             self._raise_if_over(script)
             if not idle:
-                self._enter(script)
+                self._enter_locked(script)
             return ready()
 
     def holds(self) -> bool:
@@ -221,12 +221,12 @@ class Scheduler:
     def hold(self) -> None:
         """Wait within a block until the pause ends or this script is stepped."""
         with self._lock:
-            self._stay(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
+            self._stay_locked(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
 
     def poke(self) -> None:
         """Wake waiting scripts because something arrived."""
         with self._lock:
-            self._wake_all()
+            self._wake_all_locked()
 
     # ---- pause, step, stop: called from other threads
 
@@ -236,7 +236,7 @@ class Scheduler:
             if not self._paused:
                 self._paused_since_s = self._clock()
             self._paused = True
-            self._wake_all()
+            self._wake_all_locked()
 
     @property
     def is_paused(self) -> bool:
@@ -247,15 +247,15 @@ class Scheduler:
         """End the pause."""
         with self._lock:
             if self._paused:
-                self._stood_s += self._clock() - self._paused_since_s
+                self._paused_total_s += self._clock() - self._paused_since_s
             self._paused, self._stepping = False, None
-            self._grant()
-            self._wake_all()
+            self._grant_locked()
+            self._wake_all_locked()
 
     def running_s(self) -> float:
         """Return a clock in seconds that stops while paused."""
         with self._lock:
-            return (self._paused_since_s if self._paused else self._clock()) - self._stood_s
+            return (self._paused_since_s if self._paused else self._clock()) - self._paused_total_s
 
     def set_pace(self, seconds: float) -> None:
         """Set how long each script stays at a block in slow motion; 0 disables it."""
@@ -270,16 +270,16 @@ class Scheduler:
             if self._parked:
                 self._stepping = self._parked.popleft()
                 self._resuming.append(self._stepping)
-                self._grant()
+                self._grant_locked()
                 return
             self._stepping = next((script for script in self._scripts if script.frozen), None)
-            self._wake_all()
+            self._wake_all_locked()
 
     def stop(self) -> None:
         """End every script at its next call, waiting ones at once."""
         with self._lock:
             self._stopping = True
-            self._wake_all()
+            self._wake_all_locked()
 
     @property
     def stopping(self) -> bool:
@@ -306,11 +306,13 @@ class Scheduler:
 
     # ---- the turn; call with the lock held
 
-    def _stay(self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False) -> float:
+    def _stay_locked(
+        self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False
+    ) -> float:
         used = 0.0
         script.frozen = True
-        self._leave(script)
-        while not self._over(script) and not (step_ends and self._stepping is script):
+        self._leave_locked(script)
+        while not self._is_over(script) and not (step_ends and self._stepping is script):
             most = limit_s()
             if most is not None and used >= most:
                 break
@@ -321,35 +323,35 @@ class Scheduler:
             script.wake.wait(None if most is None else most - used)
             used += self._clock() - began
         script.frozen = False
-        self._enter(script)
+        self._enter_locked(script)
         return used
 
     def _script(self) -> Script:
-        script = getattr(self._mine, "script", None)
+        script = getattr(self._local, "script", None)
         if isinstance(script, Script):
             return script
         raise RuntimeError(_("this only works in a script; put it below “when started”"))
 
-    def _leave(self, script: Script, *, then_park: bool = False) -> None:
+    def _leave_locked(self, script: Script, *, then_park: bool = False) -> None:
         if self._owner is script:
             self._owner = None
         if then_park:
             self._parked.append(script)
-        self._grant()
+        self._grant_locked()
 
-    def _enter(self, script: Script) -> None:
+    def _enter_locked(self, script: Script) -> None:
         self._resuming.append(script)
-        self._grant()
-        self._await_turn(script)
+        self._grant_locked()
+        self._await_turn_locked(script)
 
-    def _await_turn(self, script: Script) -> None:
-        while self._owner is not script and not self._over(script):
+    def _await_turn_locked(self, script: Script) -> None:
+        while self._owner is not script and not self._is_over(script):
             script.wake.wait()
-        if self._over(script) and self._owner is not script:
-            self._forget_turn(script)
+        if self._is_over(script) and self._owner is not script:
+            self._forget_turn_locked(script)
         self._raise_if_over(script)
 
-    def _grant(self) -> None:
+    def _grant_locked(self) -> None:
         if self._owner is not None or self._opening:
             return
         if self._resuming:
@@ -359,24 +361,24 @@ class Scheduler:
         if self._owner is not None:
             self._owner.wake.notify()
 
-    def _wake_all(self) -> None:
+    def _wake_all_locked(self) -> None:
         for script in self._scripts:
             script.wake.notify()
 
     def _end(self, script: Script) -> None:
         with self._lock:
             self._scripts.remove(script)
-            self._forget_turn(script)
-            self._leave(script)
+            self._forget_turn_locked(script)
+            self._leave_locked(script)
 
-    def _forget_turn(self, script: Script) -> None:
+    def _forget_turn_locked(self, script: Script) -> None:
         if self._stepping is script:
             self._stepping = None
         for queue in (self._parked, self._resuming):
             if script in queue:
                 queue.remove(script)
 
-    def _over(self, script: Script) -> bool:
+    def _is_over(self, script: Script) -> bool:
         return self._stopping or script.ended
 
     def _raise_if_over(self, script: Script) -> None:

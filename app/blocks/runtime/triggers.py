@@ -21,7 +21,7 @@ class Hat:
         self.dropped = 0
         self._waiting: deque[tuple[object, ...]] = deque(maxlen=most)
         self._condition = condition
-        self._was_so: bool | None = None
+        self._was_true: bool | None = None
 
     def happened(self, arguments: tuple[object, ...]) -> None:
         """Queue an event; the caller pokes the scheduler."""
@@ -34,11 +34,11 @@ class Hat:
         if self._condition is None:
             scheduler.wait_for(lambda: bool(self._waiting), idle=True)
             return self._waiting.popleft()
-        while not self._becomes_so(scheduler):
+        while not self._becomes_true(scheduler):
             scheduler.wait_for(lambda: False, POLL_S, idle=True)
         return ()
 
-    def _becomes_so(self, scheduler: Scheduler) -> bool:
+    def _becomes_true(self, scheduler: Scheduler) -> bool:
         if self._condition is None:
             return False
         scheduler.look()
@@ -47,8 +47,8 @@ class Hat:
         finally:
             scheduler.rest()
         # True from the beginning is not a change.
-        became = is_so and self._was_so is False
-        self._was_so = is_so
+        became = is_so and self._was_true is False
+        self._was_true = is_so
         return became
 
 

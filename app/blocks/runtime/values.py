@@ -15,7 +15,7 @@ from nep.i18n import _, lazy
 LONGEST_TEXT = 1_000_000
 MOST_BITS = 14_000
 """Python refuses to print integers of more than 4300 digits; larger ones are shown as 1.2e+4932."""
-_MOST_ROUNDS = 10**9
+_MAX_ROUNDS = 10**9
 _JOINER = "\u200d"
 
 
@@ -78,14 +78,14 @@ def letters(words: str) -> Sequence[str]:
         return words
     found: list[str] = []
     for character in words:
-        if found and _belongs(found[-1], character):
+        if found and _is_combining(found[-1], character):
             found[-1] += character
         else:
             found.append(character)
     return found
 
 
-def _belongs(before: str, character: str) -> bool:
+def _is_combining(before: str, character: str) -> bool:
     if before[-1] == _JOINER or character in (_JOINER, "\ufe0f"):
         return True
     if "\U0001f3fb" <= character <= "\U0001f3ff" or "\U000e0020" <= character <= "\U000e007f":
@@ -134,7 +134,7 @@ def random_number(low: object, high: object) -> int | float:
 
 def repeat(times: object) -> range:
     """Return the rounds of a loop: rounded, at least 0."""
-    return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MOST_ROUNDS)))
+    return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ROUNDS)))
 
 
 def part(message: object, path: str) -> object:

@@ -19,7 +19,7 @@ MOST_INSIDE = 20
 """Maximum nesting depth that is shown."""
 MOST_CHARACTERS = 200_000
 """Maximum amount of text sent at once; the rest follows with the next read."""
-_DIGITS_BITS = 600
+_MAX_PRINTED_BITS = 600
 """Integers with more bits are described by their number of digits: printing them could take seconds."""
 _CUT = "…"
 
@@ -85,7 +85,7 @@ class VariableWatch:
                 told = brief(variable.id, value)
             except RuntimeError:
                 continue  # a script is changing it; the next read gets it
-            self._seen[python] = _kept(value)
+            self._seen[python] = _comparable(value)
             if told != self._told.get(python):
                 self._told[python] = told
                 found.append(told)
@@ -100,11 +100,11 @@ class VariableWatch:
     def _is_same(self, python: str, value: object) -> bool:
         seen = self._seen.get(python)
         if isinstance(value, list):
-            return isinstance(seen, tuple) and seen == _kept(value) and all(map(_is_plain, seen[1]))
+            return isinstance(seen, tuple) and seen == _comparable(value) and all(map(_is_plain, seen[1]))
         return seen is value and _is_plain(value)
 
 
-def _kept(value: object) -> object:
+def _comparable(value: object) -> object:
     return (len(value), tuple(value[:MOST_ITEMS])) if isinstance(value, list) else value
 
 
@@ -138,7 +138,7 @@ def words(value: object, most: int) -> str:
     """Return a value as text of at most `most` characters; parts that aren't shown aren't read."""
     if isinstance(value, str):
         return _cut(value[: most + 1], most)
-    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _DIGITS_BITS:
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:
         about = round(value.bit_length() * 0.30103)
         return _("a number with about {count} digits").format(count=about)
     if isinstance(value, (list, tuple, Mapping)):

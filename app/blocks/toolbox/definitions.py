@@ -68,14 +68,14 @@ def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict
     for part in parts:
         if part is not category:
             contents.append({"kind": "label", "text": part.title})
-        contents += _shown(part)
+        contents += _category_contents(part)
     if any(block.shape == "hat" for block in category.blocks):
-        contents += _hats_of_robots(groups)
+        contents += _robot_hats(groups)
     made = _entry(category.name, category.title, category.style, category.icon, contents)
     return made | {"dynamic": category.dynamic} if category.dynamic else made
 
 
-def _shown(category: Category) -> Iterator[Mapping[str, object]]:
+def _category_contents(category: Category) -> Iterator[Mapping[str, object]]:
     for block in category.blocks:
         if block.type in category.headings:
             yield {"kind": "label", "text": category.headings[block.type]}
@@ -83,7 +83,7 @@ def _shown(category: Category) -> Iterator[Mapping[str, object]]:
             yield block.to_toolbox()
 
 
-def _hats_of_robots(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, object]]:
+def _robot_hats(groups: Mapping[str, Sequence[Group]]) -> list[Mapping[str, object]]:
     contents: list[Mapping[str, object]] = []
     for robot, its in groups.items():
         hats = [_block(entry) for group in its for entry in group.entries if entry.block.shape == "hat"]

@@ -125,15 +125,15 @@ _NAMES = {
     "ELSE": "inside, below “else”",
     "VAR": "variable",
 }
-_TAKES = {
+_TYPE_WORDS = {
     "Number": lazy("a number"),
     "String": lazy("a text"),
     "Boolean": lazy("yes or no, such as a comparison"),
     "List": lazy("a list"),
 }
 _ANY = lazy("any value")
-_MOST_CHOICES = 6
-_UNIT = 3  # letters that a unit has at most
+_MAX_CHOICES = 6
+_MAX_UNIT_LENGTH = 3  # letters that a unit has at most
 
 
 def help_of(block: Block) -> dict[str, object]:
@@ -183,10 +183,10 @@ def name(block: Block) -> str:
     Without its robot, and without the unit after its last gap.
     """
     words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
-    if len(words) > 1 and len(words[-1]) <= _UNIT:
+    if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:
         words[-1] = ""
     told = re.sub(r"\s*…[\s…]*", " … ", "…".join(words)).strip().removesuffix(" …")
-    return told if sum(letter.isalpha() for letter in told) >= _UNIT - 1 and told != "…" else ""
+    return told if sum(letter.isalpha() for letter in told) >= _MAX_UNIT_LENGTH - 1 and told != "…" else ""
 
 
 def name_of_gap(block: Block, argument: Argument) -> str:
@@ -219,13 +219,13 @@ def _kind(argument: Argument) -> str:
         return _choice(argument)
     if isinstance(argument, NumberField):
         return _number(argument)
-    for kind, words in _PLAIN.items():
+    for kind, words in _FIELD_WORDS.items():
         if isinstance(argument, kind):
             return _(words)
     return ""
 
 
-_PLAIN: Mapping[type[Argument], str] = {
+_FIELD_WORDS: Mapping[type[Argument], str] = {
     StatementInput: lazy("blocks"),
     TextField: lazy("a text, typed into the block"),
     BroadcastField: lazy("name of a message; choose one or create a new one"),
@@ -239,7 +239,7 @@ _PLAIN: Mapping[type[Argument], str] = {
 
 
 def _value(gap: ValueInput) -> str:
-    words = _(_TAKES.get(gap.check or "", _ANY))
+    words = _(_TYPE_WORDS.get(gap.check or "", _ANY))
     if isinstance(gap.default, (int, float)) and not isinstance(gap.default, bool):
         words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
     if gap.only is None:
@@ -249,8 +249,8 @@ def _value(gap: ValueInput) -> str:
 
 def _choice(field: ChoiceField) -> str:
     names = [f"“{words}”" for words, _value in field.options]
-    if len(names) > _MOST_CHOICES:
-        few = ", ".join(names[: _MOST_CHOICES - 1])
+    if len(names) > _MAX_CHOICES:
+        few = ", ".join(names[: _MAX_CHOICES - 1])
         return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
     return listed(names, "or") if len(names) > 1 else _("choose one")
 

@@ -64,7 +64,7 @@ class Program:
         return self.network._senders.node_of(message) is not None
 
     def hearing_commands(self) -> int:
-        self.network._look()
+        self.network._lookup()
         return len(hearing(self.network._view, "/Pepper/command"))
 
     def watch(self, sensor: str) -> AbstractContextManager[object]:
@@ -169,7 +169,7 @@ def test_a_stranger_starts_no_script_but_another_program_may_be_a_robots_eye(
     pepper._sensors["battery"].close()
     seen = evil.new_pub("/Pepper/battery", "json")
     network.sensor("Pepper", "battery")
-    network._look()
+    network._lookup()
 
     def told_by_another() -> bool:
         seen.publish({"value": 42})
@@ -186,7 +186,7 @@ def test_a_robot_that_is_started_anew_is_believed_when_the_runner_says_so(
     try:
         call = network.invoke("Pepper", "say", {"text": "Hi"})
         until(lambda: bool(new.heard("invoke")))
-        network._look()
+        network._lookup()
         assert call.state == "sent"
         network.know({"Pepper": new._node.id})
         second = network.invoke("Pepper", "say", {"text": "Hi"})

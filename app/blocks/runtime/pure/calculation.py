@@ -21,14 +21,14 @@ __all__ = [
     "ten_to_the",
 ]  # fmt: skip
 
-_MOST_ROUNDS = 10**9
-_MOST_PLACES = 15
-_EXACT = 2**53
+_MAX_ROUNDS = 10**9
+_MAX_PLACES = 15
+_MAX_EXACT_INTEGER = 2**53
 
 
 def square_root(value: object) -> int | float:
     """Return the square root."""
-    return _only(math.sqrt, value, lazy("“square root”"))
+    return _applied(math.sqrt, value, lazy("“square root”"))
 
 
 def absolute(value: object) -> int | float:
@@ -44,12 +44,12 @@ def sign(value: object) -> int:
 
 def sine(degrees: object) -> int | float:
     """Return the sine of an angle in degrees."""
-    return _neat(math.sin(_angle(degrees, lazy("“sin”"))))
+    return _rounded_result(math.sin(_angle(degrees, lazy("“sin”"))))
 
 
 def cosine(degrees: object) -> int | float:
     """Return the cosine of an angle in degrees."""
-    return _neat(math.cos(_angle(degrees, lazy("“cos”"))))
+    return _rounded_result(math.cos(_angle(degrees, lazy("“cos”"))))
 
 
 def tangent(degrees: object) -> int | float:
@@ -57,32 +57,32 @@ def tangent(degrees: object) -> int | float:
     what = lazy("“tan”")
     if abs(number(degrees, what)) % 180 == 90:
         raise _no_result(what, degrees)
-    return _neat(math.tan(_angle(degrees, what)))
+    return _rounded_result(math.tan(_angle(degrees, what)))
 
 
 def arc_sine(value: object) -> int | float:
     """Return the angle in degrees with this sine."""
-    return _neat(math.degrees(_only(math.asin, value, lazy("“asin”"))))
+    return _rounded_result(math.degrees(_applied(math.asin, value, lazy("“asin”"))))
 
 
 def arc_cosine(value: object) -> int | float:
     """Return the angle in degrees with this cosine."""
-    return _neat(math.degrees(_only(math.acos, value, lazy("“acos”"))))
+    return _rounded_result(math.degrees(_applied(math.acos, value, lazy("“acos”"))))
 
 
 def arc_tangent(value: object) -> int | float:
     """Return the angle in degrees with this tangent."""
-    return _neat(math.degrees(math.atan(number(value, lazy("“atan”")))))
+    return _rounded_result(math.degrees(math.atan(number(value, lazy("“atan”")))))
 
 
 def natural_logarithm(value: object) -> int | float:
     """Return the logarithm to the base e."""
-    return _only(math.log, value, lazy("“ln”"))
+    return _applied(math.log, value, lazy("“ln”"))
 
 
 def logarithm(value: object) -> int | float:
     """Return the logarithm to the base 10."""
-    return _only(math.log10, value, lazy("“log”"))
+    return _applied(math.log10, value, lazy("“log”"))
 
 
 def e_to_the(power: object) -> float:
@@ -92,15 +92,15 @@ def e_to_the(power: object) -> float:
 
 def ten_to_the(power: object) -> int | float:
     """Return 10 to this power."""
-    return _neat(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
+    return _rounded_result(math.pow(10, number(power, lazy("“10 to the power”"))), places=None)
 
 
 def rounded_to(value: object, places: object) -> int | float:
     """Round to this number of decimal places, halves up; negative places round to tens and more."""
     found = number(value, lazy("“round”"))
     wanted = number(places, lazy("“decimal places”"))
-    digits = max(-_MOST_PLACES, min(_MOST_PLACES, round(wanted)))
-    if abs(found) >= _EXACT:  # floats of this size have no fraction
+    digits = max(-_MAX_PLACES, min(_MAX_PLACES, round(wanted)))
+    if abs(found) >= _MAX_EXACT_INTEGER:  # floats of this size have no fraction
         return found
     halves = ROUND_HALF_UP if found > 0 else ROUND_HALF_DOWN
     exact = Decimal(repr(found)).scaleb(digits).to_integral_value(halves).scaleb(-digits)
@@ -174,19 +174,22 @@ def counting(first: object, last: object, step: object) -> Iterator[int | float]
         raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(what)))
     wide = abs(wide) if end >= begin else -abs(wide)
     # Tolerance for rounding errors: 0 to 0.3 by 0.1 has four numbers.
-    rounds = min(math.floor((end - begin) / wide + 1e-9), _MOST_ROUNDS)
+    rounds = min(math.floor((end - begin) / wide + 1e-9), _MAX_ROUNDS)
     whole = isinstance(begin, int) and isinstance(wide, int)
-    return (begin + at * wide if whole else _neat(begin + at * wide, places=12) for at in range(rounds + 1))
+    return (
+        begin + at * wide if whole else _rounded_result(begin + at * wide, places=12)
+        for at in range(rounds + 1)
+    )
 
 
 def _angle(degrees: object, what: str) -> float:
     return math.radians(math.fmod(number(degrees, what), 360))
 
 
-def _only(work_out: Callable[[float], float], value: object, what: str) -> int | float:
+def _applied(work_out: Callable[[float], float], value: object, what: str) -> int | float:
     found = number(value, what)
     try:
-        return _neat(work_out(found), places=None)
+        return _rounded_result(work_out(found), places=None)
     except ValueError:
         raise _no_result(what, found) from None
 
@@ -195,6 +198,6 @@ def _no_result(what: str, value: object) -> BehaviourError:
     return BehaviourError(_("{name} has no result for {number}.").format(name=_(what), number=text(value)))
 
 
-def _neat(value: float, places: int | None = 10) -> int | float:
+def _rounded_result(value: float, places: int | None = 10) -> int | float:
     found = value if places is None else round(value, places)
-    return int(found) if found.is_integer() and abs(found) < _EXACT else found
+    return int(found) if found.is_integer() and abs(found) < _MAX_EXACT_INTEGER else found

@@ -34,7 +34,7 @@ def part_of_moment(moment: datetime, part: str) -> object:
         return moment.isoweekday()
     if part == "day name":
         return _(_DAYS[moment.weekday()])
-    return moment.strftime(_SHAPES[part])
+    return moment.strftime(_FORMATS[part])
 
 
 def seconds_since(moment: object) -> float:
@@ -54,7 +54,7 @@ def read_moment(written: str, today: datetime) -> datetime:
         raise BehaviourError(said.format(text=written[:60])) from None
 
 
-_SHAPES = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M:%S"}
+_FORMATS = {"date": "%Y-%m-%d", "time": "%H:%M", "date and time": "%Y-%m-%d %H:%M:%S"}
 
 
 def _now() -> datetime:

@@ -27,43 +27,43 @@ FIRST, LAST, RANDOM = "first", "last", "random"
 
 def new_list(*items: object) -> list[object]:
     """Return a list of these values."""
-    return _own_list(items)
+    return _copied_list(items)
 
 
 def item(of: object, where: object) -> object:
     """Return the item at a position: its number, "first", "last" or "random"."""
-    items = _read(of)
+    items = _as_list(of)
     return items[_index(items, where)]
 
 
 def set_item(of: object, where: object, value: object) -> None:
     """Replace the item at a position."""
-    items = _changed(of)
+    items = _mutable_list(of)
     place = _index(items, where)
-    items[place] = _fitting(items, value)
+    items[place] = _checked_value(items, value)
 
 
 def insert_item(of: object, where: object, value: object) -> None:
     """Insert a value before the item at a position, or at the end (also for the next free number)."""
-    items = _changed(of)
+    items = _mutable_list(of)
     if where == LAST or (where != FIRST and where == len(items) + 1):
         place = len(items)
     elif where == FIRST:
         place = 0
     else:
         place = _index(items, where)
-    items.insert(place, _fitting(items, value))
+    items.insert(place, _checked_value(items, value))
 
 
 def add_item(of: object, value: object) -> None:
     """Append a value."""
-    items = _changed(of)
-    items.append(_fitting(items, value))
+    items = _mutable_list(of)
+    items.append(_checked_value(items, value))
 
 
 def remove_item(of: object, where: object) -> object:
     """Remove and return an item."""
-    items = _changed(of)
+    items = _mutable_list(of)
     return items.pop(_index(items, where))
 
 
@@ -71,23 +71,23 @@ def contains(where: object, value: object) -> bool:
     """Return whether a list has an equal item, or a text contains this text."""
     if isinstance(where, str):
         return text(value) in where
-    return any(_same(each, value) for each in _read(where))
+    return any(_same(each, value) for each in _as_list(where))
 
 
 def position(of: object, value: object) -> int:
     """Return the number of the first equal item, or 0."""
-    return next((place for place, each in enumerate(_read(of), 1) if _same(each, value)), 0)
+    return next((place for place, each in enumerate(_as_list(of), 1) if _same(each, value)), 0)
 
 
 def each(of: object) -> list[object]:
     """Return a copy of the items, so that a loop isn't affected by changes."""
-    return list(_read(of))
+    return list(_as_list(of))
 
 
 def join_items(of: object, between: object) -> str:
     """Join all items to a text with a separator."""
     joint, pieces, size = text(between), [], 0
-    for one in _read(of):
+    for one in _as_list(of):
         pieces.append(text(one))
         size += len(pieces[-1]) + len(joint)
         if size > LONGEST_TEXT:
@@ -102,34 +102,34 @@ def split_text(words: object, at: object) -> list[object]:
     whole, joint = text(words), text(at)
     pieces = whole.split(joint) if joint else letters(whole)
     if len(pieces) > MOST_ITEMS:
-        raise _full()
+        raise _full_error()
     return [*pieces]
 
 
 def part_of_list(of: object, first: object, last: object) -> list[object]:
     """Return the items from one number to another, both included; positions beyond the ends are ignored."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
-    return _own_list(_read(of)[max(begin, 1) - 1 : max(end, 0)])
+    return _copied_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
 
 
 def is_empty_list(of: object) -> bool:
     """Return whether the list is empty."""
-    return not _read(of)
+    return not _as_list(of)
 
 
 def clear_list(of: object) -> None:
     """Remove all items."""
-    _changed(of).clear()
+    _mutable_list(of).clear()
 
 
 def copy_of(of: object) -> list[object]:
     """Return a copy of the list."""
-    return _own_list(_read(of))
+    return _copied_list(_as_list(of))
 
 
 def sorted_up(of: object) -> list[object]:
     """Return the items in ascending order: numbers, then texts ignoring case, then the rest."""
-    return sorted(_own_list(_read(of)), key=_rank)
+    return sorted(_copied_list(_as_list(of)), key=_sort_key)
 
 
 def sorted_down(of: object) -> list[object]:
@@ -139,12 +139,12 @@ def sorted_down(of: object) -> list[object]:
 
 def turned_round(of: object) -> list[object]:
     """Return the items in reverse order."""
-    return _own_list(_read(of))[::-1]
+    return _copied_list(_as_list(of))[::-1]
 
 
 def shuffled(of: object) -> list[object]:
     """Return the items in random order."""
-    items = _own_list(_read(of))
+    items = _copied_list(_as_list(of))
     random.shuffle(items)
     return items
 
@@ -156,42 +156,42 @@ def sum_of(of: object) -> int | float:
 
 def average_of(of: object) -> float:
     """Return the mean of the numbers."""
-    items = _some(_numbers(of, lazy("“average”")))
+    items = _non_empty(_numbers(of, lazy("“average”")))
     return sum(items) / len(items)
 
 
 def smallest_of(of: object) -> int | float:
     """Return the smallest number."""
-    return min(_some(_numbers(of, lazy("“smallest number”"))))
+    return min(_non_empty(_numbers(of, lazy("“smallest number”"))))
 
 
 def largest_of(of: object) -> int | float:
     """Return the largest number."""
-    return max(_some(_numbers(of, lazy("“largest number”"))))
+    return max(_non_empty(_numbers(of, lazy("“largest number”"))))
 
 
 def middle_of(of: object) -> int | float:
     """Return the median of the numbers."""
-    return statistics.median(_some(_numbers(of, lazy("“middle number”"))))
+    return statistics.median(_non_empty(_numbers(of, lazy("“middle number”"))))
 
 
 def _numbers(of: object, what: str) -> list[int | float]:
-    return [number(each, what) for each in _read(of)]
+    return [number(each, what) for each in _as_list(of)]
 
 
-def _some(items: list[int | float]) -> list[int | float]:
+def _non_empty(items: list[int | float]) -> list[int | float]:
     if not items:
         raise BehaviourError(_("The list is empty."))
     return items
 
 
-def _rank(value: object) -> tuple[int, float, str]:
+def _sort_key(value: object) -> tuple[int, float, str]:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return (0, math.inf if math.isnan(value) else value, "")
     return (1 if isinstance(value, str) else 2, 0, text(value).casefold())
 
 
-def _read(of: object) -> Sequence[object]:
+def _as_list(of: object) -> Sequence[object]:
     if isinstance(of, (list, tuple)):
         return of
     if of is None:
@@ -202,8 +202,8 @@ def _read(of: object) -> Sequence[object]:
     raise BehaviourError(said.format(kind=kind(of)))
 
 
-def _changed(of: object) -> list[object]:
-    items = _read(of)
+def _mutable_list(of: object) -> list[object]:
+    items = _as_list(of)
     if not isinstance(items, list):
         raise BehaviourError(_("This list can't be changed."))
     return items
@@ -235,29 +235,29 @@ def _same(one: object, other: object) -> bool:
     return one == other and isinstance(one, bool) == isinstance(other, bool)
 
 
-def _fitting(items: list[object], value: object) -> object:
+def _checked_value(items: list[object], value: object) -> object:
     if len(items) >= MOST_ITEMS:
-        raise _full()
+        raise _full_error()
     if not isinstance(value, (list, tuple)):
         return value
     room = MOST_ITEMS - _size(items, MOST_ITEMS)
     if room <= 0 or _size(value, room) > room:
-        raise _full()
-    return _own(value)
+        raise _full_error()
+    return _copied(value)
 
 
-def _own_list(items: Sequence[object]) -> list[object]:
+def _copied_list(items: Sequence[object]) -> list[object]:
     room = MOST_ITEMS - len(items)
     for one in items:
         room -= _size(one, MOST_ITEMS)
         if room < 0:
-            raise _full()
-    return [_own(one) for one in items]
+            raise _full_error()
+    return [_copied(one) for one in items]
 
 
-def _own(value: object) -> object:
+def _copied(value: object) -> object:
     if isinstance(value, (list, tuple)):
-        return [_own(each) for each in value]
+        return [_copied(each) for each in value]
     return value
 
 
@@ -272,5 +272,5 @@ def _size(value: object, enough: int) -> int:
     return found
 
 
-def _full() -> BehaviourError:
+def _full_error() -> BehaviourError:
     return BehaviourError(_("The list is full: it can have at most {most} items.").format(most=MOST_ITEMS))

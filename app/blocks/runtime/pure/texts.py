@@ -22,7 +22,7 @@ __all__ = [
 
 _NUMBER = re.compile(r"(?<![\d.,])[-−]?\d+(?:[.,]\d+)*")  # noqa: RUF001 (the sign that people read)
 _THOUSANDS = re.compile(r"[1-9]\d{0,2}(?:,\d{3})+(?:\.\d+)?")
-_MOST_DIGITS = 300
+_MAX_DIGITS = 300
 
 
 def letter(of: object, where: object) -> str:
@@ -82,7 +82,7 @@ def ends_with(of: object, piece: object) -> bool:
 
 def same_words(one: object, other: object) -> bool:
     """Return whether both texts are equal, ignoring case and surrounding spaces."""
-    return _plain(one) == _plain(other)
+    return _folded(one) == _folded(other)
 
 
 def is_empty(value: object) -> bool:
@@ -138,9 +138,9 @@ def number_in(value: object) -> int | float:
 
 
 def _written(value: object) -> int | float | None:
-    # “12”, “-3.5”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
+    # “12”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
     match = _NUMBER.search(text(value))
-    if match is None or len(match[0]) > _MOST_DIGITS:
+    if match is None or len(match[0]) > _MAX_DIGITS:
         return None
     minus, digits = match[0][0] in "-−", match[0].lstrip("-−")  # noqa: RUF001 (the sign that people read)
     if _THOUSANDS.fullmatch(digits):
@@ -150,5 +150,5 @@ def _written(value: object) -> int | float | None:
     return -found if minus else found
 
 
-def _plain(value: object) -> str:
+def _folded(value: object) -> str:
     return unicodedata.normalize("NFKC", text(value)).casefold().strip()
