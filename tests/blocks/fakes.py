@@ -64,14 +64,14 @@ class FakeLink:
     def publish(self, topic: str, payload: object) -> None:
         self.published.append((topic, payload))
 
-    def on_sensor(self, robot: str, name: str, told: Callable[[object], None]) -> None:
-        self.told.setdefault((robot, name), []).append(told)
+    def on_sensor(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
+        self.told.setdefault((robot, name), []).append(callback)
 
-    def on_event(self, robot: str, name: str, told: Callable[[object], None]) -> None:
-        self.told.setdefault((robot, name), []).append(told)
+    def on_event(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
+        self.told.setdefault((robot, name), []).append(callback)
 
-    def on_message(self, topic: str, told: Callable[[object], None]) -> None:
-        self.told.setdefault(topic, []).append(told)
+    def on_message(self, topic: str, callback: Callable[[object], None]) -> None:
+        self.told.setdefault(topic, []).append(callback)
 
     def happen(self, where: object, data: object) -> None:
         """An event, a sensor's value or a message arrives."""

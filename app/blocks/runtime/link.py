@@ -60,14 +60,14 @@ class ProgramLink(Protocol):
         """Publish a message."""
         ...
 
-    def on_sensor(self, robot: str, name: str, told: Callable[[object], None]) -> None:
-        """Call `told` with each value of a sensor."""
+    def on_sensor(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
+        """Call `callback` with each value of a sensor."""
         ...
 
-    def on_event(self, robot: str, name: str, told: Callable[[object], None]) -> None:
-        """Call `told` with the data of each such event."""
+    def on_event(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
+        """Call `callback` with the data of each such event."""
         ...
 
-    def on_message(self, topic: str, told: Callable[[object], None]) -> None:
-        """Call `told` with each message of a topic."""
+    def on_message(self, topic: str, callback: Callable[[object], None]) -> None:
+        """Call `callback` with each message of a topic."""
         ...

@@ -29,7 +29,7 @@ LOOKUP_INTERVAL_S = 0.2
 """Minimum interval of graph queries for unknown publishers."""
 MOST_UNKNOWN = 32
 
-Told = Callable[[object], None]
+Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
 
 
@@ -126,7 +126,7 @@ class Network:
         self._stops: dict[str, tuple[str, set[str]]] = {}
         self._own_stops: set[str] = set()
         self._newest: dict[str, Message] = {}
-        self._told: dict[str, list[Told]] = {}
+        self._callbacks: dict[str, list[Callback]] = {}
         self._subscribed: set[str] = set()
         self._publishers: dict[str, ProgramPublisher] = {}
         self._poke: Callable[[], None] = _do_nothing
@@ -221,18 +221,18 @@ class Network:
         self.guard.check(topic)
         self._publisher(topic).publish(payload)
 
-    def on_sensor(self, robot: str, name: str, told: Told) -> None:
-        """Call `told` with each value of a sensor."""
-        self.on_message(self._topic(robot, name), lambda payload: told(value_of(payload)))
+    def on_sensor(self, robot: str, name: str, callback: Callback) -> None:
+        """Call `callback` with each value of a sensor."""
+        self.on_message(self._topic(robot, name), lambda payload: callback(value_of(payload)))
 
-    def on_event(self, robot: str, name: str, told: Told) -> None:
-        """Call `told` with the data of each event."""
-        self.on_message(self._topic(robot, name), told)
+    def on_event(self, robot: str, name: str, callback: Callback) -> None:
+        """Call `callback` with the data of each event."""
+        self.on_message(self._topic(robot, name), callback)
 
-    def on_message(self, topic: str, told: Told) -> None:
-        """Call `told` with each message."""
+    def on_message(self, topic: str, callback: Callback) -> None:
+        """Call `callback` with each message."""
         with self._lock:
-            self._told.setdefault(topic, []).append(told)
+            self._callbacks.setdefault(topic, []).append(callback)
         self._subscribe(topic)
 
     # ---- stopping
@@ -375,10 +375,10 @@ class Network:
         if not self._is_from_robot(message):
             return
         self._newest[message.topic] = message
-        for told in self._told.get(message.topic, ()):
+        for callback in self._callbacks.get(message.topic, ()):
             payload = payload_of(message)
             if payload is not None:
-                told(payload)
+                callback(payload)
 
     def _answers(self, messages: Sequence[Message]) -> None:
         with self._answers_lock:
@@ -410,9 +410,9 @@ class Network:
             must_answer = any(node in waiting for _name, waiting in self._stops.values())
         return must_answer or any(self._is_own(robot, topic, node) for robot in self._robots.values())
 
-    def _answer(self, topic: str, told: Mapping[str, object], node: str) -> None:
+    def _answer(self, topic: str, payload: Mapping[str, object], node: str) -> None:
         # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
-        answer = told if "state" in told and "op" in told else rize.from_answer(told)
+        answer = payload if "state" in payload and "op" in payload else rize.from_answer(payload)
         if answer is None:
             return
         if answer.get("op") == "stop":
