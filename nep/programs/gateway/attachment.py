@@ -163,12 +163,12 @@ class NativeNetwork:
             if image_codec.raw_layout(message.extension.get("encoding")) is None:
                 examine(message.data)  # reject decompression bombs: original programs decode anything
                 return message.data
-            made = image_codec.encode(message.payload)
-            if image_codec.raw_layout((made.extension or {}).get("encoding")) is not None:
+            created = image_codec.encode(message.payload)
+            if image_codec.raw_layout((created.extension or {}).get("encoding")) is not None:
                 raise EncodeError("image", "picture", _("they read JPEG and PNG, which have no such numbers"))
-            return made.data
+            return created.data
         except (DecodeError, EncodeError) as error:
-            self.tell(
+            self.report(
                 f"message:{message.topic}",
                 _("Original programs get no pictures of “{topic}”: {error}").format(
                     topic=message.topic, error=error
@@ -190,7 +190,7 @@ class NativeNetwork:
         try:
             if self._node is None:
                 self._node = self._make_node()
-            made = make(self._node)
+            created = make(self._node)
         except NepError as error:
             now = time.monotonic()
             self._retry_at = {each: at for each, at in self._retry_at.items() if at > now}
@@ -198,7 +198,7 @@ class NativeNetwork:
             why, hint = str(error), ""
             if isinstance(error, BadTopicError):
                 why, hint = error.reason, _("Give the topic another name.")
-            self.tell(
+            self.report(
                 id,
                 _("“{topic}” stays among programs of the original NEP: {why}").format(topic=topic, why=why),
                 hint,
@@ -206,7 +206,7 @@ class NativeNetwork:
             return None
         self._retry_at.pop(topic, None)
         self.resolve(id)
-        return made
+        return created
 
     # ---- graph and alerts
 
@@ -214,13 +214,13 @@ class NativeNetwork:
         """Register these original programs in the graph."""
         self._registrar.show(programs)
 
-    def look(self) -> None:
+    def tick(self) -> None:
         """Send statistics to the master and report dropped messages. Call once a second."""
         self._registrar.renew()
         if self._inbox is not None and self._inbox.dropped != self._dropped:
             lost = self._inbox.dropped - self._dropped
             self._dropped = self._inbox.dropped
-            self.tell(
+            self.report(
                 "gateway:full",
                 ngettext(
                     "{count} message did not reach original programs in the last second",
@@ -231,7 +231,7 @@ class NativeNetwork:
         else:
             self.resolve("gateway:full")
 
-    def tell(self, id: str, sentence: str, hint: str = "") -> None:
+    def report(self, id: str, sentence: str, hint: str = "") -> None:
         """Report a problem as an alert; repeating it has no effect."""
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _MAX_ALERTS):

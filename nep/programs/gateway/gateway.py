@@ -16,7 +16,7 @@ from nep.programs.gateway.inbox import NativeInbox
 from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.processes import Processes
 from nep.programs.gateway.programs import OriginalProgram, ProgramTable
-from nep.programs.gateway.proxy_pair import ProxyPair, is_free, port_to_tell
+from nep.programs.gateway.proxy_pair import ProxyPair, is_free, reply_port
 from nep.programs.gateway.relay import AlertSink, NativeSide, Relay
 from nep.programs.gateway.request_server import Ports, RequestServer
 from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
@@ -42,7 +42,7 @@ class GatewayNetwork(NativeSide, AlertSink, Protocol):
     def data_of(self, message: Message) -> bytes | memoryview | None:
         """Return the bytes that original programs can decode: for images JPEG or PNG; None if impossible."""
 
-    def look(self) -> None:
+    def tick(self) -> None:
         """Called once a second."""
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
@@ -149,7 +149,7 @@ class Gateway:
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)
         if changed:
-            self._programs.look(changed)
+            self._programs.update(changed)
             self._show()
         if time.monotonic() >= self._maintain_at:
             self._maintain()
@@ -165,9 +165,9 @@ class Gateway:
 
     def _maintain(self) -> None:
         self._maintain_at = time.monotonic() + _MAINTENANCE_S
-        self._relay.look()
-        self._programs.look()
-        if self._programs.forget_the_gone():
+        self._relay.tick()
+        self._programs.update()
+        if self._programs.remove_ended():
             for line in [pair.line for pair in self._relay.pairs if not self._programs.is_used(pair.line)]:
                 self._relay.close_line(line)
             self._poller = None
@@ -177,7 +177,7 @@ class Gateway:
             self._poller = None
         if self._unserved() != self._shown_unserved:
             self._show()
-        self._outside.look()
+        self._outside.tick()
 
     def _program_names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         return self._programs.names(line, role)  # created after the relay, whose pairs it uses
@@ -187,17 +187,17 @@ class Gateway:
 
     def _show(self) -> None:
         self._shown_unserved = self._unserved()
-        self._relay.know_languages(self._programs.languages())
+        self._relay.set_languages(self._programs.languages())
         self._outside.show(self._programs.programs())
-        self._request_server.tell(self._programs.members())
+        self._request_server.publish_members(self._programs.members())
 
     def _restore(self) -> None:
         # Binds the ports of running programs again: they never ask twice.
-        self._programs.forget_the_gone()
+        self._programs.remove_ended()
         for line in {known.line for known in self._port_map.registrations if not known.line.is_service}:
             base = self._port_map.port_of(line)
             if base is not None and not self._open(line, base):
-                self._outside.tell(
+                self._outside.report(
                     f"port:{base}",
                     _("Port {first} or {second} of “{topic}” is taken by another program").format(
                         first=base, second=base + 1, topic=line.topic
@@ -219,9 +219,9 @@ class Gateway:
         self._port_map.add(registration)
         self._programs.expect(registration)
         self._save()
-        self._programs.look([line])
+        self._programs.update([line])
         self._show()
-        return port_to_tell(line, base, request.socket)
+        return reply_port(line, base, request.socket)
 
     def _port_for(self, line: TopicLine) -> int:
         known = self._port_map.port_of(line)
@@ -233,7 +233,7 @@ class Gateway:
             )
         for base in self._port_map.candidates(self._programs.is_used):
             if self._open(line, base):
-                self._port_map.give(line, base)
+                self._port_map.assign(line, base)
                 return base
         raise RequestError(_("no ports are left between 9000 and 9999"), line.topic)
 
@@ -261,7 +261,7 @@ class Gateway:
         try:
             self._port_map.save()
         except OSError as error:
-            self._outside.tell(
+            self._outside.report(
                 "gateway:file",
                 _("The list of the ports of original programs cannot be kept: {strerror}").format(
                     strerror=error.strerror

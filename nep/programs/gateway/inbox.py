@@ -59,10 +59,10 @@ class NativeInbox:
         with contextlib.suppress(BlockingIOError):
             self._reader.recv(4096)
         with self._lock:
-            taken = list(self._messages)
+            messages = list(self._messages)
             self._messages.clear()
             self._size_bytes = 0
-        return taken
+        return messages
 
     def close(self) -> None:
         """Close the two sockets."""

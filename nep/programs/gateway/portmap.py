@@ -90,11 +90,11 @@ class PortMap:
 
     def candidates(self, is_used: Callable[[TopicLine], bool]) -> Iterator[int]:
         """Yield base ports for a new line: unassigned ones first, then those of unused lines."""
-        taken = {port: line for line, port in self._ports.items()}
-        yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in taken)
-        yield from (port for port, line in taken.items() if not is_used(line))
+        assigned = {port: line for line, port in self._ports.items()}
+        yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in assigned)
+        yield from (port for port, line in assigned.items() if not is_used(line))
 
-    def give(self, line: TopicLine, port: int) -> None:
+    def assign(self, line: TopicLine, port: int) -> None:
         """Assign `port` to `line`, taking it from another line."""
         for other in [known for known, used in self._ports.items() if used == port and known != line]:
             del self._ports[other]

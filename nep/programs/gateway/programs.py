@@ -65,7 +65,7 @@ class ProgramTable:
         self._was_joined: set[Registration] = set()
         self._openings: dict[Registration, tuple[int, float]] = {}
 
-    def look(self, lines: Iterable[TopicLine] | None = None) -> None:
+    def update(self, lines: Iterable[TopicLine] | None = None) -> None:
         """Update the roles of programs on these lines (default: all)."""
         chosen = None if lines is None else set(lines)
         for registration in self._port_map.registrations:
@@ -80,17 +80,17 @@ class ProgramTable:
         self._was_joined.discard(registration)
         self._openings.pop(registration, None)
 
-    def forget_the_gone(self) -> bool:
+    def remove_ended(self) -> bool:
         """Remove programs that ended or closed their connections; return whether any was removed."""
-        gone = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
-        self._forget(gone)
-        return bool(gone)
+        ended = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
+        self._forget(ended)
+        return bool(ended)
 
-    def _forget(self, gone: set[Registration]) -> None:
-        if gone:
-            self._port_map.remove(gone)
-            self._was_joined -= gone
-            for registration in gone:
+    def _forget(self, ended: set[Registration]) -> None:
+        if ended:
+            self._port_map.remove(ended)
+            self._was_joined -= ended
+            for registration in ended:
                 self._roles.pop(registration, None)
                 self._openings.pop(registration, None)
 
@@ -205,8 +205,8 @@ class ProgramTable:
             return False
         now = self._clock()
         before, asked_at = self._openings.setdefault(registration, (pair.openings, now))
-        came = pair.openings > before and not any(pair.connections.values())
-        return came and now - asked_at >= _CONNECT_GRACE_S
+        was_joined = pair.openings > before and not any(pair.connections.values())
+        return was_joined and now - asked_at >= _CONNECT_GRACE_S
 
     def _is_gone(self, registration: Registration) -> bool:
         if registration.pid is not None and registration.started is not None:

@@ -45,7 +45,7 @@ def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
     )
 
 
-def port_to_tell(line: TopicLine, base: int, socket_name: str) -> int:
+def reply_port(line: TopicLine, base: int, socket_name: str) -> int:
     """Return the port of the reply: `many2many` programs add one themselves, others don't."""
     if line.is_service or line.mode == "many2many" or socket_name == "publisher":
         return base
@@ -95,13 +95,13 @@ class ProxyPair:
         kind: int,
         end: Endpoint,
         undo: contextlib.ExitStack,
-        largest_bytes: int,
+        max_bytes: int,
     ) -> zmq.Socket[bytes]:
         opened = context.socket(kind)
         undo.callback(opened.close, _LINGER_MS)
         opened.setsockopt(zmq.SNDHWM, self._queue)
         opened.setsockopt(zmq.RCVHWM, self._queue)
-        opened.setsockopt(zmq.MAXMSGSIZE, largest_bytes)  # larger messages disconnect the sender
+        opened.setsockopt(zmq.MAXMSGSIZE, max_bytes)  # larger messages disconnect the sender
         if end.bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
         monitor = opened.get_monitor_socket(_OPENED | _CLOSED)

@@ -37,7 +37,7 @@ class NativeSide(Protocol):
 class AlertSink(Protocol):
     """Receiver of current problems."""
 
-    def tell(self, id: str, sentence: str, hint: str = "") -> None:
+    def report(self, id: str, sentence: str, hint: str = "") -> None:
         """Report a problem; repeating it has no effect."""
 
     def resolve(self, id: str) -> None:
@@ -48,7 +48,7 @@ Key = tuple[str, str]
 """Topic and codec: lines with the same key exchange messages."""
 
 
-Who = Callable[[TopicLine, Role], Sequence[str]]
+ProgramNames = Callable[[TopicLine, Role], Sequence[str]]
 """Lookup of the names of programs that publish or subscribe on a line, as far as known."""
 
 
@@ -63,19 +63,19 @@ class _RejectedMessages:
 
 
 class Relay:
-    """Open lines. Belongs to the gateway's thread. `who` names programs in alerts."""
+    """Open lines. Belongs to the gateway's thread. `program_names` names programs in alerts."""
 
     def __init__(
         self,
         context: zmq.Context[zmq.Socket[bytes]],
         native: NativeSide,
         alerts: AlertSink,
-        who: Who = lambda _line, _role: (),
+        program_names: ProgramNames = lambda _line, _role: (),
     ) -> None:
         self._context = context
         self._native = native
         self._alerts = alerts
-        self._who = who
+        self._program_names = program_names
         self._pairs: dict[TopicLine, ProxyPair] = {}
         self._subscribed: set[Key] = set()
         self._publishing: set[Key] = set()
@@ -125,7 +125,7 @@ class Relay:
             self._relay_frame(pair, frame)
         return changed
 
-    def know_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
+    def set_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
         """Set the programming languages on each line: some need shielded frames."""
         for line, pair in self._pairs.items():
             pair.languages = languages.get(line, frozenset())
@@ -135,7 +135,7 @@ class Relay:
         for pair in self._pairs_of((topic, codec)):
             pair.deliver(data)
 
-    def look(self) -> None:
+    def tick(self) -> None:
         """Retry failed subscriptions and update alerts. Call once a second."""
         for key in {(line.topic, line.codec) for line in self._pairs}:
             self.settle(key)
@@ -176,7 +176,7 @@ class Relay:
         if pair.line.topic in self._rejected:
             self._rejected[pair.line.topic].is_resolved = True
         if pair.line.codec == "json" and lost_numbers(frame, data):
-            self._alerts.tell(
+            self._alerts.report(
                 f"nan:{pair.line.topic}",
                 _("“{topic}” has NaN or infinity; JSON has neither, and native programs get null").format(
                     topic=pair.line.topic
@@ -205,7 +205,7 @@ class Relay:
     def _report_rejected(self, topic: str, rejected: _RejectedMessages) -> None:
         rejected.reported = rejected.count
         words = ngettext("{reason}", "{reason} ({count} messages)", rejected.count)
-        self._alerts.tell(f"message:{topic}", words.format(reason=rejected.reason, count=rejected.count))
+        self._alerts.report(f"message:{topic}", words.format(reason=rejected.reason, count=rejected.count))
 
     def _check_versions(self, pair: ProxyPair) -> None:
         if pair.has_0546:
@@ -220,14 +220,14 @@ class Relay:
 
     def _report_version(self, role: Role, pair: ProxyPair, version: str) -> None:
         pair.unserved[role] = version
-        names = [f"“{name}”" for name in self._who(pair.line, role)]
+        names = [f"“{name}”" for name in self._program_names(pair.line, role)]
         if not names:
             words = _("A program on “{topic}” uses nep {version}, which no other version understands")
         elif len(names) == 1:
             words = _("{programs} on “{topic}” uses nep {version}, which no other version understands")
         else:
             words = _("One of {programs} on “{topic}” uses nep {version}, which no other version understands")
-        self._alerts.tell(
+        self._alerts.report(
             f"version:{pair.line.topic}:{role}",
             words.format(programs=", ".join(names), topic=pair.line.topic, version=version),
             _("Install nep 0.5.4.8 or 0.5.4.5 for that program."),

@@ -65,13 +65,13 @@ class RequestServer:
     def open(self) -> bool:
         """Bind the ports that are not bound yet; return whether any was bound."""
         before = len(self._request_sockets)
-        for port, who in (
+        for port, versions in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
             (self._ports.requests_b, "nep 0.5.4.8"),
         ):
             if port and port not in self._request_sockets:
                 words = _("Port {port} is taken by another program; programs of {version} cannot join")
-                bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=who))
+                bound = self._bind(zmq.ROUTER, port, words.format(port=port, version=versions))
                 if bound is not None:
                     self._request_sockets[port] = bound
         if self._ports.broadcast and self._broadcast_socket is None:
@@ -110,7 +110,7 @@ class RequestServer:
             reply = refuse(RequestError("the gateway could not carry this out; its log says why"))
         counter.send_multipart([*envelope, reply])
 
-    def tell(self, members: Iterable[Member]) -> None:
+    def publish_members(self, members: Iterable[Member]) -> None:
         """Broadcast all topics to tools of the original NEP."""
         if self._broadcast_socket is not None:
             self._broadcast_socket.send(broadcast(members))
@@ -132,7 +132,7 @@ class RequestServer:
             socket.bind(f"tcp://{LOOPBACK}:{port}")
         except zmq.ZMQError:
             socket.close(0)
-            self._alerts.tell(
+            self._alerts.report(
                 f"port:{port}",
                 taken,
                 _("Close that program: another master, or on macOS the AirPlay Receiver."),

@@ -58,10 +58,10 @@ class FakeNative:
     def show(self, programs):
         self._set(lambda: setattr(self, "programs", programs))
 
-    def look(self):
+    def tick(self):
         pass
 
-    def tell(self, id, sentence, hint=""):
+    def report(self, id, sentence, hint=""):
         self._set(lambda: self.alerts.update({id: sentence}))
 
     def resolve(self, id):

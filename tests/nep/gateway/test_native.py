@@ -131,9 +131,9 @@ def test_a_name_that_is_no_native_topic_is_an_alert_and_is_not_tried_at_once_aga
 
 
 def test_an_alert_is_reported_once_and_taken_back_when_cured(scene):
-    scene.native.tell("port:7000", "Port 7000 is taken")
+    scene.native.report("port:7000", "Port 7000 is taken")
     told = scene.alerts
-    scene.native.tell("port:7000", "Port 7000 is taken")
+    scene.native.report("port:7000", "Port 7000 is taken")
     assert scene.alerts is told
     scene.native.resolve("port:7000")
     assert scene.alerts == ()

@@ -14,8 +14,8 @@ def registration(line=JSON_A, node="n", pid=7):
 
 def test_the_map_is_the_same_after_a_restart(tmp_path):
     before = PortMap(tmp_path / "deep" / "map.json")
-    before.give(JSON_A, 9000)
-    before.give(JSON_B, 9002)
+    before.assign(JSON_A, 9000)
+    before.assign(JSON_B, 9002)
     before.add(registration())
     before.save()
     after = PortMap(tmp_path / "deep" / "map.json")
@@ -46,7 +46,7 @@ def test_asking_twice_is_one_registration_and_another_program_another():
 
 def test_after_the_computer_was_started_again_no_program_is_remembered(tmp_path):
     before = PortMap(tmp_path / "map.json", boot=1000.0)
-    before.give(JSON_A, 9000)
+    before.assign(JSON_A, 9000)
     before.add(registration())
     before.save()
     after = PortMap(tmp_path / "map.json", boot=5000.0)
@@ -57,16 +57,16 @@ def test_after_the_computer_was_started_again_no_program_is_remembered(tmp_path)
 def test_ports_are_given_from_9000_up_in_even_steps():
     known = PortMap(None)
     assert next(known.candidates(lambda line: True)) == FIRST_PORT == 9000
-    known.give(JSON_A, 9000)
+    known.assign(JSON_A, 9000)
     assert next(known.candidates(lambda line: True)) == 9002
 
 
 def test_a_line_that_nobody_uses_gives_its_port_away_only_when_all_are_given():
     known = PortMap(None)
     for number, port in enumerate(range(FIRST_PORT, LAST_PORT + 1, 2)):
-        known.give(TopicLine(f"t{number}", "bare", "json", "many2many"), port)
+        known.assign(TopicLine(f"t{number}", "bare", "json", "many2many"), port)
     assert list(known.candidates(lambda line: line.topic != "t3")) == [9006]
-    known.give(JSON_A, 9006)
+    known.assign(JSON_A, 9006)
     assert known.port_of(JSON_A) == 9006
     assert known.port_of(TopicLine("t3", "bare", "json", "many2many")) is None
     assert not list(known.candidates(lambda line: True))

@@ -30,7 +30,7 @@ class FakeProcesses:
 @pytest.fixture
 def scene():
     known, processes = PortMap(None), FakeProcesses()
-    known.give(LINE, 9000)
+    known.assign(LINE, 9000)
     pair = SimpleNamespace(
         ends=endpoints_of(LINE, 9000), connections={"publisher": 0, "subscriber": 0}, openings=0, unserved={}
     )
@@ -48,7 +48,7 @@ def register(scene, pid=7, socket="publisher", node="n", started=100.0):
 
 
 def roles(scene):
-    scene.programs.look()
+    scene.programs.update()
     return [link.role for program in scene.programs.programs() for link in program.links]
 
 
@@ -75,16 +75,16 @@ def test_where_the_system_does_not_tell_the_request_is_believed(scene):
 
 def test_a_program_is_gone_with_its_process(scene):
     register(scene)
-    assert not scene.programs.forget_the_gone()
+    assert not scene.programs.remove_ended()
     del scene.processes.running[7]
-    assert scene.programs.forget_the_gone()
+    assert scene.programs.remove_ended()
     assert not scene.programs.programs()
 
 
 def test_a_number_that_another_process_has_now_is_not_the_program(scene):
     register(scene)
     scene.processes.running[7] = 5000.0
-    assert scene.programs.forget_the_gone()
+    assert scene.programs.remove_ended()
 
 
 def test_a_program_is_gone_when_its_connections_are(scene):
@@ -92,43 +92,43 @@ def test_a_program_is_gone_when_its_connections_are(scene):
     scene.pair.connections["publisher"] = 1
     scene.processes.joined = {(7, 9000)}
     assert roles(scene) == ["publisher"]
-    assert not scene.programs.forget_the_gone()
+    assert not scene.programs.remove_ended()
     scene.processes.joined = set()
-    scene.programs.look()
-    assert scene.programs.forget_the_gone()
+    scene.programs.update()
+    assert scene.programs.remove_ended()
 
 
 def test_a_program_without_a_process_number_lives_as_long_as_its_connection(scene):
     register(scene, pid=None, started=None, socket="subscriber")
-    assert not scene.programs.forget_the_gone()
+    assert not scene.programs.remove_ended()
     scene.pair.connections["subscriber"] = 1
     assert roles(scene) == ["subscriber"]
     scene.pair.connections["subscriber"] = 0
-    scene.programs.look()
-    assert scene.programs.forget_the_gone()
+    scene.programs.update()
+    assert scene.programs.remove_ended()
 
 
 def test_a_program_that_left_before_anybody_looked_is_gone(scene):
     register(scene)
-    scene.programs.look()
+    scene.programs.update()
     scene.pair.openings = 1
     scene.now[0] = 11.0
-    scene.programs.look()
-    assert scene.programs.forget_the_gone()
+    scene.programs.update()
+    assert scene.programs.remove_ended()
 
 
 def test_a_stranger_that_comes_and_goes_ends_no_program_that_is_about_to_come(scene):
     register(scene)
-    scene.programs.look()
+    scene.programs.update()
     scene.pair.openings = 1
     scene.now[0] = 3.0
-    scene.programs.look()
-    assert not scene.programs.forget_the_gone()
+    scene.programs.update()
+    assert not scene.programs.remove_ended()
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
     scene.now[0] = 11.0
     assert roles(scene) == ["subscriber"]
-    assert not scene.programs.forget_the_gone()
+    assert not scene.programs.remove_ended()
 
 
 def test_one_program_that_publishes_and_subscribes_is_one_node_with_two_links(scene):
@@ -167,11 +167,11 @@ def test_a_version_that_cannot_be_served_is_shown_when_one_program_alone_can_be_
     scene.pair.connections["subscriber"] = 1
     scene.processes.joined = {(7, 9001)}
     scene.pair.unserved["subscriber"] = "0.5.4.6"
-    scene.programs.look()
+    scene.programs.update()
     (program,) = scene.programs.programs()
     assert program.generation == "0.5.4.6"
     assert scene.programs.names(LINE, "subscriber") == (program.name,)
     register(scene, pid=8, node="m")
     scene.processes.joined.add((8, 9001))
-    scene.programs.look()
+    scene.programs.update()
     assert {program.generation for program in scene.programs.programs()} == {"A"}
