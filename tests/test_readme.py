@@ -20,7 +20,7 @@ from tests.e2e.programs import ROOT, Program
 from tests.e2e.waiting import until
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-RUNS_UNTIL = "press Ctrl+C to stop"
+RUNS_UNTIL = "Ctrl+C ends it"
 """The comment behind a command that does not end by itself."""
 MAX_CPU_SHARE = 0.2
 

@@ -44,12 +44,12 @@ _COLUMNS = (
 )
 
 
-def _checked_lifetime(given: float | None) -> float | None:
-    if given is not None and not given > 0.0:  # rejects NaN, too
+def _checked_lifetime(lifetime_s: float | None) -> float | None:
+    if lifetime_s is not None and not lifetime_s > 0.0:  # rejects NaN, too
         raise typer.BadParameter(
-            _("{given:g} is not a valid lifetime; use a number of seconds above 0").format(given=given)
+            _("{given:g} is not a valid lifetime; use a number of seconds above 0").format(given=lifetime_s)
         )
-    return given
+    return lifetime_s
 
 
 class _DefaultRunGroup(TranslatedGroup):

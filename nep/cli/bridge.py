@@ -118,8 +118,10 @@ def bridge(
             raise typer.BadParameter(refusal)
         report = _report_for(running, notes, as_json=as_json)
         if not as_json:
-            said = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
-            say(said.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
+            template = _("{name}: forwarding between a ({a}) and b ({b}); press Ctrl+C to stop")
+            say(
+                template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network)
+            )
         _run(report, count)
 
 
@@ -172,8 +174,8 @@ def _show_configuration(configuration: BridgeConfiguration) -> None:
     for topic in configuration.topics:
         ends = f"{topic.a.name} {ways[topic.direction]} {topic.b.name}"
         write(escaped(ends) + (f"  ≤ {topic.max_rate_hz:g} /s" if topic.max_rate_hz else "") + "\n")
-    said = _("the file is valid: {name} connects {a} and {b}")
-    say(said.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
+    template = _("the file is valid: {name} connects {a} and {b}")
+    say(template.format(name=configuration.name, a=configuration.a.network, b=configuration.b.network))
 
 
 # ---- messages beside the table

@@ -123,7 +123,7 @@ def echo(
                 for message in itertools.islice(passing, count or None):
                     show(message)
             finally:
-                picked.say_missing()
+                picked.report_missing()
 
 
 def _messages(
@@ -190,12 +190,12 @@ def _receive_all(
                 missing = (each.lost or 0) - lost.get(each.topic, 0)
                 if missing > 0:
                     lost[each.topic] = each.lost or 0
-                    said = ngettext(
+                    template = ngettext(
                         "{count} message of '{topic}' was lost",
                         "{count} messages of '{topic}' were lost",
                         missing,
                     )
-                    say(said.format(count=missing, topic=each.topic))
+                    say(template.format(count=missing, topic=each.topic))
             yield from received
             waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:
@@ -297,13 +297,13 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
     try:
         payload = message.payload
     except DecodeError as error:
-        said = _("{size_bytes}, not valid {codec}: {hexadecimal} ({reason})").format(
+        text = _("{size_bytes}, not valid {codec}: {hexadecimal} ({reason})").format(
             size_bytes=size(message.size_bytes),
             codec=message.codec,
             hexadecimal=_hexadecimal(message.data),
             reason=error.reason,
         )
-        return cleaned(said)
+        return cleaned(text)
     if isinstance(payload, str):
         return cleaned(payload if whole else shortened(payload, _MAX_SHOWN_CHARACTERS))
     if isinstance(payload, bytes):
@@ -329,8 +329,8 @@ def _hexadecimal(data: bytes | memoryview) -> str:
 
 
 def _image_summary(message: Message) -> str:
-    shape, told = message.extension.get("shape"), message.extension.get("encoding", _("image"))
-    encoding = escaped(shortened(str(told), 40))
+    shape, encoding_name = message.extension.get("shape"), message.extension.get("encoding", _("image"))
+    encoding = escaped(shortened(str(encoding_name), 40))
     if (
         isinstance(shape, (list, tuple))
         and len(shape) >= 2

@@ -90,7 +90,7 @@ def _end(_signal: int, _frame: FrameType | None) -> None:
 def _ask(_signal: int, frame: FrameType | None) -> None:
     if _is_in_finalizer(frame):  # exceptions in __del__ are printed and ignored
         with suppress(RuntimeError):
-            _thread.start_new_thread(_interrupt_again, ())
+            _thread.start_new_thread(_retry_interrupt, ())
         return
     end_at_once()
     with suppress(RuntimeError):  # no more threads; not Thread, whose locks the interrupted code may hold
@@ -106,7 +106,7 @@ def _is_in_finalizer(frame: FrameType | None) -> bool:
     return False
 
 
-def _interrupt_again() -> None:
+def _retry_interrupt() -> None:
     threading.Event().wait(RETRY_S)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(

@@ -86,12 +86,12 @@ def play(
         named = _named_topics(recording, topics or (), publish_all=publish_all)
         chosen = list(recording.topics) if publish_all else named
         if not any(recording.topics[each].message_count for each in chosen):
-            said = _("nothing to play: '{file}' has no messages of these topics").format(file=file)
+            reason = _("nothing to play: '{file}' has no messages of these topics").format(file=file)
             words = damage.damage_words(recording.damage, recording.start_ns)
-            raise NepError(f"{said}; {words}" if words else said)
+            raise NepError(f"{reason}; {words}" if words else reason)
         if len(chosen) > _MAX_TOPICS:
-            said = _("'{file}' has {count} matching topics; name at most {most}")
-            raise NepError(said.format(file=file, count=len(chosen), most=_MAX_TOPICS))
+            template = _("'{file}' has {count} matching topics; name at most {most}")
+            raise NepError(template.format(file=file, count=len(chosen), most=_MAX_TOPICS))
         names = _remapped_names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
         limits = _MotionLimits(recording, names, frozenset(allow_moving or ()), armed)
@@ -111,8 +111,8 @@ def play(
             playback.choose(chosen)
             with _Sender(node, recording, chosen, limits) as sender:
                 _play(recording, playback, sender)
-                said = ngettext("published {count} message", "published {count} messages", sender.count)
-                say(said.format(count=sender.count))
+                template = ngettext("published {count} message", "published {count} messages", sender.count)
+                say(template.format(count=sender.count))
         end_with_damage(recording)
         if limits.was_named_blocked:
             raise typer.Exit(1)
@@ -150,16 +150,16 @@ class _MotionLimits:
     def filter_allowed(self, chosen: Sequence[str], named: Sequence[str]) -> list[str]:
         # Returns the topics that may be published. Raises `typer.BadParameter` if a named one is blocked.
         self._named_topics = frozenset(named)
-        kept = []
+        allowed_topics = []
         for topic in chosen:
             reason = self._block_reason(topic)
             if not reason:
-                kept.append(topic)
+                allowed_topics.append(topic)
             elif topic in self._named_topics:
                 raise typer.BadParameter(reason)
             else:
                 say(_("not published: {reason}").format(reason=reason))
-        return kept
+        return allowed_topics
 
     def allows(self, topic: str) -> bool:
         # Reports a topic that becomes blocked once on stderr.
@@ -245,8 +245,8 @@ class _Sender:
     def _publisher(self, topic: str, msg_type: str) -> Publisher:
         key = (topic, msg_type)
         if key not in self._publishers:
-            made = self._node.new_pub(topic, msg_type, latched=topic in self._latched)
-            self._publishers[key] = self._opened.enter_context(made)
+            publisher = self._node.new_pub(topic, msg_type, latched=topic in self._latched)
+            self._publishers[key] = self._opened.enter_context(publisher)
         return self._publishers[key]
 
     def send(self, messages: Sequence[Message]) -> None:

@@ -140,9 +140,9 @@ def publish(
                 _publish_lines(publisher, kind)
             else:
                 repeat(partial(publisher.publish, value), rate_hz or 1.0, count if rate_hz is not None else 1)
-            said = _("published {count} on '{topic}' ({kind}) to {people}")
+            template = _("published {count} on '{topic}' ({kind}) to {people}")
             people = _subscriber_text(publisher.subscribers)
-            say(said.format(count=publisher.count, topic=topic, kind=kind, people=people))
+            say(template.format(count=publisher.count, topic=topic, kind=kind, people=people))
             if latched:
                 say(_("keeping the message for later subscribers; press Ctrl+C to stop"))
                 _wait_for_ever()
@@ -232,11 +232,11 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
         try:
             text = data.decode()
         except UnicodeDecodeError as error:
-            said = _(
+            template = _(
                 "byte {byte} of line {line} is not valid UTF-8; convert the text to UTF-8, or use "
                 "--type bytes"
             )
-            raise NepError(said.format(byte=error.start + 1, line=number)) from error
+            raise NepError(template.format(byte=error.start + 1, line=number)) from error
         publisher.publish(encoded_of(text, msg_type, number))
 
 
@@ -281,12 +281,12 @@ def wait_for_subscribers(publisher: Publisher, count: int) -> None:
     """Block until `count` subscribers are connected."""
     if publisher.subscribers >= count:
         return
-    said = ngettext(
+    template = ngettext(
         "waiting for {count} subscriber; press Ctrl+C to stop",
         "waiting for {count} subscribers; press Ctrl+C to stop",
         count,
     )
-    say(said.format(count=count))
+    say(template.format(count=count))
     never = threading.Event()
     while publisher.subscribers < count:
         never.wait(_WAIT_SLICE_S)

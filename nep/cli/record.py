@@ -108,8 +108,8 @@ def record(
             with recorder.Recorder(node, file, selection):
                 interrupts.call_first(ended.set)
                 if not as_json:
-                    said = _("recording to '{path}'; press Ctrl+C to stop")
-                    say(said.format(path=path if parts is None else parts.paths[0]))
+                    template = _("recording to '{path}'; press Ctrl+C to stop")
+                    say(template.format(path=path if parts is None else parts.paths[0]))
                 _wait(ended, file, duration_s, None if split else max_bytes)
         finally:
             status = file.close()
@@ -134,10 +134,10 @@ def _show_result(paths: Sequence[Path], status: writer.RecordingStatus, *, as_js
         return
     _show_summary(paths[0], status)
     if len(paths) > 1:
-        said = ngettext(
+        template = ngettext(
             "in {count} file, the last is '{path}'", "in {count} files, the last is '{path}'", len(paths)
         )
-        say(said.format(count=len(paths), path=paths[-1]))
+        say(template.format(count=len(paths), path=paths[-1]))
 
 
 def _max_bytes(text: str | None, *, split: bool) -> int | None:
@@ -194,13 +194,13 @@ def _line(status: writer.RecordingStatus) -> str:
 
 def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
     topics = ngettext("{count} topic", "{count} topics", len(status.topics))
-    said = ngettext(
+    template = ngettext(
         "{count} message of {topics} in {time}, {size}: '{path}'",
         "{count} messages of {topics} in {time}, {size}: '{path}'",
         status.message_count,
     )
     say(
-        said.format(
+        template.format(
             count=status.message_count,
             topics=topics.format(count=len(status.topics)),
             time=clock_text(status.duration_s),
@@ -211,9 +211,9 @@ def _show_summary(path: Path, status: writer.RecordingStatus) -> None:
     for topic, each in sorted(status.topics.items()):
         missing = (each.lost or 0) + each.unkept
         if missing:
-            said = ngettext(
+            template = ngettext(
                 "'{topic}' lacks {count} message: {lost} lost, {unkept} write errors",
                 "'{topic}' lacks {count} messages: {lost} lost, {unkept} write errors",
                 missing,
             )
-            say(said.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))
+            say(template.format(count=missing, topic=topic, lost=each.lost or 0, unkept=each.unkept))

@@ -70,11 +70,11 @@ def info(
                 words = _("only the first gigabyte was checked for damage; --check reads all of it")
                 say(words)
         if not recording.is_complete:
-            said = _(
+            template = _(
                 "the file is incomplete: it was truncated or not closed. Readable messages are "
                 "shown; to repair it: nep recording repair {file}"
             )
-            say(said.format(file=file))
+            say(template.format(file=file))
         end_with_damage(recording)
 
 
@@ -96,12 +96,12 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
     show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])
     left_out = len(recording.topics) - len(topics)
     if left_out:
-        said = ngettext(
+        template = ngettext(
             "and {count} more topic, which --json lists",
             "and {count} more topics, which --json lists",
             left_out,
         )
-        write(f"{said.format(count=left_out)}\n")
+        write(f"{template.format(count=left_out)}\n")
     if recording.facts.attachments:
         rows = [
             (quotable(each.name), quotable(each.media_type), size(each.size_bytes))
@@ -118,8 +118,8 @@ def _written_by(facts: file_reader.FileFacts) -> str:
         if name == "-":
             kinds.append(_("messages outside of chunks"))
         else:
-            said = ngettext("{count} chunk {compression}", "{count} chunks {compression}", count)
-            kinds.append(said.format(count=count, compression=name or _("uncompressed")))
+            template = ngettext("{count} chunk {compression}", "{count} chunks {compression}", count)
+            kinds.append(template.format(count=count, compression=name or _("uncompressed")))
     parts = [quotable(facts.library) or UNKNOWN]
     if facts.profile:
         parts.append(_("profile {profile}").format(profile=quotable(facts.profile)))
@@ -136,12 +136,12 @@ def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
         yield _("metadata {name}: {values}").format(name=quotable(name), values="; ".join(pairs) + more)
     if len(shown) > _MAX_VALUES:
         count = len(shown) - _MAX_VALUES
-        said = ngettext(
+        template = ngettext(
             "and {count} more metadata record, which --json lists",
             "and {count} more metadata records, which --json lists",
             count,
         )
-        yield said.format(count=count)
+        yield template.format(count=count)
 
 
 def _day_text(at_ns: int) -> str:

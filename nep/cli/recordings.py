@@ -81,18 +81,18 @@ def repair(
             }
         )
         return
-    said = ngettext(
+    template = ngettext(
         "recovered and verified {count} message, {time}: '{path}'",
         "recovered and verified {count} messages, {time}: '{path}'",
         report.recovered,
     )
-    say(said.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path))
+    say(template.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path))
     if not report.is_whole:
-        gone = UNKNOWN if report.discarded is None else str(report.discarded)
+        lost_count = UNKNOWN if report.discarded is None else str(report.discarded)
         words = _("lost: {messages} messages, {size}, the last {seconds} s")
         say(
             words.format(
-                messages=gone, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
+                messages=lost_count, size=size(report.discarded_bytes), seconds=number(report.lost_s, ".1f")
             )
         )
 
@@ -157,16 +157,16 @@ def export(
             ]
         )
     else:
-        _say_exported(exported)
+        _show_exported(exported)
     if words:
         say(words)
         raise typer.Exit(1)
 
 
-def _say_exported(exported: Sequence[exports.Exported]) -> None:
+def _show_exported(exported: Sequence[exports.Exported]) -> None:
     for each in exported:
-        said = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
-        say(said.format(count=each.count, path=each.path))
+        template = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
+        say(template.format(count=each.count, path=each.path))
         if each.unreadable:
             words = ngettext(
                 "skipped {count} undecodable message",

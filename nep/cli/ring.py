@@ -68,9 +68,9 @@ class _Saver:
             raise NepError(_("{given:g} is not a valid duration; use seconds above 0").format(given=wanted))
         with self._lock:
             kept = self._ring.keep(self._free_path(), min(wanted, self._seconds), note)
-        told: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
+        result: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
         if self._as_json:
-            show_json(told)
+            show_json(result)
         else:
             words = ngettext(
                 "saved {count} message of the last {time}: '{path}'",
@@ -79,7 +79,7 @@ class _Saver:
             )
             time = clock_text(kept.duration_s)
             say(words.format(count=kept.message_count, time=time, path=kept.path))
-        return told
+        return result
 
     def _free_path(self) -> Path:
         stem = datetime.now().astimezone().strftime("kept-%Y-%m-%d-%H-%M-%S")
@@ -122,8 +122,8 @@ def ring(
     """
     for given, least, most, hint in ((seconds, 0.1, 1e6, "--seconds"), (size_gb, 0.001, 1e6, "--size")):
         if not least <= given <= most:
-            said = _("{given:g} is out of range; use {least:g} to {most:g}")
-            raise typer.BadParameter(said.format(given=given, least=least, most=most), param_hint=hint)
+            template = _("{given:g} is out of range; use {least:g} to {most:g}")
+            raise typer.BadParameter(template.format(given=given, least=least, most=most), param_hint=hint)
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     commands: queue.SimpleQueue[str] = queue.SimpleQueue()
     with node_for("ring", master) as node:
@@ -143,10 +143,10 @@ def ring(
                 interrupts.call_first(lambda: commands.put(_STOP))
                 _save_on_signal(commands)
                 if not as_json:
-                    said = _(
+                    template = _(
                         "buffering the last {seconds:g} s; 'nep recording keep' saves them, Ctrl+C stops"
                     )
-                    say(said.format(seconds=seconds))
+                    say(template.format(seconds=seconds))
                 _run_commands(commands, keeper, kept)
             problem = kept.status.problem
         with suppress(OSError):  # another flight recorder uses the same folder
@@ -220,8 +220,8 @@ def keep(
         if not has_ring(node.graph(), f"{name}/keep"):
             raise NepError(_("nothing to save: 'nep recording ring' is not running"))
         answer = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
-    told = answer if isinstance(answer, dict) else {}
+    result = answer if isinstance(answer, dict) else {}
     if as_json:
-        show_json(told)
+        show_json(result)
     else:
-        say(_("saved to '{path}'").format(path=told.get("path", "")))
+        say(_("saved to '{path}'").format(path=result.get("path", "")))

@@ -45,8 +45,8 @@ class TextColumn:
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
     """Return a console for coloured text, on `out` if given. Rich is imported on the first call."""
-    made = _console_class()
-    return made(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
+    console_type = _console_class()
+    return console_type(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
 
 
 @cache
@@ -163,9 +163,9 @@ def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: 
         max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
         for at, column in enumerate(columns)
     ]
-    kept = [column.is_whole or column.justify == "right" for column in columns]
+    is_fixed = [column.is_whole or column.justify == "right" for column in columns]
     while _total(widths) > room:
-        giving = [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not kept[at]]
+        giving = [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not is_fixed[at]]
         giving = giving or [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
         if not giving:
             break

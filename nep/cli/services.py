@@ -136,10 +136,10 @@ def find(
         write("".join(f"{escaped(name)}\n" for name in names))
     else:
         types = sorted({each.msg_type for each in graph.services.values()})
-        said = _(
+        template = _(
             "no service has the type '{msg_type}'; {meant}'nep service type NAME' shows a service's type"
         )
-        say(said.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
+        say(template.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
 
 
 @app.command("call")
@@ -191,8 +191,8 @@ def _found(service: str, graph: GraphView) -> ServiceInfo:
     found = graph.services.get(service)
     if found is None:
         check_service(service)
-        said = _("no service '{service}'; {meant}'nep service list' shows all services")
-        raise NepError(said.format(service=service, meant=meant(service, list(graph.services))))
+        template = _("no service '{service}'; {meant}'nep service list' shows all services")
+        raise NepError(template.format(service=service, meant=meant(service, list(graph.services))))
     return found
 
 

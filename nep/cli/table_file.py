@@ -58,7 +58,7 @@ class Fields:
         """Return values from `of` by name, without the missing ones."""
         return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
 
-    def say_missing(self) -> None:
+    def report_missing(self) -> None:
         """Print counts of missing fields and undecodable messages to stderr."""
         for name in self.names:
             if self.missing[name]:
@@ -68,12 +68,12 @@ class Fields:
                     )
                 )
         if self.unreadable:
-            said = ngettext(
+            template = ngettext(
                 "skipped {count} undecodable message",
                 "skipped {count} undecodable messages",
                 self.unreadable,
             )
-            say(said.format(count=self.unreadable))
+            say(template.format(count=self.unreadable))
 
 
 class Table:

@@ -112,18 +112,20 @@ def find(
         write("".join(f"{escaped(name)}\n" for name in names))
     else:
         types = sorted({each.msg_type for each in graph.topics.values()})
-        said = _("no topic has the type '{msg_type}'; {meant}'nep topic list' shows all types")
-        say(said.format(msg_type=msg_type, meant=meant(msg_type, types)))
+        template = _("no topic has the type '{msg_type}'; {meant}'nep topic list' shows all types")
+        say(template.format(msg_type=msg_type, meant=meant(msg_type, types)))
 
 
 def _found(topic: str, graph: GraphView) -> TopicInfo:
     found = graph.topics.get(check_topic(topic))
     if found is None and topic in graph.patterns:
-        said = _("'{topic}' is a pattern, not a topic; 'nep node list' shows the nodes that subscribe to it")
-        raise NepError(said.format(topic=topic))
+        template = _(
+            "'{topic}' is a pattern, not a topic; 'nep node list' shows the nodes that subscribe to it"
+        )
+        raise NepError(template.format(topic=topic))
     if found is None:
-        said = _("no topic '{topic}'; {meant}'nep topic list' shows all topics")
-        raise NepError(said.format(topic=topic, meant=meant(topic, list(graph.topics))))
+        template = _("no topic '{topic}'; {meant}'nep topic list' shows all topics")
+        raise NepError(template.format(topic=topic, meant=meant(topic, list(graph.topics))))
     return found
 
 

@@ -46,8 +46,8 @@ class TopicPatterns:
             if pattern not in self._reported:
                 self._reported.add(pattern)
                 if not any(matches(pattern, name) for name in published):
-                    said = _("no topic matches '{pattern}' yet; waiting (Ctrl+C to stop)")
-                    say(said.format(pattern=pattern))
+                    template = _("no topic matches '{pattern}' yet; waiting (Ctrl+C to stop)")
+                    say(template.format(pattern=pattern))
         found = [
             (name, published[name].msg_type)
             for name in sorted(published.keys() - self._known)

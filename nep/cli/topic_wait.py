@@ -52,12 +52,14 @@ class TopicWait:
                 self._silent.discard(topic)
             elif topic not in self._silent:
                 self._silent.add(topic)
-                others = [name for name, other in graph.topics.items() if name != topic and other.publishers]
+                other_topics = [
+                    name for name, other in graph.topics.items() if name != topic and other.publishers
+                ]
                 if topic in self._published_before:
-                    said = _("'{topic}' has no publisher any more; {meant}waiting (Ctrl+C to stop)")
+                    template = _("'{topic}' has no publisher any more; {meant}waiting (Ctrl+C to stop)")
                 else:
-                    said = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
-                say(said.format(topic=topic, meant=meant(topic, others)))
+                    template = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
+                say(template.format(topic=topic, meant=meant(topic, other_topics)))
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def mark_received(self, topics: Collection[str]) -> None:

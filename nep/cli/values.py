@@ -79,12 +79,12 @@ def ids_as_text(value: object) -> object:
 
 def presented(value: object, *, whole: bool, indent: bool = False) -> str:
     """Format a payload for people: JSON with NaN; long values are shortened unless `whole`."""
-    most = (
+    limits = (
         (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
         if whole
         else (MAX_ITEMS, MAX_FIELDS, MAX_CHARACTERS, MAX_DEPTH)
     )
-    return json_of(_presented(value, *most), indent=indent).decode()
+    return json_of(_presented(value, *limits), indent=indent).decode()
 
 
 def _presented(value: object, items: float, fields: float, letters: float, depth: float) -> object:

@@ -91,7 +91,7 @@ def watch(
         opened.callback(watching.close)
         watching.check_sends()
         if not as_json:
-            watching.say_begin()
+            watching.show_rules()
         watching.run(count)
 
 
@@ -107,8 +107,8 @@ class _EventLines:
     def event(self, event: AlarmEvent) -> None:
         what = escaped(what_words(event.rule.condition, event.seen))
         if event.kind == "off":
-            said = _("resolved after {seconds:.1f} s: {what}")
-            what = said.format(seconds=event.lasted_s, what=what)
+            template = _("resolved after {seconds:.1f} s: {what}")
+            what = template.format(seconds=event.lasted_s, what=what)
             if event.count > 1:
                 what += " " + _("(occurred {count} times)").format(count=event.count)
         elif event.is_snoozed:
@@ -193,7 +193,7 @@ class _AlarmRunner:
             if refusal:
                 raise typer.BadParameter(refusal)
 
-    def say_begin(self) -> None:
+    def show_rules(self) -> None:
         rules = [rule for rule in self.alarms.rules if rule.is_on]
         for rule in rules:
             say(rule_words(rule))
@@ -204,19 +204,19 @@ class _AlarmRunner:
             if action.kind in _STUDIO_ACTIONS
         )
         if studios:
-            said = _("these actions need Studio and are skipped: {actions}")
-            say(said.format(actions=", ".join(studios)))
+            template = _("these actions need Studio and are skipped: {actions}")
+            say(template.format(actions=", ".join(studios)))
         say(_("watching; press Ctrl+C to stop"))
 
     def run(self, count: int) -> None:
-        came = 0
+        alarm_count = 0
         while True:
             self._poll_graph()
             for event in self.alarms.tick():
                 self._out.event(event)
-                came += event.kind == "on"
+                alarm_count += event.kind == "on"
             self._show_actions()
-            if count and came >= count and not self.alarms.is_busy:
+            if count and alarm_count >= count and not self.alarms.is_busy:
                 return
             # in slices: Ctrl+C does not interrupt a wait on Windows
             self.alarms.evaluator.came.wait(_EVENT_WAIT_S)
@@ -308,8 +308,8 @@ class _AlarmRunner:
         done(True, "")
 
     def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        said = _("this action needs Studio: {action}")
-        done(False, said.format(action=action_words(action)))
+        template = _("this action needs Studio: {action}")
+        done(False, template.format(action=action_words(action)))
 
     def _show_actions(self) -> None:
         for rule, words, at_s in self.alarms.take_deeds():
@@ -322,8 +322,8 @@ def _report_saved(ended: Future[object], done: Done) -> None:
     if error is not None or ended.cancelled():
         done(False, _("nothing saved: {reason}").format(reason=error or ""))
     else:
-        told = ended.result()
-        path = told.get("path") if isinstance(told, dict) else ""
+        result = ended.result()
+        path = result.get("path") if isinstance(result, dict) else ""
         done(True, _("saved {file}").format(file=path))
 
 

@@ -55,8 +55,8 @@ class AlarmCommands:
         except NepError as error:
             done(False, str(error))
             return
-        said = _("sent to {topic}") if has_subscribers else _("nobody hears {topic}")
-        done(has_subscribers, said.format(topic=action.name))
+        template = _("sent to {topic}") if has_subscribers else _("nobody hears {topic}")
+        done(has_subscribers, template.format(topic=action.name))
 
     def close(self) -> None:
         """Drop cached clients and publishers; their node closes them."""
@@ -94,8 +94,8 @@ def _reply_handler(service: str, done: Done) -> Callable[[Future[object]], None]
         if isinstance(error, NoServerError):
             done(False, _("nobody serves {service}").format(service=service))
         elif isinstance(error, WaitTimeoutError):
-            said = _("{service} did not answer within {seconds} s")
-            done(False, said.format(service=service, seconds=number(CALL_S)))
+            template = _("{service} did not answer within {seconds} s")
+            done(False, template.format(service=service, seconds=number(CALL_S)))
         elif error is not None or ended.cancelled():
             done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
         else:

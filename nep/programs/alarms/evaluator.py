@@ -158,38 +158,40 @@ class AlarmEvaluator:
             self._update_topics()
 
     def _update_topics(self) -> None:
-        heard, self._subscribed = self._subscribed, {}
+        subscription, self._subscribed = self._subscribed, {}
         losses, self._losses = self._losses, {}
         for track in self._tracks.values():
             condition = track.rule.condition
             if condition.hears:
                 topic = self._subscribed.get(condition.name)
                 if topic is None:
-                    topic = self._subscribed[condition.name] = heard.get(condition.name) or _SubscribedTopic()
+                    topic = self._subscribed[condition.name] = (
+                        subscription.get(condition.name) or _SubscribedTopic()
+                    )
                     topic.readers = []
                 if condition.is_about_value:
                     topic.readers.append(track)
             elif condition.kind == "loses":
-                kept = losses.get(condition.name) or TopicLosses()
-                self._losses[condition.name] = kept
+                topic_losses = losses.get(condition.name) or TopicLosses()
+                self._losses[condition.name] = topic_losses
 
     # ---- inputs
 
     def take(self, topic: str, messages: Sequence[Message]) -> None:
         """Process messages of a topic, oldest first. Does nothing for topics without a rule."""
-        heard = self._subscribed.get(topic)
-        if heard is None or not messages:
+        subscription = self._subscribed.get(topic)
+        if subscription is None or not messages:
             return
-        payloads, unreadable, skipped = _payloads(messages) if heard.readers else ([], False, 0)
+        payloads, unreadable, skipped = _payloads(messages) if subscription.readers else ([], False, 0)
         now, is_news = self._clock(), False
         with self._lock:
-            heard.last = now
-            heard.count += len(messages)
-            heard.unreadable = unreadable
+            subscription.last = now
+            subscription.count += len(messages)
+            subscription.unreadable = unreadable
             self.skipped += skipped
-            if heard.there_since is None:
-                heard.there_since = now
-            for track in heard.readers:
+            if subscription.there_since is None:
+                subscription.there_since = now
+            for track in subscription.readers:
                 for payload in payloads:
                     turn = track.read(payload, now)
                     if turn is not None:
@@ -209,16 +211,16 @@ class AlarmEvaluator:
                 self._epoch, self._epoch_at = view.epoch, now
             nodes = frozenset(node.name for node in view.nodes.values())
             topics = frozenset(name for name, info in view.topics.items() if info.publishers)
-            came_nodes, came_topics = nodes - self._nodes, topics - self._topics
+            new_nodes, new_topics = nodes - self._nodes, topics - self._topics
             is_settled = before is not None and now - self._epoch_at >= MASTER_GRACE_S
             self._nodes, self._topics = nodes, topics
-            for name, heard in self._subscribed.items():
-                if heard.there_since is None and name in topics:
-                    heard.there_since = now
+            for name, subscription in self._subscribed.items():
+                if subscription.there_since is None and name in topics:
+                    subscription.there_since = now
             for name, losses in self._losses.items():
                 losses.add(view.topics.get(name), now)
             for track in self._tracks.values():
-                self._evaluate_graph(track, came_nodes, came_topics, now, is_settled=is_settled)
+                self._evaluate_graph(track, new_nodes, new_topics, now, is_settled=is_settled)
 
     def _evaluate_graph(
         self,
@@ -258,9 +260,9 @@ class AlarmEvaluator:
             self.came.clear()
             if now - self._sampled_at >= _SAMPLE_PERIOD_S:
                 self._sampled_at = now
-                for heard in self._subscribed.values():
-                    if heard.there_since is not None:
-                        heard.samples.append((now, heard.count))
+                for subscription in self._subscribed.values():
+                    if subscription.there_since is not None:
+                        subscription.samples.append((now, subscription.count))
             for track in self._tracks.values():
                 turn = self._evaluate_time(track, now)
                 if turn is not None:
@@ -277,12 +279,12 @@ class AlarmEvaluator:
 
     def _evaluate_time(self, track: AlarmTrack, now: float) -> Turn | None:
         condition = track.rule.condition
-        heard = self._subscribed.get(condition.name) if condition.hears else None
-        if condition.kind == "silent" and heard is not None and heard.there_since is not None:
-            silent_s = now - max(heard.there_since, heard.last or heard.there_since)
+        subscription = self._subscribed.get(condition.name) if condition.hears else None
+        if condition.kind == "silent" and subscription is not None and subscription.there_since is not None:
+            silent_s = now - max(subscription.there_since, subscription.last or subscription.there_since)
             return track.observe(silent_s >= condition.for_s, silent_s, now)
-        if condition.kind in {"rate_below", "rate_above"} and heard is not None:
-            rate_hz = heard.rate_hz(_window_s(condition.number), now)
+        if condition.kind in {"rate_below", "rate_above"} and subscription is not None:
+            rate_hz = subscription.rate_hz(_window_s(condition.number), now)
             if rate_hz is not None:
                 return track.compare(rate_hz, now, is_below=condition.kind == "rate_below")
         elif condition.kind == "loses" and self._view is not None:
@@ -316,11 +318,13 @@ class AlarmEvaluator:
             if track is None:  # validate again only if the rule is not evaluated
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
-            heard = self._subscribed.get(condition.name) if condition.hears else None
-            was_seen = track.was_seen or (heard is not None and heard.there_since is not None)
+            subscription = self._subscribed.get(condition.name) if condition.hears else None
+            was_seen = track.was_seen or (subscription is not None and subscription.there_since is not None)
             if condition.is_about_value:
-                was_seen = heard is not None and heard.last is not None
-            trouble = track.trouble or ("unreadable" if heard is not None and heard.unreadable else "")
+                was_seen = subscription is not None and subscription.last is not None
+            trouble = track.trouble or (
+                "unreadable" if subscription is not None and subscription.unreadable else ""
+            )
             if track.on_since is not None:
                 return AlarmState("on", track.seen, now - track.on_since, track.count, trouble)
             phase: AlarmPhase = "pending" if track.is_pending else "well" if was_seen else "waits"

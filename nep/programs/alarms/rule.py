@@ -156,10 +156,10 @@ class RuleProblem(NamedTuple):
 class _Check:
     found: list[RuleProblem] = field(default_factory=list)
 
-    def number(self, key: str, value: object, least: float, most: float) -> None:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-            said = _("it must be a number from {least:g} to {most:g}")
-            self.found.append(RuleProblem(key, said.format(least=least, most=most)))
+    def number(self, key: str, value: object, minimum: float, maximum: float) -> None:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not minimum <= value <= maximum:
+            template = _("it must be a number from {least:g} to {most:g}")
+            self.found.append(RuleProblem(key, template.format(least=minimum, most=maximum)))
 
     def named(self, key: str, check: object, name: str) -> None:
         try:
@@ -189,8 +189,8 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
     _check_condition(rule.condition, check)
     check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
-        said = _("it has more than {most} actions; make two alarms of it")
-        check.found.append(RuleProblem("do", said.format(most=MAX_ACTIONS)))
+        template = _("it has more than {most} actions; make two alarms of it")
+        check.found.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
     for action in rule.actions:
         _check_action(action, check)
     return check.found[0] if check.found else None
@@ -198,18 +198,18 @@ def problem_of(rule: AlarmRule) -> RuleProblem | None:
 
 def _check_condition(condition: AlarmCondition, check: _Check) -> None:
     if not condition.name:
-        key, said = (
+        key, template = (
             ("node", _("no node is named")) if condition.is_about_node else ("topic", _("no topic is named"))
         )
-        check.found.append(RuleProblem(key, said))
+        check.found.append(RuleProblem(key, template))
         return
     if condition.is_about_node:
         check.named("node", check_node_name, condition.name)
     else:
         check.named("topic", check_topic, condition.name)
         if is_pattern(condition.name) and condition.kind != "appears":
-            said = _("it has wildcards, and only 'appears' may have them; name one topic")
-            check.found.append(RuleProblem("topic", said))
+            template = _("it has wildcards, and only 'appears' may have them; name one topic")
+            check.found.append(RuleProblem("topic", template))
     if condition.is_about_value:
         check.named("value", parse_path, condition.path)
     _check_limit(condition, check)

@@ -111,9 +111,9 @@ def read_alarms(path: Path) -> AlarmFile:
             data = file.read(_MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # NUL in a file name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
-        said = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
+        template = _("'{path}' cannot be read: {reason}; 'nep watch --example' shows what a file looks like")
         raise NepError(
-            said.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
+            template.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
         ) from error
     return read_text(data, str(path))
 
@@ -131,20 +131,20 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     """
     path = escaped(path)
     if len(data) > _MAX_BYTES:
-        said = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
-        raise NepError(said.format(path=path, most=_MAX_BYTES))
+        template = _("'{path}' is larger than {most} bytes, so it is no file of alarms; give another")
+        raise NepError(template.format(path=path, most=_MAX_BYTES))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        said = _("line {line} of '{path}' is no UTF-8; save it as UTF-8")
-        raise NepError(said.format(line=line, path=path)) from error
+        template = _("line {line} of '{path}' is no UTF-8; save it as UTF-8")
+        raise NepError(template.format(line=line, path=path)) from error
     fault = find_json_fault(text, allow_nan=True)
     if fault is not None:
-        said = _(
+        template = _(
             "'{path}' is not valid JSON: line {line}, column {column}: {reason}; see 'nep watch --example'"
         )
-        raise NepError(said.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
+        raise NepError(template.format(path=path, line=fault.line, column=fault.column, reason=fault.reason))
     return _Reader(path, text, lenient=lenient).file(json.loads(text))
 
 
@@ -210,13 +210,13 @@ class _Reader:
 
     def file(self, value: object) -> AlarmFile:
         try:
-            value_ = self._root(value)
+            alarms = self._root(value)
         except _InvalidAlarm as wrong:
             raise NepError(str(wrong)) from None
         rules: list[AlarmRule] = []
         problems: list[str] = []
         ids: set[str] = set()
-        for index, each in enumerate(value_):
+        for index, each in enumerate(alarms):
             try:
                 rule = self._rule(each, index)
                 if rule.id in ids:
@@ -237,35 +237,37 @@ class _Reader:
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
             self._fail("format", _("it must be {format}").format(format=FORMAT))
         if version > FORMAT:
-            said = _("'{path}' is of a newer version of nep (format {found}, known is {format}); update nep")
-            raise NewerAlarmsError(said.format(path=self._path, found=version, format=FORMAT))
+            template = _(
+                "'{path}' is of a newer version of nep (format {found}, known is {format}); update nep"
+            )
+            raise NewerAlarmsError(template.format(path=self._path, found=version, format=FORMAT))
         self._check_keys(value, _ROOT_KEYS, None)
-        value_ = value.get("alarms")
-        if not isinstance(value_, list):
+        alarms = value.get("alarms")
+        if not isinstance(alarms, list):
             self._fail("alarms", _('no alarms are in it; write "alarms": [...]'))
-        if len(value_) > MOST_ALARMS:
+        if len(alarms) > MOST_ALARMS:
             self._fail("alarms", _("there are more than {most} alarms").format(most=MOST_ALARMS))
-        return value_
+        return alarms
 
     def _history(self, value: object) -> AlarmHistory:
-        value_ = value.get("history") if isinstance(value, dict) else None
-        found = [record_from(each) for each in value_] if isinstance(value_, list) else []
+        records = value.get("history") if isinstance(value, dict) else None
+        found = [record_from(each) for each in records] if isinstance(records, list) else []
         return AlarmHistory([record for record in found if record is not None])
 
-    def _rule(self, value_: object, index: int) -> AlarmRule:
-        if not isinstance(value_, dict):
+    def _rule(self, entry: object, index: int) -> AlarmRule:
+        if not isinstance(entry, dict):
             self._fail("", _('it is no alarm; write {"when": {...}, "do": [...]}'), index)
-        self._check_keys(value_, _RULE_KEYS, index)
-        when = value_.get("when")
+        self._check_keys(entry, _RULE_KEYS, index)
+        when = entry.get("when")
         if not isinstance(when, dict):
             self._fail("when", _('it does not say when; write "when": {"topic": ..., "is": ...}'), index)
-        do = value_.get("do", [])
+        do = entry.get("do", [])
         if not isinstance(do, list):
             self._fail("do", _("it must be a list of what is done"), index)
-        is_on = value_.get("on", True)
+        is_on = entry.get("on", True)
         if not isinstance(is_on, bool):
             self._fail("on", _("it must be true or false"), index)
-        rule_id = value_.get("id") or new_id()
+        rule_id = entry.get("id") or new_id()
         if not isinstance(rule_id, str) or len(rule_id) > 64:
             self._fail("id", _("it must be a short text"), index)
         rule = AlarmRule(
@@ -273,8 +275,8 @@ class _Reader:
             self._condition(when, index),
             tuple(self._action(each, index) for each in do),
             is_on,
-            self._number(value_, "calm_s", CALM_S, index),
-            min(self._number(value_, "snoozed_until_s", 0.0, index), _MAX_TIME_S),
+            self._number(entry, "calm_s", CALM_S, index),
+            min(self._number(entry, "snoozed_until_s", 0.0, index), _MAX_TIME_S),
         )
         problem = problem_of(rule)
         if problem is not None:
@@ -287,14 +289,14 @@ class _Reader:
         if not isinstance(kind, str) or kind not in KINDS:
             if kind is None:
                 self._fail("when", _('it does not say what; write "is": "silent"'), index)
-            said = _("there is no '{kind}'; {did_you_mean}")
-            value_ = quotable(str(kind))
-            self._fail("is", said.format(kind=value_, did_you_mean=did_you_mean(value_, KINDS)), index)
+            template = _("there is no '{kind}'; {did_you_mean}")
+            shown = quotable(str(kind))
+            self._fail("is", template.format(kind=shown, did_you_mean=did_you_mean(shown, KINDS)), index)
         subject = "node" if kind in NODE_KINDS else "topic"
         other = "topic" if kind in NODE_KINDS else "node"
         if other in when:
-            said = _("'{kind}' is about a {subject}; write \"{subject}\": ...")
-            self._fail(other, said.format(kind=kind, subject=subject), index)
+            template = _("'{kind}' is about a {subject}; write \"{subject}\": ...")
+            self._fail(other, template.format(kind=kind, subject=subject), index)
         name, path = when.get(subject, ""), when.get("value", "")
         if not isinstance(name, str) or not isinstance(path, str):
             self._fail(subject if not isinstance(name, str) else "value", _("it must be a text"), index)
@@ -311,25 +313,29 @@ class _Reader:
             self._number(when, "margin", 0.0, index),
         )
 
-    def _action(self, value_: object, index: int) -> AlarmAction:
-        if isinstance(value_, str):
-            if value_ not in _SIMPLE_ACTIONS:
+    def _action(self, entry: object, index: int) -> AlarmAction:
+        if isinstance(entry, str):
+            if entry not in _SIMPLE_ACTIONS:
                 known = [*_SIMPLE_ACTIONS, *(kind for kind in ACTION_KINDS if kind not in _SIMPLE_ACTIONS)]
-                said = _("there is no action '{kind}'; {did_you_mean}")
-                shown = quotable(value_)
-                self._fail("do", said.format(kind=shown, did_you_mean=did_you_mean(shown, known)), index)
-            return AlarmAction(value_)
-        kind = next((key for key in _ACTION_KEYS if isinstance(value_, dict) and key in value_), None)
-        if not isinstance(value_, dict) or kind is None:
-            said = _('an action is {simple}, or {{"call": "name", "with": {{}}}}, "send", "run" or "keep_s"')
-            self._fail("do", said.format(simple=", ".join(f'"{each}"' for each in _SIMPLE_ACTIONS)), index)
-        self._check_keys(value_, (kind, *_ACTION_KEYS[kind]), index)
+                template = _("there is no action '{kind}'; {did_you_mean}")
+                shown = quotable(entry)
+                self._fail("do", template.format(kind=shown, did_you_mean=did_you_mean(shown, known)), index)
+            return AlarmAction(entry)
+        kind = next((key for key in _ACTION_KEYS if isinstance(entry, dict) and key in entry), None)
+        if not isinstance(entry, dict) or kind is None:
+            template = _(
+                'an action is {simple}, or {{"call": "name", "with": {{}}}}, "send", "run" or "keep_s"'
+            )
+            self._fail(
+                "do", template.format(simple=", ".join(f'"{each}"' for each in _SIMPLE_ACTIONS)), index
+            )
+        self._check_keys(entry, (kind, *_ACTION_KEYS[kind]), index)
         if kind == "keep_s":
-            return AlarmAction("keep", seconds=self._number(value_, "keep_s", 60.0, index))
-        name, msg_type = value_[kind], value_.get("type", "json")
+            return AlarmAction("keep", seconds=self._number(entry, "keep_s", 60.0, index))
+        name, msg_type = entry[kind], entry.get("type", "json")
         if not isinstance(name, str) or not isinstance(msg_type, str) or not msg_type:
             self._fail(kind if not isinstance(name, str) else "type", _("it must be a text"), index)
-        payload = value_.get("message" if kind == "send" else "with", {} if kind == "call" else None)
+        payload = entry.get("message" if kind == "send" else "with", {} if kind == "call" else None)
         return AlarmAction(kind, name, payload, msg_type)
 
     def _scalar(self, value: object, index: int) -> Scalar:
@@ -337,24 +343,26 @@ class _Reader:
             self._fail("than", _("it must be a number, a text, true, false or null"), index)
         return value
 
-    def _number(self, value_: Mapping[str, object], key: str, default: float, index: int) -> float:
-        value = value_.get(key, default)
+    def _number(self, table: Mapping[str, object], key: str, default: float, index: int) -> float:
+        value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 < value < 1e300:
             self._fail(key, _("it must be a number"), index)
         return float(value)
 
-    def _check_keys(self, value_: Mapping[str, object], known: Sequence[str], index: int | None) -> None:
-        for key in value_:
+    def _check_keys(self, table: Mapping[str, object], known: Sequence[str], index: int | None) -> None:
+        for key in table:
             if key not in known:
-                said = _("there is no '{key}' here; {did_you_mean}")
+                template = _("there is no '{key}' here; {did_you_mean}")
                 shown = quotable(key)
-                self._fail(key, said.format(key=shown, did_you_mean=did_you_mean(shown, known)), index)
+                self._fail(key, template.format(key=shown, did_you_mean=did_you_mean(shown, known)), index)
 
     def _fail(self, key: str, sentence: str, index: int | None = None) -> NoReturn:
         line = self._line(key, index)
         if key:
-            said = _("line {line} of '{path}', '{key}': {sentence}")
-            raise _InvalidAlarm(said.format(line=line, path=self._path, key=quotable(key), sentence=sentence))
+            template = _("line {line} of '{path}', '{key}': {sentence}")
+            raise _InvalidAlarm(
+                template.format(line=line, path=self._path, key=quotable(key), sentence=sentence)
+            )
         raise _InvalidAlarm(
             _("line {line} of '{path}': {sentence}").format(line=line, path=self._path, sentence=sentence)
         )

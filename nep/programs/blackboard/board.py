@@ -240,10 +240,10 @@ class Blackboard:
         names = parse_key(key)
         with self._updated:
             self._expire_locked()
-            gone = self._entries.remove(names)
-            self._queue_changes_locked(gone)
+            removed = self._entries.remove(names)
+            self._queue_changes_locked(removed)
         self._schedule()
-        return len(gone)
+        return len(removed)
 
     def _store_message(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
         if message.publisher in self._ignored:
@@ -368,10 +368,10 @@ class Blackboard:
         }
 
     def _value_of(self, key: Key, max_age_s: float | None) -> object:
-        most = math.inf if max_age_s is None else max_age_s
+        limit_s = math.inf if max_age_s is None else max_age_s
         with self._updated:
             now = self._expire_locked()
-            found = [each for each in self._entries.below(key) if each.age_s(now) <= most]
+            found = [each for each in self._entries.below(key) if each.age_s(now) <= limit_s]
         if not found:
             return _MISSING
         return _composed(found, key)
@@ -483,9 +483,9 @@ class Blackboard:
         # Call with the lock held. Returns the current time.
         now = self._clock()
         if self._entries.next_end <= now:
-            gone = self._entries.expire(now)
-            if gone:
-                self._queue_changes_locked(gone)
+            removed = self._entries.expire(now)
+            if removed:
+                self._queue_changes_locked(removed)
         return now
 
     def _queue_changes_locked(self, changes: Sequence[EntryChange]) -> None:
@@ -511,17 +511,18 @@ class Blackboard:
                 return
             self._timer_at = due
             wait_s = _IMMEDIATE_S if self._pending else max(_MIN_TIMER_S, due - now)
-        made: list[Timer] = []
+        timers: list[Timer] = []
 
         def call() -> None:
-            for timer in made:  # empty if the timer fires before it is appended; then it fires again at once
+            # The list is empty if the timer fires before it is appended; then it fires again at once.
+            for timer in timers:
                 timer.cancel()
                 with self._updated:
                     self._timer_at = math.inf
                 self.deliver()
 
         with suppress(ClosedError):
-            made.append(node.new_timer(wait_s, call))
+            timers.append(node.new_timer(wait_s, call))
 
     # ---- closing
 

@@ -87,11 +87,11 @@ class Entries:
 
     def rebuilt(self) -> Entries:
         """Return a copy built from the entries; for a fork that interrupted a change."""
-        made = Entries(self._max_keys, self._max_bytes)
+        copy = Entries(self._max_keys, self._max_bytes)
         for entry in list(self._by_age.values()):
-            made.put(entry, -math.inf)
-        made.dropped, made.outdated = self.dropped, self.outdated
-        return made
+            copy.put(entry, -math.inf)
+        copy.dropped, copy.outdated = self.dropped, self.outdated
+        return copy
 
     # ---- reading
 
@@ -131,8 +131,8 @@ class Entries:
         Entries above and below its key are replaced. Raises `BadValueError` if it exceeds the memory limit.
         """
         if entry.bytes > self._max_bytes:
-            said = _("it takes {size} bytes, and there is room for {most}")
-            raise BadValueError(key_text(entry.key), said.format(size=entry.bytes, most=self._max_bytes))
+            template = _("it takes {size} bytes, and there is room for {most}")
+            raise BadValueError(key_text(entry.key), template.format(size=entry.bytes, most=self._max_bytes))
         before = self.get(entry.key)
         if entry.expires <= now or (before is not None and _is_newer(before, entry, now)):
             self.outdated += 1

@@ -77,10 +77,10 @@ class MessageReading:
             return
         beginning = key_of_topic(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
-        said = robot if isinstance(robot, str) else ""
+        robot_name = robot if isinstance(robot, str) else ""
         for at, value in self._chosen(item):
             for key, leaf in leaves(value, (*beginning, *at)):
-                yield PerceivedValue(key, leaf, said)
+                yield PerceivedValue(key, leaf, robot_name)
 
     def _chosen(self, item: object) -> Iterator[tuple[Key, object]]:
         if self._fields is None:

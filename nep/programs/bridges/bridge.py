@@ -229,18 +229,18 @@ class Bridge:
                     self._known.discard((side.name, a.topic, b.topic))
                 route.close()
 
-    def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
+    def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
         """Return whether the status is published on this side.
 
         If both back ends share one graph, it is published on side a only, because two nodes of one topic
         would conflict.
         """
-        return side.name == "a" or (side.looks > 1 and self.sides["a"].node.id not in view.nodes)
+        return side.name == "a" or (side.poll_count > 1 and self.sides["a"].node.id not in view.nodes)
 
-    def heard(self, side: SideName, message: Message) -> None:
+    def on_status(self, side: SideName, message: Message) -> None:
         """Process the status of another bridge. Runs in a thread of the side's node."""
         with suppress(DecodeError):
-            self._others.heard(side, message.payload, time.monotonic())
+            self._others.add_status(side, message.payload, time.monotonic())
 
     def _check_other_bridges(self) -> None:
         # Warns of duplicate messages, and stops routes that would loop.

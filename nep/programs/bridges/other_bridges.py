@@ -55,7 +55,7 @@ class OtherBridges:
         self._lock = threading.Lock()
         self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
-    def heard(self, side: SideName, status: object, now: float) -> None:
+    def add_status(self, side: SideName, status: object, now: float) -> None:
         """Process a status received on that side of ours; invalid ones are ignored."""
         if not isinstance(status, Mapping):
             return

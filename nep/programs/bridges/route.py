@@ -87,7 +87,7 @@ class _BufferedSink:
         self.is_open = is_open
         self.is_muted = False
         self._on_messages = take
-        self._kept: list[Message] = []
+        self._buffered: list[Message] = []
         self._lock = threading.Lock()
 
     def receive(self, messages: Sequence[Message]) -> None:
@@ -95,14 +95,14 @@ class _BufferedSink:
             if self.is_muted:
                 return
             if not self.is_open:
-                self._kept.extend(messages)
+                self._buffered.extend(messages)
                 return
         self._on_messages(messages)
 
     def open(self) -> None:
         with self._lock:
-            self._on_messages(self._kept)
-            self._kept = []
+            self._on_messages(self._buffered)
+            self._buffered = []
             self.is_open = True
 
     def mute(self) -> None:
@@ -154,7 +154,7 @@ class Route:
         self._is_closed = False
         self._lost_by_previous: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
-        self._gone_since: dict[tuple[bool, int | None], float] = {}
+        self._absent_since: dict[tuple[bool, int | None], float] = {}
         self._form: Form | None = None
         self._supports_extension = end.backend.has_extensions
         self._received = self._sent = self._bytes = 0
@@ -228,10 +228,10 @@ class Route:
             self._waits_for_type = not msg_type
             if not msg_type:
                 return
-            ear = _BufferedSink(self._on_messages, is_open=True)
-            subscriber = self._new_sub(node, msg_type, ear)
+            sink = _BufferedSink(self._on_messages, is_open=True)
+            subscriber = self._new_sub(node, msg_type, sink)
             with self._lock:
-                self._subscriber, self._sink = subscriber, ear
+                self._subscriber, self._sink = subscriber, sink
         elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
             self._subscribe_again(node, known)
 
@@ -240,10 +240,10 @@ class Route:
         old, old_sink = self._subscriber, self._sink
         if old is None or old_sink is None or _has_received(old):
             return
-        ear = _BufferedSink(self._on_messages, is_open=False)
-        new = self._new_sub(node, msg_type, ear)
+        sink = _BufferedSink(self._on_messages, is_open=False)
+        new = self._new_sub(node, msg_type, sink)
         if _has_received(old):  # a message arrived meanwhile
-            ear.mute()
+            sink.mute()
             new.close()
             return
         old_sink.mute()
@@ -252,13 +252,13 @@ class Route:
             self._lost_by_previous = (
                 None if lost is None or self._lost_by_previous is None else self._lost_by_previous + lost
             )
-            self._subscriber, self._sink = new, ear
+            self._subscriber, self._sink = new, sink
         old.close()
-        ear.open()
+        sink.open()
 
-    def _new_sub(self, node: Node, msg_type: str, ear: _BufferedSink) -> Subscriber:
+    def _new_sub(self, node: Node, msg_type: str, sink: _BufferedSink) -> Subscriber:
         return node.new_sub(
-            self.origin.topic, msg_type, sink=ear.receive, qos=self.origin.qos, wildcards=False
+            self.origin.topic, msg_type, sink=sink.receive, qos=self.origin.qos, wildcards=False
         )
 
     def end_taking(self) -> None:
@@ -382,7 +382,7 @@ class Route:
             self._form = Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
         return self._form
 
-    def close_gone(self, origin: GraphView, now: float) -> None:
+    def close_departed(self, origin: GraphView, now: float) -> None:
         """Close publishers of latched messages whose original publisher left the graph."""
         there = origin.topics.get(self.origin.topic)
         ids = {each.id for each in there.publishers} if there is not None else set()
@@ -390,9 +390,9 @@ class Route:
         with self._lock:
             for key in list(self._publishers):
                 if not key[0] or key[1] is None or key[1] in ids:
-                    self._gone_since.pop(key, None)
-                elif now - self._gone_since.setdefault(key, now) >= _PUBLISHER_EXPIRY_S:
-                    del self._gone_since[key]
+                    self._absent_since.pop(key, None)
+                elif now - self._absent_since.setdefault(key, now) >= _PUBLISHER_EXPIRY_S:
+                    del self._absent_since[key]
                     ended.append(self._publishers.pop(key))
                     self._subscriber_counts.pop(ended[-1], None)
         for publisher in ended:
@@ -435,18 +435,18 @@ class Route:
             publisher.refuse(payload, error)
             raise
 
-    def _publish(self, publisher: Publisher, message: Message, made: Encoded) -> None:
-        beside = {key: value for key, value in (made.extension or {}).items() if key != TRAIL_KEY}
-        self.end.echoes.sent(made.data, self._clock())
+    def _publish(self, publisher: Publisher, message: Message, encoded: Encoded) -> None:
+        extension = {key: value for key, value in (encoded.extension or {}).items() if key != TRAIL_KEY}
+        self.end.echoes.sent(encoded.data, self._clock())
         refused = publisher.refused
         if self._supports_extension:
-            publisher.publish_bytes(made.data, {**beside, TRAIL_KEY: self._trail(message).to_plain()})
+            publisher.publish_bytes(encoded.data, {**extension, TRAIL_KEY: self._trail(message).to_plain()})
             if publisher.refused == refused:
                 self._count(message)
                 return
             self._supports_extension = False  # a back end that wrongly claims to support extensions
             refused = publisher.refused
-        publisher.publish_bytes(made.data, beside or None)
+        publisher.publish_bytes(encoded.data, extension or None)
         if publisher.refused == refused:
             self._count(message)
         else:

@@ -45,10 +45,10 @@ class BridgeOfSide(Protocol):
     def status(self) -> dict[str, object]:
         """Return the status to publish."""
 
-    def speaks_on(self, side: BridgeSide, view: GraphView) -> bool:
+    def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
         """Return whether the status is published, and other bridges are detected, on that side."""
 
-    def heard(self, side: SideName, message: Message) -> None:
+    def on_status(self, side: SideName, message: Message) -> None:
         """Process a status received on that side, possibly our own."""
 
 
@@ -70,7 +70,7 @@ class BridgeSide:
         self.view: GraphView | None = None
         self.problem = ""
         """Reason why the network is unavailable, "" if it is available or not queried yet."""
-        self.looks = 0
+        self.poll_count = 0
         """Number of successful graph queries."""
         self.node = Node(
             node_name, configuration.backend.name, master=configuration.master, wait_s=_REQUEST_TIMEOUT_S
@@ -129,12 +129,12 @@ class BridgeSide:
                 self._poll_at = time.monotonic() + _GRAPH_POLL_S
             if self.view is not None:
                 self._update_routes(owner, self.view, undecided, is_due=is_due)
-                if is_due and owner.speaks_on(self, self.view):
+                if is_due and owner.publishes_status_on(self, self.view):
                     self._subscribe_to_bridges(owner)
                     self._publish_status({**owner.status(), "side": self.name})
-            is_soon = self.view is not None and self._undecided_routes(owner)
-            look_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if is_soon else 0.0)
-            self._wake_event.wait(max(0.0, look_at - time.monotonic()))
+            is_early = self.view is not None and self._undecided_routes(owner)
+            poll_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if is_early else 0.0)
+            self._wake_event.wait(max(0.0, poll_at - time.monotonic()))
 
     def _undecided_routes(self, owner: BridgeOfSide) -> list[Route]:
         # Their type depends on the current publishers, so the graph is polled first.
@@ -164,11 +164,11 @@ class BridgeSide:
         if self.guard is not None:
             self.guard.see(view)
         self.view = view
-        self.looks += 1
+        self.poll_count += 1
         owner.find(self, view)
         for route in owner.routes:
             if route.origin.side == self.name:
-                route.close_gone(view, time.monotonic())
+                route.close_departed(view, time.monotonic())
 
     def _update_routes(
         self, owner: BridgeOfSide, view: GraphView, undecided: Sequence[Route], *, is_due: bool
@@ -210,13 +210,13 @@ class BridgeSide:
         route.troubles.pop(self.name, None)
 
     def _subscribe_to_bridges(self, owner: BridgeOfSide) -> None:
-        def hear(messages: Sequence[Message]) -> None:
+        def on_messages(messages: Sequence[Message]) -> None:
             for message in messages:
-                owner.heard(self.name, message)
+                owner.on_status(self.name, message)
 
         if self._bridges_subscriber is None and not self._is_closing:
             with suppress(NepError):  # retried with the next poll
-                self._bridges_subscriber = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=hear)
+                self._bridges_subscriber = self.node.new_sub(BRIDGES_TOPIC, _STATUS_TYPE, sink=on_messages)
 
     def _publish_status(self, status: dict[str, object]) -> None:
         now = time.monotonic()

@@ -160,8 +160,8 @@ class _Reader:
         return BridgeConfiguration(name, a, b, found)
 
     def _side(self, table: Mapping[str, Any], side: SideName) -> SideConfiguration:
-        told = table.get(side)
-        if not isinstance(told, dict):
+        section = table.get(side)
+        if not isinstance(section, dict):
             self._fail(
                 side,
                 "",
@@ -169,12 +169,12 @@ class _Reader:
                     side=side
                 ),
             )
-        self._check_keys(told, _SIDE_KEYS, side)
-        backend = self._text(told, "backend", side)
+        self._check_keys(section, _SIDE_KEYS, side)
+        backend = self._text(section, "backend", side)
         if not backend:
             self._fail("backend", side, _('no back end is named; write backend = "zeromq"'))
         self._checked(lambda: backend_named(backend), "backend", side)
-        master, network = (self._text(told, key, side) for key in ("master", "network"))
+        master, network = (self._text(section, key, side) for key in ("master", "network"))
         if len(network) > _MAX_NETWORK_LENGTH:
             self._fail(
                 "network",
@@ -184,34 +184,36 @@ class _Reader:
         return self._checked(lambda: side_of(backend, master, network), "master", side)
 
     def _topic(
-        self, told: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
+        self, section: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
     ) -> BridgeTopic:
-        self._check_keys(told, _TOPIC_KEYS, "topics", number)
-        on_a, on_b = (self._text(told, side, "topics", number) for side in SIDES)
+        self._check_keys(section, _TOPIC_KEYS, "topics", number)
+        on_a, on_b = (self._text(section, side, "topics", number) for side in SIDES)
         on_a, on_b = on_a or on_b, on_b or on_a
         if not on_a:
             self._fail("a", "topics", _('the topic has no name; write a = "/a/topic"'), number)
-        key = "b" if told.get("b") else "a"
+        key = "b" if section.get("b") else "a"
         self._checked(lambda: checked_topic_names(on_a, on_b), key, "topics", number)
-        direction = self._text(told, "direction", "topics", number, default="both")
+        direction = self._text(section, "direction", "topics", number, default="both")
         way = self._checked(lambda: direction_named(direction), "direction", "topics", number)
         ends = [
             TopicEnd(
-                name, self._type(told, side, number), self._quality(told, f"{side}_qos", number, of.backend)
+                name,
+                self._type(section, side, number),
+                self._quality(section, f"{side}_qos", number, of.backend),
             )
             for name, side, of in ((on_a, "a", a), (on_b, "b", b))
         ]
-        return BridgeTopic(ends[0], ends[1], way, self._rate(told, number))
+        return BridgeTopic(ends[0], ends[1], way, self._rate(section, number))
 
-    def _type(self, told: Mapping[str, Any], side: str, number: int) -> str:
-        key = f"{side}_type" if f"{side}_type" in told else "type"
-        name = self._text(told, key, "topics", number)
-        if key in told:
+    def _type(self, section: Mapping[str, Any], side: str, number: int) -> str:
+        key = f"{side}_type" if f"{side}_type" in section else "type"
+        name = self._text(section, key, "topics", number)
+        if key in section:
             self._checked(lambda: checked_type(key, name), key, "topics", number)
         return name
 
-    def _quality(self, told: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
-        word = self._text(told, key, "topics", number)
+    def _quality(self, section: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
+        word = self._text(section, key, "topics", number)
         if word and not backend.qos:
             self._fail(
                 key,
@@ -232,8 +234,8 @@ class _Reader:
             )
         return word
 
-    def _rate(self, told: Mapping[str, Any], number: int) -> float:
-        value = told.get("max_rate_hz")
+    def _rate(self, section: Mapping[str, Any], number: int) -> float:
+        value = section.get("max_rate_hz")
         if value is None:
             return 0.0
         is_number = isinstance(value, int | float) and not isinstance(value, bool)

@@ -138,21 +138,21 @@ def _unreached(facts: Facts) -> Finding:
     host, _colon, port = facts.address.rpartition(":")
     if facts.reach == "timeout":
         sentence = _("Nothing answers at {address}, so no master is found.")
-        mend = _(
+        fix = _(
             "{host} is switched off, in another network, or its firewall keeps programs out. Let NEP Studio "
             "(Python) through the firewall there."
         )
     elif facts.reach == "refused":
         sentence = _("{host} is there, but nobody listens at its port {port} for other computers.")
-        mend = _("Start NEP Studio on that computer, and let other computers connect in its settings.")
+        fix = _("Start NEP Studio on that computer, and let other computers connect in its settings.")
     elif facts.reach:
         sentence = _("There is no way to {address}, so no master is found.")
-        mend = _("Look whether both computers are in the same network.")
+        fix = _("Look whether both computers are in the same network.")
     else:
         sentence = _("{host} answers at port {port}, but no master does.")
-        mend = _("It hangs, or another program holds that port. Start NEP Studio anew on that computer.")
+        fix = _("It hangs, or another program holds that port. Start NEP Studio anew on that computer.")
     holes = {"address": facts.address, "host": host, "port": port}
-    return Finding("master:unreached", "error", sentence.format(**holes), mend.format(**holes))
+    return Finding("master:unreached", "error", sentence.format(**holes), fix.format(**holes))
 
 
 def _running(facts: Facts, holder: ProcessFact | None) -> Finding:

@@ -119,24 +119,24 @@ def _unreached(each: PublisherFact) -> Finding:
     place = each.endpoint.removeprefix("tcp://")
     if each.reach == "elsewhere":
         sentence = _("“{node}” publishes for its own computer, {host}, only.")
-        mend = _(
+        fix = _(
             "It knows its master by an address of that computer alone. Start it with the address in the "
             "network as its NEP_MASTER."
         )
     elif each.reach == "timeout":
         sentence = _("Nothing answers at {place} ({host}), where “{node}” publishes.")
-        mend = _(
+        fix = _(
             "A firewall keeps programs out there, or it is another network. Let Python through the firewall "
             "of {host}."
         )
     elif each.reach == "refused":
         sentence = _("Nobody listens at {place} ({host}) any more, where “{node}” published.")
-        mend = _("The program has ended or hangs. Start it again.")
+        fix = _("The program has ended or hangs. Start it again.")
     else:
         sentence = _("There is no way to {place} ({host}), where “{node}” publishes.")
-        mend = _("Look whether both computers are in the same network.")
+        fix = _("Look whether both computers are in the same network.")
     holes = {"node": each.node, "host": each.host, "place": place}
-    return Finding(f"topic:address:{each.node}", "error", sentence.format(**holes), mend.format(**holes))
+    return Finding(f"topic:address:{each.node}", "error", sentence.format(**holes), fix.format(**holes))
 
 
 def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
@@ -147,7 +147,7 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
         return
     if quiet_s is None or each.last_s is None:
         sentence = _("“{node}” is there, but has sent nothing on {topic} yet.")
-        mend = _("Look at that program: what does it wait for?")
+        fix = _("Look at that program: what does it wait for?")
     else:
         sentence = _("“{node}” is there, but has sent nothing on {topic} for {ago}.")
         at = time.strftime("%H:%M:%S", time.localtime(each.last_s))
@@ -156,15 +156,15 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
             words = _(
                 "Its last message was number {count}, at {at}. Look at that program: what does it wait for?"
             )
-        mend = words.format(count=number(each.sent or 0, ".0f"), at=at)
+        fix = words.format(count=number(each.sent or 0, ".0f"), at=at)
     remedy = next(iter(each.remedies), "")
     if remedy:
-        mend += " " + _("It offers the service “{service}”.").format(service=remedy)
+        fix += " " + _("It offers the service “{service}”.").format(service=remedy)
     yield Finding(
         f"topic:silent:{each.node}",
         "error",
         sentence.format(node=each.node, topic=facts.topic, ago=ago(quiet_s or 0.0)),
-        mend,
+        fix,
         instead=remedy,
     )
 

@@ -149,16 +149,16 @@ class MotionGuard:
         # suspended.
         for topic in sorted(description_topics(view) - self._subscribers.keys()):
             if len(self._subscribers) >= MAX_DESCRIPTIONS:
-                gone = next((each for each in self._subscribers if each not in view.topics), None)
-                if gone is None:
+                departed = next((each for each in self._subscribers if each not in view.topics), None)
+                if departed is None:
                     return True  # the remaining ones count as unread
-                self._subscribers.pop(gone).close()
-                self._controls.pop(gone, None)
+                self._subscribers.pop(departed).close()
+                self._controls.pop(departed, None)
             try:
-                made = self._node.new_sub(topic, DESCRIPTION_TYPE, sink=self._receive, wildcards=False)
+                subscriber = self._node.new_sub(topic, DESCRIPTION_TYPE, sink=self._receive, wildcards=False)
             except NepError:
                 return False
-            self._subscribers[topic] = made
+            self._subscribers[topic] = subscriber
         return True
 
     def _receive(self, messages: Sequence[Message]) -> None:

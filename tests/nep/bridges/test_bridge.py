@@ -217,8 +217,8 @@ def test_a_type_that_nobody_has_there_is_said_once_and_its_messages_wait(twist_s
                 pub.publish(number)
                 eventually(lambda number=number: found.counts().waiting == number + 1)
                 eventually(lambda: found.trouble == "there is no type 'no_msgs/Type'; install it")
-            looks = bridge.sides["b"].looks
-            eventually(lambda: bridge.sides["b"].looks >= looks + 2)
+            polls = bridge.sides["b"].poll_count
+            eventually(lambda: bridge.sides["b"].poll_count >= polls + 2)
             assert caplog.text.count("install it") == 1
             assert bridge.status()["routes"][0]["trouble"] == found.trouble
 

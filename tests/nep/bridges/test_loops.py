@@ -311,11 +311,11 @@ STATUS = {
 
 def test_another_bridge_is_one_that_was_heard_on_both_sides_lately():
     known = OtherBridges("own")
-    known.heard("b", STATUS, 0.0)
+    known.add_status("b", STATUS, 0.0)
     assert known.between(0.0) == []
-    known.heard("a", STATUS, 1.0)
+    known.add_status("a", STATUS, 1.0)
     assert known.between(1.0) == [], "twice the same side of it: one network has two names"
-    known.heard("a", {**STATUS, "side": "b"}, 1.0)
+    known.add_status("a", {**STATUS, "side": "b"}, 1.0)
     assert known.between(2.0) == [OtherBridge("other", "lab", frozenset({("b", "/t", "/u")}))]
     assert known.between(30.0) == []
 
@@ -330,8 +330,8 @@ def test_another_bridge_is_one_that_was_heard_on_both_sides_lately():
 def test_whatever_else_is_told_there_is_no_bridge(status):
     known = OtherBridges("own")
     for side in ("a", "b"):
-        known.heard(side, status, 0.0)
-        known.heard(
+        known.add_status(side, status, 0.0)
+        known.add_status(
             side, {**status, "side": "b"} if isinstance(status, dict) and side == "b" else status, 0.0
         )
     assert known.between(0.0) == []
@@ -346,8 +346,8 @@ def test_whatever_else_is_told_there_is_no_bridge(status):
 )  # fmt: skip
 def test_strange_routes_are_none(routes):
     known = OtherBridges("own")
-    known.heard("a", {**STATUS, "routes": routes}, 0.0)
-    known.heard("b", {**STATUS, "side": "b"}, 0.0)
+    known.add_status("a", {**STATUS, "routes": routes}, 0.0)
+    known.add_status("b", {**STATUS, "side": "b"}, 0.0)
     assert known.between(0.0)[0].ways == frozenset()
 
 
@@ -355,7 +355,7 @@ def test_others_have_a_bound():
     known = OtherBridges("own")
     for number in range(1000):
         for side in ("a", "b"):
-            known.heard(side, {**STATUS, "id": str(number), "side": side}, 0.0)
+            known.add_status(side, {**STATUS, "id": str(number), "side": side}, 0.0)
     assert len(known.between(0.0)) == 64
 
 

@@ -101,7 +101,7 @@ def test_what_is_missing_or_cannot_be_read_is_counted(capsys):
     table = Table(fields, io.StringIO())
     for each in (message({"x": 1}), message({"x": 1, "y": 2}), message(b"{oops"), message({})):
         table(each)
-    fields.say_missing()
+    fields.report_missing()
     said = capsys.readouterr().err
     assert "'x' was missing in 1 of 3 messages" in said
     assert "'y' was missing in 2 of 3 messages" in said
