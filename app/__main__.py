@@ -47,43 +47,37 @@ _log = logging.getLogger("studio")
 
 def window_parser() -> argparse.ArgumentParser:
     """Return the argument parser of ``python -m app``."""
-    made = argparse.ArgumentParser(
-        prog="nep-studio",
-        description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window."),
+    parser = argparse.ArgumentParser(
+        prog="nep-studio", description=_("NEP Studio. `nep-studio run FILE` runs a behaviour without a window.")
     )
-    made.add_argument("files", nargs="*", type=Path, metavar="FILE", help=_("behaviours to open"))
-    made.add_argument(
-        "--new-window",
-        action="store_true",
-        help=_("open a separate window even if Studio is already running"),
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help=_("behaviours to open"))
+    parser.add_argument(
+        "--new-window", action="store_true", help=_("open a separate window even if Studio is already running")
     )
-    made.add_argument(
+    parser.add_argument(
         "--demo", action="store_true", help=_("start with the virtual robot and the first example")
     )
-    made.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
-    made.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
-    made.add_argument("--theme", choices=("light", "dark", "system"), help=_("colour theme"))
-    made.add_argument(
-        "--self-drive",
-        metavar="DIR",
-        type=Path,
-        help=_("run the main job without a person; screenshots go to DIR"),
+    parser.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
+    parser.add_argument("--version", action="version", version=f"NEP Studio {__version__}")
+    parser.add_argument("--theme", choices=("light", "dark", "system"), help=_("colour theme"))
+    parser.add_argument(
+        "--self-drive", metavar="DIR", type=Path, help=_("run the main job without a person; screenshots go to DIR")
     )
-    made.add_argument(
+    parser.add_argument(
         "--selftest",
         metavar="DIR",
         type=Path,
         help=_("test whether all of Studio works; write a report to DIR"),
     )
-    made.add_argument(
+    parser.add_argument(
         "--no-web", dest="web", action="store_false", help=_("with --selftest: skip the block editor")
     )
-    return made
+    return parser
 
 
 def run_parser() -> argparse.ArgumentParser:
     """Return the argument parser of ``python -m app run``."""
-    made = argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         prog="nep-studio run",
         description=_(
             "Run a behaviour without a window. Exit codes: 0 finished; 1 a block failed or a robot did "
@@ -91,26 +85,22 @@ def run_parser() -> argparse.ArgumentParser:
             "move and is not allowed to; 130 stopped by Ctrl+C."
         ),
     )
-    made.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))
-    made.add_argument(
-        "--robot-wait",
-        type=float,
-        metavar="S",
-        default=10.0,
-        help=_("how long to wait for its robots, in seconds"),
+    parser.add_argument("file", type=Path, metavar="FILE", help=_("the behaviour"))
+    parser.add_argument(
+        "--robot-wait", type=float, metavar="S", default=10.0, help=_("how long to wait for its robots, in seconds")
     )
-    made.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
-    made.add_argument(
+    parser.add_argument("--master", metavar="HOST:PORT", help=_("address of the master"))
+    parser.add_argument(
         "--allow-moving",
         action="store_true",
         help=_("allow real robots to move; Ctrl+C stops them"),
     )
-    made.add_argument(
+    parser.add_argument(
         "--keep-position",
         action="store_true",
         help=_("start where the virtual robots are instead of at their start position"),
     )
-    return made
+    return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -261,7 +251,7 @@ def end_process(code: int, within_s: float = GRACE_S) -> int:
     left = still_running(within_s)
     if not left:
         return code
-    _log.error("Studio ends without %s, which goes on", ", ".join(f"'{name}'" for name in left))
+    _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in left))
     logging.shutdown()
     close_streams()
     os._exit(code)

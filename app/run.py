@@ -40,7 +40,7 @@ from nep.text import escaped
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
 SLICE_S = 0.1
-EVERYBODY_S = 3.0
+ALL_ROBOTS_WAIT_S = 3.0
 """Time that a behaviour with publish blocks waits for the descriptions of all robots on the network."""
 LATE_S = 1.0
 _STARTER = re.compile(r"events_|robot_.*_when_")
@@ -78,21 +78,21 @@ def run_file(
         known = _known(descriptions)
         wanted = robots_named(workspace)
         with nep.node("behaviour runner", master=master) as node:
-            found = _judged(_robots_for(workspace, node, robot_wait_s, known))
+            found = _with_trusted_virtual(_robots_for(workspace, node, robot_wait_s, known))
             for claim in found.claims:
                 say(_("warning: {sentence}").format(sentence=claim))
             program = compile_behaviour(workspace, found.robots, absent=known, name=name)
-            code = _refused(program, wanted, found.robots, say)
+            code = _rejection_code(program, wanted, found.robots, say)
             if code is not None:
                 return code
             used = [robot for robot in found.robots if robot.name in program.robots]
             if not allow_moving and _would_move(program, used, say):
                 return MAY_NOT_MOVE
             if not keep_position:
-                _to_start(node, [robot for robot in used if robot.virtual])
+                _reset_positions(node, [robot for robot in used if robot.virtual])
             with closing(RobotStopper(node)) as stopper:
                 stopper.set_robots(StopTarget(robot, found.owners.get(robot.name)) for robot in used)
-                return _run(program, found, _Reach(master, node, stopper), say, ending)
+                return _run(program, found, _Connection(master, node, stopper), say, ending)
     except KeyboardInterrupt:
         return INTERRUPTED
     except (AppError, NepError) as error:
@@ -108,11 +108,13 @@ def _robots_for(
     wanted = robots_named(workspace)
     found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else FoundRobots()
     if compile_behaviour(workspace, found.robots, absent=known).publishes:
-        found = find_robots(node, EVERYBODY_S, wanted=(), known=known)  # publish blocks may move any of them
+        found = find_robots(
+            node, ALL_ROBOTS_WAIT_S, wanted=(), known=known
+        )  # publish blocks may move any of them
     return found
 
 
-def _judged(found: FoundRobots) -> FoundRobots:
+def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
     # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
     processes = VirtualProcesses(VIRTUAL_ROBOTS.values())
     robots = (
@@ -180,7 +182,7 @@ def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
     return found
 
 
-def _refused(
+def _rejection_code(
     program: Program, wanted: Sequence[str], robots: Sequence[Robot], say: Callable[[str], None]
 ) -> int | None:
     for problem in program.problems:
@@ -210,7 +212,7 @@ def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], 
     return any(moves.values())
 
 
-def _to_start(node: nep.Node, robots: Sequence[Robot]) -> None:
+def _reset_positions(node: nep.Node, robots: Sequence[Robot]) -> None:
     names = [robot.name for robot in robots]
     for topic in filter(None, (robot.topics.world for robot in robots)):
         with node.new_pub(topic, "json") as world:
@@ -218,7 +220,7 @@ def _to_start(node: nep.Node, robots: Sequence[Robot]) -> None:
 
 
 @dataclass(frozen=True)
-class _Reach:
+class _Connection:
     """Connection to the network: master address, node, and the stopper of robots."""
 
     master: str | None
@@ -227,10 +229,10 @@ class _Reach:
 
 
 def _run(
-    program: Program, found: FoundRobots, reach: _Reach, say: _Lines, interrupted: threading.Event
+    program: Program, found: FoundRobots, reach: _Connection, say: _Lines, interrupted: threading.Event
 ) -> int:
     stopper = reach.stopper
-    told = _Told(say)
+    told = _RunEvents(say)
     runner = Runner(told)
     say(_("“{name}” runs").format(name=program.name))
     if interrupted.is_set():
@@ -241,7 +243,7 @@ def _run(
         runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
         while not runner.wait(SLICE_S) and not interrupted.is_set():
             if late is not None:
-                late.look()
+                late.poll()
         was_interrupted = interrupted.is_set()
     except KeyboardInterrupt:
         was_interrupted = True
@@ -266,7 +268,7 @@ class _LateRobots:
         self._next_s = time.monotonic() + LATE_S
         self._known: tuple[str, ...] = ()
 
-    def look(self) -> None:
+    def poll(self) -> None:
         if time.monotonic() < self._next_s:
             return
         with suppress(NepError):
@@ -281,7 +283,7 @@ class _LateRobots:
         self._next_s = time.monotonic() + LATE_S
 
 
-class _Told:
+class _RunEvents:
     """Writes the runner's events as lines and stores how the run ended."""
 
     def __init__(self, say: Callable[[str], None]) -> None:

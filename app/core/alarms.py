@@ -46,7 +46,7 @@ valid."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
 NOT_CARRIED = lazy("an alarm can't carry out its action: {error}")
-_MOST_BYTES = 4_000_000
+_MAX_FILE_BYTES = 4_000_000
 MILD = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
 """Kinds of conditions that are warnings; all others are errors."""
 
@@ -72,7 +72,7 @@ class AlarmSession(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class _AskedSend:
+class _PendingSend:
     """Message that waits for the answer to a motion question."""
 
     question: Question
@@ -98,19 +98,19 @@ class SessionAlarms:
         self.path: Path | None = session.settings.path.with_name(FILE)
         self._clock, self._clock_s = clock, clock_s
         self._commands = AlarmCommands(session.fleet.gate.refusal_now)
-        self._asked: _AskedSend | None = None
+        self._pending_send: _PendingSend | None = None
         self.on_moved: OnMoved = ignore_moved
         """Called before a message that moves robots is sent, with the robots and "alarm"."""
         self.keep: Carrier | None = None
         self.run_behaviour: Callable[[str], str] | None = None
-        self.on_event: Callable[[AlarmEvent], object] = _nobody
+        self.on_event: Callable[[AlarmEvent], object] = _ignore_event
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
         self._watches: dict[str, Watch] = {}
         self._removed: tuple[AlarmRule, int] | None = None
         self._is_newer = False
         found = self._read(self.path)
         carriers: dict[str, Carrier] = {
-            "banner": _told,
+            "banner": _done_by_alert,
             "console": self._console,
             "sound": self._sound,
             "keep": self._keep,
@@ -213,9 +213,9 @@ class SessionAlarms:
         for event in self.alarms.tick():
             self._show(event)
         self.alarms.take_deeds()
-        asked = self._asked
+        asked = self._pending_send
         if asked is not None and self._session.fleet.permission.question is not asked.question:
-            self._asked = None
+            self._pending_send = None
             asked.done(
                 False,
                 _("not sent: {robots} is not allowed to move").format(robots=listed(asked.question.names)),
@@ -225,7 +225,7 @@ class SessionAlarms:
         """Refresh the alerts and save changes. Called once a second."""
         for rule in self.rules:
             if rule.id in self._on:
-                self._say(rule, self.alarms.evaluator.state(rule).seen, count=0)
+                self._update_alert(rule, self.alarms.evaluator.state(rule).seen, count=0)
         self._write()
         try:
             if self._worker.take(FILE):
@@ -271,11 +271,11 @@ class SessionAlarms:
         if event.kind == "still":
             alerts.resolve(_alert_id(rule.id))  # its banner was dismissed by the snooze
         self._on.add(rule.id)
-        self._say(rule, event.seen, count=1)
+        self._update_alert(rule, event.seen, count=1)
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
             alerts.dismiss(_alert_id(rule.id))
 
-    def _say(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
+    def _update_alert(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
         # prefers the recorded value that triggered the alarm over the current one
         words = record.words if record is not None else what_words(condition, seen)
@@ -335,18 +335,18 @@ class SessionAlarms:
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
             topic=topic, what=what_words(event.rule.condition, event.seen)
         )
-        go_on = partial(self._send_asked, event, action, done)
+        go_on = partial(self._send_permitted, event, action, done)
         if not fleet.gate.permits(topic, go_on, msg_type, reason=reason):
             question = fleet.permission.question
-            self._asked = None if question is None else _AskedSend(question, done)
+            self._pending_send = None if question is None else _PendingSend(question, done)
             return
         moved = fleet.gate.moved_by(topic, msg_type)
         if moved:
             self.on_moved(moved, "alarm")
         self._command(event, action, done)
 
-    def _send_asked(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        self._asked = None
+    def _send_permitted(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+        self._pending_send = None
         self._send(event, action, done)
 
     def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
@@ -385,7 +385,7 @@ class SessionAlarms:
             found = read_text(data, path.name, lenient=True)
             return found, next(iter(found.problems), "")
 
-        kept = read_kept(path, parse, NewerAlarmsError, _MOST_BYTES)
+        kept = read_kept(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
             some = kept.value is not None
@@ -396,12 +396,12 @@ class SessionAlarms:
         return kept.value if kept.value is not None else AlarmFile()
 
 
-def _nobody(_event: AlarmEvent) -> None: ...
+def _ignore_event(_event: AlarmEvent) -> None: ...
 
 
 def _alert_id(rule_id: str) -> str:
     return f"alarm:{rule_id}"
 
 
-def _told(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+def _done_by_alert(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
     done(True, "")

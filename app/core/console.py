@@ -56,12 +56,12 @@ class Console:
     @property
     def records(self) -> Sequence[ConsoleRecord]:
         """Records, oldest first; decodes pending messages."""
-        self._read()
+        self._decode_unread()
         return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
         """Add a record; text longer than `TEXT_LIMIT` is shortened visibly."""
-        self._put([ConsoleRecord(self._clock(), level, origin, _cut(text))])
+        self._append([ConsoleRecord(self._clock(), level, origin, _shortened(text))])
 
     def take(self, messages: Sequence[Message], dropped: int = 0) -> None:
         """Add log messages from the network; ``dropped`` is the number of messages lost before them."""
@@ -74,7 +74,7 @@ class Console:
             )
             self.add("warn", "studio", words.format(count=dropped))
         if messages:
-            self._put(messages)
+            self._append(messages)
 
     def leave_out(self, pid: int | None) -> None:
         """Ignore log messages of a process whose output already arrives through a pipe."""
@@ -95,20 +95,20 @@ class Console:
         self._errors = log_handler.ShownErrors()
         self.clear()
 
-    def _put(self, lines: Sequence[ConsoleRecord | Message]) -> None:
+    def _append(self, lines: Sequence[ConsoleRecord | Message]) -> None:
         self._lines.extend(lines)
         self._unread = min(self._unread + len(lines), len(self._lines))
         self.revision += 1
 
-    def _read(self) -> None:
+    def _decode_unread(self) -> None:
         unread = [self._lines.pop() for _unread in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
-            for record in self._of_bus(line) if isinstance(line, Message) else (line,):
+            for record in self._decoded(line) if isinstance(line, Message) else (line,):
                 self._count += 1
                 self._lines.append(replace(record, number=self._count))
 
-    def _of_bus(self, message: Message) -> Sequence[ConsoleRecord]:
+    def _decoded(self, message: Message) -> Sequence[ConsoleRecord]:
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
                 given = self._errors.new_in(message.payload)
@@ -124,12 +124,12 @@ class Console:
         return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
-            given.node or given.name or _("someone"),
-            _cut(given.text),
+            given.node or given.name or _("somebody"),
+            _shortened(given.text),
             logger="" if given.name == given.node else given.name,
             place=place,
         )
 
 
-def _cut(text: str) -> str:
+def _shortened(text: str) -> str:
     return shortened(text, TEXT_LIMIT)

@@ -73,7 +73,7 @@ class RepeatFilter:
 
         Never raises, so that logging can't fail because of a record's arguments.
         """
-        record = _sayable(record)
+        record = _formattable(record)
         key = (record.name, record.levelno, _place(record) or record.getMessage())
         count = self._counts.pop(key, 0) + 1
         while len(self._counts) >= FAULTS_KEPT:
@@ -89,14 +89,17 @@ class RepeatFilter:
         return again
 
 
-def _sayable(record: logging.LogRecord) -> logging.LogRecord:
+def _formattable(record: logging.LogRecord) -> logging.LogRecord:
     try:
         record.getMessage()
     except Exception as error:  # noqa: BLE001  arguments may have any class
         text = record.msg if isinstance(record.msg, str) else type(record.msg).__name__
-        made = logging.makeLogRecord(record.__dict__)
-        made.msg, made.args = f"{text} (its values can't be said: {type(error).__name__})", ()
-        return made
+        replacement = logging.makeLogRecord(record.__dict__)
+        replacement.msg, replacement.args = (
+            f"{text} (its arguments can't be formatted: {type(error).__name__})",
+            (),
+        )
+        return replacement
     else:
         return record
 
@@ -125,13 +128,13 @@ class LogFile(RotatingFileHandler):
         )
         self.setLevel(logging.WARNING)
         self.setFormatter(logging.Formatter(FORMAT))
-        self._once = RepeatFilter()
+        self._repeat_filter = RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write the record unless it is a repetition."""
-        told = self._once.filter(record)
-        if told is not None:
-            super().emit(told)
+        shown = self._repeat_filter.filter(record)
+        if shown is not None:
+            super().emit(shown)
 
     def _open(self) -> io.TextIOWrapper:
         path = Path(self.baseFilename)
@@ -151,33 +154,38 @@ class LogFile(RotatingFileHandler):
 
 def install_hooks() -> None:
     """Log uncaught exceptions of this thread, of other threads and of finalizers."""
-    sys.excepthook = _raised
-    threading.excepthook = _raised_in_thread
-    sys.unraisablehook = _raised_at_end
+    sys.excepthook = _log_uncaught
+    threading.excepthook = _log_uncaught_in_thread
+    sys.unraisablehook = _log_unraisable
 
 
-def _raised(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+def _log_uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     if issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return
-    _log.error("a fault of Studio: %s", error_words(error), exc_info=(kind, error, trace))
+    _log.error("uncaught exception: %s", error_words(error), exc_info=(kind, error, trace))
 
 
-def _raised_in_thread(raised: threading.ExceptHookArgs) -> None:
+def _log_uncaught_in_thread(raised: threading.ExceptHookArgs) -> None:
     error = raised.exc_value
     if error is None or isinstance(error, SystemExit):
         return
     name = raised.thread.name if raised.thread is not None else "a thread"
     _log.error(
-        "'%s' ended: %s", name, error_words(error), exc_info=(type(error), error, raised.exc_traceback)
+        "uncaught exception in thread '%s': %s",
+        name,
+        error_words(error),
+        exc_info=(type(error), error, raised.exc_traceback),
     )
 
 
-def _raised_at_end(raised: sys.UnraisableHookArgs) -> None:
+def _log_unraisable(raised: sys.UnraisableHookArgs) -> None:
     error = raised.exc_value
     if error is not None:
         trace = raised.exc_traceback
-        _log.error("while something ended: %s", error_words(error), exc_info=(type(error), error, trace))
+        _log.error(
+            "exception ignored in a finalizer: %s", error_words(error), exc_info=(type(error), error, trace)
+        )
 
 
 def error_words(error: BaseException) -> str:
@@ -233,7 +241,7 @@ class FaultAlerts:
         if over and not self._faults:
             self._alerts.resolve(ALERT)
         elif over:
-            self._tell(next(iter(self._faults.values())), count=0)
+            self._update_alert(next(iter(self._faults.values())), count=0)
 
     def _failed(self, what: str, said: str) -> None:
         is_new = what not in self._faults
@@ -241,9 +249,9 @@ class FaultAlerts:
             del self._faults[next(iter(self._faults))]
         self._faults[what] = _Fault(said, self._clock())
         if not self._alerts.has(ALERT):
-            self._tell(self._faults[what], count=1)  # further faults and repetitions are in the log
+            self._update_alert(self._faults[what], count=1)  # further faults and repetitions are in the log
 
-    def _tell(self, fault: _Fault, *, count: int) -> None:
+    def _update_alert(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")
         self._alerts.put(
             ALERT, "error", title, fault.said, button=_("Show the log"), action="help.log", count=count

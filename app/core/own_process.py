@@ -37,19 +37,19 @@ class OwnProgram:
         # By default the executable of a frozen build; without one, nothing is checked.
         frozen = bool(getattr(sys, "frozen", False))
         self._file = file if file is not None or not frozen else Path(sys.executable)
-        self._was = self._look()
+        self._initial = self._signature()
 
     def fate(self) -> Fate:
         """Return what happened to the file since the start.
 
         "" (unchanged), "replaced" by an update, or "gone".
         """
-        now = self._look()
-        if now == self._was:
+        now = self._signature()
+        if now == self._initial:
             return ""
         return "replaced" if now is not None else "gone"
 
-    def _look(self) -> tuple[int, ...] | None:
+    def _signature(self) -> tuple[int, ...] | None:
         if self._file is None:
             return None
         try:

@@ -125,9 +125,9 @@ class Session:
         self.recordings = SessionRecordings(*recorder, clock=clock, reads_apart=start_processes)
         self._connect_parts()
         self._program, self.tick_ms = OwnProgram(), 0.0
-        self._robots_seen = self._topics_seen = -1
+        self._robots_revision = self._topics_revision = -1
         self._reachable: tuple[StopTarget, ...] = ()
-        self._tries_to_reach, self._next_check, self._closing_replays = False, 0.0, []
+        self._retries_stop_connections, self._next_check, self._closing_replays = False, 0.0, []
 
     def _add_network(self, make_source: MakeSource) -> None:
         self.topics, self.nodes = Topics(), Nodes()
@@ -353,7 +353,7 @@ class Session:
             missed = self.source.missed()
             self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
         with self.guarded(lazy("report problems with Stop")):
-            self._look_for_problems_of_stop()
+            self._check_stop_connections()
         with self.guarded(lazy("check for problems")):
             self._health.check(self.runs.used, self.launcher.virtual_robots)
             self.documents.unkept()
@@ -371,19 +371,19 @@ class Session:
         """Stop the running program and end every thread and child process; errors are logged, not raised."""
         live = self.live
         ends: list[tuple[str, Callable[[], object]]] = [
-            ("end the program", self.runs.close),
-            ("end what is sent by hand", self.acting.close),
-            ("keep the tabs", lambda: self.tabs.keep(ended_well=True)),
-            ("keep which robots were here", partial(self.last_robots.keep, self.launcher)),
+            ("stop the program", self.runs.close),
+            ("stop sending by hand", self.acting.close),
+            ("save the tabs", lambda: self.tabs.keep(ended_well=True)),
+            ("save the robots", partial(self.last_robots.keep, self.launcher)),
             ("save the alarms", self.alarms.close),
-            ("end the behaviours", self.documents.end),
+            ("close the behaviours", self.documents.end),
             ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
             *([("end the stopper", self.stopper.close)] if self.stopper is not None else []),
             ("end the pictures", live.images.close),
             ("end the doctor", self.doctor.close),
-            ("end the recorder", self.recordings.close),  # before the master, which the recorder may need
+            ("stop the recorder", self.recordings.close),  # before the master, which the recorder may need
             ("close the recording", self._close_replays),
             ("leave the network", self.source.close),
             ("leave other networks", live.networks.close),
@@ -560,26 +560,26 @@ class Session:
             self.live.topics.values_revision += 1
 
     def _follow_robots(self) -> None:
-        if self.fleet.revision != self._robots_seen:
-            self._robots_seen = self.fleet.revision
+        if self.fleet.revision != self._robots_revision:
+            self._robots_revision = self.fleet.revision
             robots = [link.robot for link in self.fleet.connected]
             self.documents.set_connected(robots)
             for robot in robots:
                 self.launcher.came(robot.name)
                 self.alerts.resolve(f"companion:{robot.name}")
-        self._keep_within_reach()
+        self._update_stop_targets()
         topics = self.live.topics
-        if topics.revision != self._topics_seen:
-            self._topics_seen = topics.revision
+        if topics.revision != self._topics_revision:
+            self._topics_revision = topics.revision
             self.documents.set_topics(sorted(topic.name for topic in topics.live()))
 
-    def _look_for_problems_of_stop(self) -> None:
+    def _check_stop_connections(self) -> None:
         # Alerts about robots that a stop can't reach; the next tick tries to connect to them again.
         problems = self.stopper.problems if self.stopper is not None else {}
         self._health.unreachable(problems)
-        self._tries_to_reach = bool(problems)
+        self._retries_stop_connections = bool(problems)
 
-    def _keep_within_reach(self) -> None:
+    def _update_stop_targets(self) -> None:
         # Covers connected robots and those that disconnected while a program used them or without a stop.
         if self.stopper is not None:
             self.stopper.deliver()
@@ -587,7 +587,7 @@ class Session:
                 link.is_reached = self.stopper.reaches(link.name)
         targets = self.fleet.stop_targets
         stopper = self.stopper
-        if stopper is not None and (targets != self._reachable or self._tries_to_reach):
-            self._reachable, self._tries_to_reach = targets, False
+        if stopper is not None and (targets != self._reachable or self._retries_stop_connections):
+            self._reachable, self._retries_stop_connections = targets, False
             stopper.expect(targets)
             self.source.submit(NO_WATCH, lambda _node: stopper.set_robots(targets))

@@ -145,9 +145,9 @@ def test_what_is_raised_anywhere_is_logged(heard: pytest.LogCaptureFixture) -> N
     one = Ends()
     del one
     assert [record.getMessage() for record in heard.records] == [
-        "a fault of Studio: ValueError: a slot of Qt",
-        "'some thread' ended: KeyError: 'key'",
-        "while something ended: OSError: while it ends",
+        "uncaught exception: ValueError: a slot of Qt",
+        "uncaught exception in thread 'some thread': KeyError: 'key'",
+        "exception ignored in a finalizer: OSError: while it ends",
     ]
 
 
@@ -346,7 +346,7 @@ def test_the_source_outlives_a_graph_that_nobody_can_take(
         assert again.wait(20)
     finally:
         source.close()
-    assert "can't follow the network" in caplog.text
+    assert "can't poll the network" in caplog.text
 
 
 class Unsayable:
@@ -357,9 +357,9 @@ class Unsayable:
 @pytest.mark.parametrize(
     ("text", "value", "said"),
     [
-        ("%d items", "many", "%d items (its values can't be said: TypeError)"),
-        ("it is %s", Unsayable(), "it is %s (its values can't be said: ValueError)"),
-        (Unsayable(), None, "Unsayable (its values can't be said: ValueError)"),
+        ("%d items", "many", "%d items (its arguments can't be formatted: TypeError)"),
+        ("it is %s", Unsayable(), "it is %s (its arguments can't be formatted: ValueError)"),
+        (Unsayable(), None, "Unsayable (its arguments can't be formatted: ValueError)"),
     ],
 )
 def test_who_logs_what_can_not_be_said_goes_on_and_the_text_is_kept(

@@ -29,7 +29,7 @@ def ran(name: str, *, daemon: bool) -> subprocess.CompletedProcess[str]:
 def test_the_process_ends_and_the_log_says_without_whom() -> None:
     done = ran("never ends", daemon=False)
     assert (done.returncode, done.stdout) == (3, "kept\n")
-    assert "Studio ends without 'never ends', which goes on" in done.stderr
+    assert "exiting while threads are still running: 'never ends'" in done.stderr
 
 
 def test_a_daemon_is_nobody_to_wait_for() -> None:
