@@ -21,7 +21,7 @@ SHARE = 0.07
 ADVANCE_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
-LOOK_S = 0.0002
+CLOCK_READ_INTERVAL_S = 0.0002
 """Reading the clock takes as long as decoding a small message, so it is read once per this much work."""
 SOME, SOME_BYTES = 256, 64_000
 
@@ -63,7 +63,7 @@ class Checks:
             return
         found = Checked()
         self._refill()
-        self._try(topic, messages, found)
+        self._check(topic, messages, found)
         with self._lock:
             old = self._found.get(topic)
             if old is not None:
@@ -84,7 +84,7 @@ class Checks:
         self._advance_s = min(ADVANCE_S, self._advance_s + max(0.0, now - self._refilled) * SHARE)
         self._refilled = now
 
-    def _try(self, topic: str, messages: Sequence[Message], found: Checked) -> None:
+    def _check(self, topic: str, messages: Sequence[Message], found: Checked) -> None:
         newest = messages[-1]
         # the newest is always decoded and stays decoded: panels show it
         found.sentence = _problem(newest, keep=True)
@@ -94,21 +94,21 @@ class Checks:
         if found.bad:
             self._suspects[topic] = now
         if len(messages) > 1:  # reading the clock takes longer than a single message
-            self._try_older(topic, messages, found, now)
+            self._check_older(topic, messages, found, now)
 
-    def _try_older(self, topic: str, messages: Sequence[Message], found: Checked, now: float) -> None:
+    def _check_older(self, topic: str, messages: Sequence[Message], found: Checked, now: float) -> None:
         began = self._work()
         left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
         place, some, worked, older = 0, 1, 0.0, len(messages) - 1
         while place < older and worked < left:
             was_well, before = not found.bad, worked
             end = min(older, place + some)
-            place = _try_some(messages, place, end, found)
+            place = _check_batch(messages, place, end, found)
             if was_well and found.bad:
                 self._suspects[topic] = now
                 left = self._advance_s
             worked = self._work() - began
-            some = min(2 * some, SOME) if worked - before < LOOK_S else max(1, some // 2)
+            some = min(2 * some, SOME) if worked - before < CLOCK_READ_INTERVAL_S else max(1, some // 2)
         found.unchecked = len(messages) - found.checked
         self._advance_s -= worked
 
@@ -120,7 +120,7 @@ class Checks:
         return seen is not None
 
 
-def _try_some(messages: Sequence[Message], place: int, end: int, found: Checked) -> int:
+def _check_batch(messages: Sequence[Message], place: int, end: int, found: Checked) -> int:
     # Returns the index of the first message that was not decoded (fewer are decoded when they are large).
     size_bytes = 0
     while place < end and size_bytes < SOME_BYTES:

@@ -22,7 +22,7 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
     """Return sentences for new nodes with their topics, new topics of known nodes, and nodes that left."""
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
-    came = [id for id, node in after.nodes.items() if id not in before.nodes and _told(node)]
+    came = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]
     told: set[str] = set()
     topics_of = _topics_by_node(after)
     for node in came:
@@ -36,21 +36,21 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
             here.append((name, words.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
-        if count and name not in told and not _ours(name) and not _published(before, name):
+        if count and name not in told and not _is_internal(name) and not _published(before, name):
             words = ngettext("{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count)
             more.append((name, words.format(topic=name, count=count)))
-    left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _told(node)]
+    left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)]
     return [
-        *_gathered(here, _("{count} nodes joined: {names} and {more} more")),
-        *_gathered(more, _("{count} new topics: {names} and {more} more")),
-        *_gathered(
+        *_summarized(here, _("{count} nodes joined: {names} and {more} more")),
+        *_summarized(more, _("{count} new topics: {names} and {more} more")),
+        *_summarized(
             [(name, _("{node} left").format(node=name)) for name in left],
             _("{count} nodes left: {names} and {more} more"),
         ),
     ]
 
 
-def _gathered(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
+def _summarized(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
     if len(lines) <= MOST_LINES:
         return [line for _name, line in lines]
     named = ", ".join(name for name, _line in lines[:NAMED])
@@ -70,12 +70,12 @@ def _here_with(node: str, count: int, *, original: bool) -> str:
     return words.format(node=node, count=count)
 
 
-def _told(node: NodeInfo) -> bool:
+def _is_reported(node: NodeInfo) -> bool:
     # a behaviour's program is reported by its run; the gateway and the master's log node belong to the master
     return node.generation != GATEWAY and node.name != MASTER and not node.name.startswith(PROGRAM)
 
 
-def _ours(topic: str) -> bool:
+def _is_internal(topic: str) -> bool:
     return topic.startswith(NEP)
 
 
@@ -86,7 +86,7 @@ def _published(view: GraphView, topic: str) -> bool:
 def _topics_by_node(view: GraphView) -> dict[str, dict[str, None]]:
     found: dict[str, dict[str, None]] = {}
     for name, info in view.topics.items():
-        if not _ours(name):
+        if not _is_internal(name):
             for publisher in info.publishers:
                 found.setdefault(publisher.node_id, {})[name] = None
     return found

@@ -69,7 +69,7 @@ class Mailbox:
         self._rings: dict[str, _Ring] = {}
         self._events: deque[object] = deque()
         self._lost_events = 0
-        self._rooms: dict[str, int] = {}
+        self._ring_sizes: dict[str, int] = {}
 
     def set_room(self, topic: str, messages: int | None) -> None:
         """Set the ring size of a topic in messages (at least 1, the byte limit stays).
@@ -78,9 +78,9 @@ class Mailbox:
         """
         with self._lock:
             if messages is None:
-                self._rooms.pop(topic, None)
+                self._ring_sizes.pop(topic, None)
             else:
-                self._rooms[topic] = max(1, messages)
+                self._ring_sizes[topic] = max(1, messages)
 
     def post(self, topic: str, messages: Sequence[Message]) -> None:
         """Post a batch of one topic, oldest first, under one lock.
@@ -88,7 +88,7 @@ class Mailbox:
         Messages beyond the ring's size are only counted, so a batch of thousands costs no more than a full
         ring.
         """
-        room = self._rooms.get(topic, self._messages_per_topic)
+        room = self._ring_sizes.get(topic, self._messages_per_topic)
         newest = messages[-room:]
         size_bytes = sum(message.size_bytes for message in newest)
         with self._lock:

@@ -75,7 +75,7 @@ class MasterStart:
         self._address, self._failed, self._clock = address, failed, clock
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
-        self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
+        self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
         self.first = False
         """True if no master ran before this one was started, so that no other node can be registered yet."""
 
@@ -93,7 +93,7 @@ class MasterStart:
 
     def keep(self) -> None:
         """Call `ensure` unless the back-off after a failure is still running. Call it repeatedly."""
-        if self._clock() >= self._again_at:
+        if self._clock() >= self._retry_at:
             self.ensure()
 
     def close(self) -> None:
@@ -102,24 +102,24 @@ class MasterStart:
             self._thread.join(timeout=END_WAIT_S)
 
     def _start(self) -> None:
-        why = self._why_not()
+        why = self._start_or_reason()
         if not why:
-            self._wait_s, self._again_at, self._told = AGAIN_S, 0.0, ""
+            self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
             return
-        self._again_at = self._clock() + self._wait_s
+        self._retry_at = self._clock() + self._wait_s
         self._wait_s = min(2 * self._wait_s, AGAIN_AT_MOST_S)
-        if why != self._told:
-            self._told = why
+        if why != self._last_reason:
+            self._last_reason = why
             self._failed(why)
 
-    def _why_not(self) -> str:
+    def _start_or_reason(self) -> str:
         if is_running(self._address, timeout_s=0.5):
             return ""
         hindered = doctor.start_obstacle(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.mend}"
         self.first = True
-        self._look_back()
+        self._log_crash()
         try:
             self._process = start_process(
                 self._address, owner_pid=os.getpid(), command=module_command("nep"), timeout_s=START_S
@@ -128,7 +128,7 @@ class MasterStart:
             return str(error)
         return ""
 
-    def _look_back(self) -> None:
+    def _log_crash(self) -> None:
         code = self._process.poll() if self._process is not None else None
         if code is None:
             return

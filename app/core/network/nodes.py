@@ -70,7 +70,7 @@ class Nodes:
         self._network = network
         self._nodes: dict[str, NodeEntry] = {}
         self._first_graph = True
-        self._seen = (0, 0)
+        self._last_version = (0, 0)
         self.revision = 0
         self.values_revision = 0
 
@@ -100,9 +100,9 @@ class Nodes:
 
     def update(self, view: GraphView, now: float) -> None:
         """Apply a new graph; ``now`` is monotonic seconds."""
-        if (view.epoch, view.revision) != self._seen:
-            self._seen = (view.epoch, view.revision)
-            self._take_all(view, now)
+        if (view.epoch, view.revision) != self._last_version:
+            self._last_version = (view.epoch, view.revision)
+            self._update_all(view, now)
         for id, node in self._nodes.items():
             if id in view.nodes:
                 node.cpu_ratio = view.nodes[id].cpu_ratio
@@ -119,7 +119,7 @@ class Nodes:
                 del self._nodes[node.id]
                 self.revision += 1
 
-    def _take_all(self, view: GraphView, now: float) -> None:
+    def _update_all(self, view: GraphView, now: float) -> None:
         publishes, subscribes = _topics_by_node(view)
         for id, info in view.nodes.items():
             if info.generation == GATEWAY:
@@ -129,7 +129,7 @@ class Nodes:
                 self._replace_gone(info)
                 new = not self._first_graph
                 node = self._nodes[id] = NodeEntry(id, info.name, new=new, network=self._network)
-            _take(node, info)
+            _update_entry(node, info)
             place = place_of(id)
             node.may_set = place in view.services
             told = view.topics.get(place)
@@ -148,7 +148,7 @@ class Nodes:
                 del self._nodes[id]
 
 
-def _take(node: NodeEntry, info: NodeInfo) -> None:
+def _update_entry(node: NodeEntry, info: NodeInfo) -> None:
     node.name, node.host, node.pid = info.name, info.host, info.pid
     node.language, node.generation, node.since_ns = info.language, info.generation, info.since_ns
     node.gone_since = node.gone_s = None

@@ -68,7 +68,7 @@ class RemoteAccess:
 
     def listen_at(self, hosts: Sequence[str]) -> None:
         """Listen for other computers at these addresses, or at none; saved for the next start."""
-        self._tell(tuple(hosts))  # first, because shutting others out must not wait for a disk
+        self._request(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
             self._settings.set(KEPT, list(hosts))
         except SettingsError as error:
@@ -97,7 +97,7 @@ class RemoteAccess:
             hosts: list[object] = self._settings.get(KEPT, [])
             kept = tuple(map(str, hosts))
             if kept and self.is_near and set(kept) - set(self.hosts):
-                self._tell(kept)
+                self._request(kept)
 
     def changed(self, event: RemoteAccessChanged) -> None:
         """Apply the master's reply."""
@@ -119,7 +119,7 @@ class RemoteAccess:
         if self._asking is not None:
             self._asking.join(3.0)
 
-    def _tell(self, hosts: tuple[str, ...]) -> None:
+    def _request(self, hosts: tuple[str, ...]) -> None:
         before = self._asking
 
         def work() -> None:

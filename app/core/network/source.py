@@ -137,7 +137,7 @@ class LiveSource:
         self._node: Node | None = None
         self._subscribers: dict[str, tuple[str, Subscriber]] = {}
         self._missed_before: Counter[str] = Counter()
-        self._found: bool | None = None
+        self._is_connected: bool | None = None
         self._view: GraphView | None = None
 
     def start(self) -> None:
@@ -150,13 +150,13 @@ class LiveSource:
             self._wanted.add(topic)
             held = self._subscribers.get(topic)
             self._missed_before[topic] = -(held[1].lost or 0) if held is not None else 0
-        self.submit("", _nothing)
+        self.submit("", _wake)
 
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from ``topic``."""
         with self._lock:
             self._wanted.discard(topic)
-        self.submit("", _nothing)
+        self.submit("", _wake)
 
     def submit(self, what: str, job: Job) -> None:
         """Queue a job; jobs run in order and wait until a master answers."""
@@ -215,8 +215,8 @@ class LiveSource:
         try:
             while not self._closing.is_set():
                 went_well = False
-                with log_errors("follow the network"):
-                    went_well = self._turn()
+                with log_errors("poll the network"):
+                    went_well = self._run_cycle()
                 if not went_well:
                     self._closing.wait(self.poll_s)
         finally:
@@ -226,11 +226,11 @@ class LiveSource:
             if self._node is not None:
                 self._node.close()
 
-    def _turn(self) -> bool:
+    def _run_cycle(self) -> bool:
         # One cycle: join, query, run jobs until the next query. False while no master answers.
         if self._node is None and not self._join():
             return False
-        asked_s = self._ask()
+        asked_s = self._query_graph()
         pause_s = max(self.poll_s, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
         self._do_jobs(time.monotonic() + pause_s)
         return True
@@ -239,16 +239,16 @@ class LiveSource:
         try:
             self._node = self.join()
         except NepError as error:
-            self._lost(str(error))
+            self._report_lost(str(error))
             return False
         return True
 
-    def _lost(self, sentence: str) -> None:
-        if self._found is not False:
-            self._found = False
+    def _report_lost(self, sentence: str) -> None:
+        if self._is_connected is not False:
+            self._is_connected = False
             self._post_event(MasterLost(self.address, sentence))
 
-    def _ask(self) -> float:
+    def _query_graph(self) -> float:
         # Returns the duration of the query in seconds, 0.0 when it failed.
         if self._node is None:
             return 0.0
@@ -256,11 +256,11 @@ class LiveSource:
         try:
             view = self.look(self._node)
         except NepError as error:
-            self._lost(str(error))
+            self._report_lost(str(error))
             return 0.0
         asked_s = time.monotonic() - asked
-        if self._found is not True:
-            self._found = True
+        if self._is_connected is not True:
+            self._is_connected = True
             self._post_event(MasterFound(self.address))
         self._post_event(GraphSeen(view, asked_s))
         self._view = view
@@ -281,7 +281,7 @@ class LiveSource:
             except NepError as error:
                 self._post_event(JobFailed(what, str(error)))
             except Exception as error:  # noqa: BLE001  a failing job must not end the thread
-                _log.exception("a job on the network failed")
+                _log.exception("a network job failed")
                 self._post_event(JobFailed(what, error_words(error)))
             self._reconcile()
 
@@ -292,7 +292,7 @@ class LiveSource:
         with self._lock:
             wanted = {*self._wanted, *self._always}
         for topic in [topic for topic in self._subscribers if topic not in wanted]:
-            self._leave(topic)
+            self._unsubscribe(topic)
             self._missed_before.pop(topic, None)
         for topic in wanted:
             info = view.topics.get(topic)
@@ -301,7 +301,7 @@ class LiveSource:
                 continue
             held = self._subscribers.get(topic)
             if held is not None and held[0] != msg_type:
-                self._missed_before[topic] += self._leave(topic)
+                self._missed_before[topic] += self._unsubscribe(topic)
                 held = None
             if held is None:
                 self._subscribe(topic, msg_type)
@@ -317,7 +317,7 @@ class LiveSource:
         with self._lock:
             self._subscribers[topic] = (msg_type, subscriber)
 
-    def _leave(self, topic: str) -> int:
+    def _unsubscribe(self, topic: str) -> int:
         # Returns the number of lost messages of the subscription.
         with self._lock:
             _, subscriber = self._subscribers.pop(topic)
@@ -326,7 +326,7 @@ class LiveSource:
 
     def _deliver(self, topic: str, messages: Sequence[Message]) -> None:
         for sink in self._sinks:
-            with log_errors(f"take messages of {topic}"):
+            with log_errors(f"process messages of {topic}"):
                 sink(topic, messages)
 
 
@@ -336,4 +336,4 @@ def _free_name(view: GraphView) -> str:
     return NODE_NAME if NODE_NAME not in taken else next(name for name in others if name not in taken)
 
 
-def _nothing(_node: Node) -> None: ...
+def _wake(_node: Node) -> None: ...

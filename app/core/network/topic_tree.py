@@ -99,7 +99,7 @@ class TopicTree:
         self._folders: dict[str, TopicFolder] = {}
         self._top: list[TreeRow] = []
         for topic in topics:
-            self._put(topic)
+            self._insert(topic)
 
     def __contains__(self, key: object) -> bool:
         return key in self._folders
@@ -126,7 +126,7 @@ class TopicTree:
         for folder in self._folders.values():
             folder.renew()
 
-    def _put(self, topic: Topic) -> None:
+    def _insert(self, topic: Topic) -> None:
         inside, path = self._top, "/"
         for deep, part in enumerate(parts_of_name(topic.name)[:-1]):
             path = f"{path}{part}/"

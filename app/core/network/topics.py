@@ -118,17 +118,17 @@ class Topics:
         self._view: GraphView | None = None
         self._clocks: Mapping[str, int] = {}
         """Clock offset of each node on another computer, to add to its times (ns)."""
-        self._aged = 0
-        self._told_at = 0.0
-        self._past: set[str] = set()  # vanished, but still watched
+        self._next_index = 0
+        self._reported_at = 0.0
+        self._hidden: set[str] = set()  # vanished, but still watched
         self.revision = 0
         self.values_revision = 0
 
     def __iter__(self) -> Iterator[Topic]:
-        return (topic for topic in self._topics.values() if topic.name not in self._past)
+        return (topic for topic in self._topics.values() if topic.name not in self._hidden)
 
     def __len__(self) -> int:
-        return len(self._topics) - len(self._past)
+        return len(self._topics) - len(self._hidden)
 
     def __getitem__(self, name: str) -> Topic:
         return self._topics[name]
@@ -164,10 +164,10 @@ class Topics:
         seen = (view.epoch, view.revision)
         self._clocks = self._clocks_in(view)
         if seen != self._seen:
-            self._take_all(view, now)
+            self._apply_graph(view, now)
         elif len(self._topics) <= AT_ONCE:
-            _renew(self._topics.values(), view, now, self._clocks)
-        self._seen, self._view, self._told_at = seen, view, now
+            _update_statistics(self._topics.values(), view, now, self._clocks)
+        self._seen, self._view, self._reported_at = seen, view, now
         self.values_revision += 1
 
     def _own_in(self, view: GraphView) -> set[str]:
@@ -182,7 +182,7 @@ class Topics:
         own = next((known[id] for id in self._own_in(view) if id in known), None)
         return {} if own is None else {id: offset - own for id, offset in known.items() if offset != own}
 
-    def _take_all(self, view: GraphView, now: float) -> None:
+    def _apply_graph(self, view: GraphView, now: float) -> None:
         own = self._own_in(view)
         shown = {
             name: info
@@ -194,7 +194,7 @@ class Topics:
             if topic is None:
                 topic = self._topics[name] = Topic(name, new=not self._first_graph, network=self._network)
                 self.revision += 1
-            self._take(topic, info, view, now)
+            self._apply_info(topic, info, view, now)
         for name, topic in self._topics.items():
             if name not in shown and topic.gone_since is None:
                 self._vanish(topic, now)
@@ -241,28 +241,28 @@ class Topics:
 
         With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` and updates their statistics.
         """
-        if self._aged >= len(self._topics):
-            self._aged = 0
-        begin, self._aged = self._aged, self._aged + AT_ONCE
-        some = list(islice(self._topics.values(), begin, self._aged))
+        if self._next_index >= len(self._topics):
+            self._next_index = 0
+        begin, self._next_index = self._next_index, self._next_index + AT_ONCE
+        some = list(islice(self._topics.values(), begin, self._next_index))
         if self._view is not None and len(self._topics) > AT_ONCE:
-            _renew(some, self._view, self._told_at, self._clocks)
+            _update_statistics(some, self._view, self._reported_at, self._clocks)
         for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
                 if topic.gone_s >= GONE_SHOWN_S:
-                    self._leave(topic)
+                    self._remove_or_hide(topic)
             else:
                 topic.age_s = _age(topic, now, now_ns)
-                topic.silent_s = _silence(topic, now, self._told_at)
+                topic.silent_s = _silence(topic, now, self._reported_at)
 
-    def _leave(self, topic: Topic) -> None:
+    def _remove_or_hide(self, topic: Topic) -> None:
         # A vanished topic that is still watched only leaves the lists.
-        listed = topic.name not in self._past
+        listed = topic.name not in self._hidden
         if topic.watched:
-            self._past.add(topic.name)
+            self._hidden.add(topic.name)
         else:
-            self._past.discard(topic.name)
+            self._hidden.discard(topic.name)
             del self._topics[topic.name]
         self.revision += listed
 
@@ -319,7 +319,7 @@ class Topics:
         topic.silent_s = topic.heard_since = topic.moved_at = None
         self.revision += 1
 
-    def _take(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
+    def _apply_info(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
         before = topic.facts()
         topic.heard_since = _heard_since(topic, info, now)
         topic.msg_type, topic.codec = info.msg_type, info.codec
@@ -327,21 +327,23 @@ class Topics:
         topic.publisher_nodes = _names(info, view)
         topic.gone_since = topic.gone_s = None
         topic.stale = False
-        self._past.discard(topic.name)
-        _take_figures(topic, info, now, self._clocks)
+        self._hidden.discard(topic.name)
+        _apply_statistics(topic, info, now, self._clocks)
         if topic.facts() != before:
             self.revision += 1
 
 
-def _renew(topics: Iterable[Topic], view: GraphView, now: float, clocks: Mapping[str, int]) -> None:
+def _update_statistics(
+    topics: Iterable[Topic], view: GraphView, now: float, clocks: Mapping[str, int]
+) -> None:
     find = view.topics.get
     for topic in topics:
         info = find(topic.name)
         if info is not None and info is not topic.info and topic.gone_since is None:
-            _take_figures(topic, info, now, clocks)
+            _apply_statistics(topic, info, now, clocks)
 
 
-def _take_figures(topic: Topic, info: TopicInfo, now: float, clocks: Mapping[str, int]) -> None:
+def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clocks: Mapping[str, int]) -> None:
     if info.last_stamp_ns is not None and (
         topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
     ):

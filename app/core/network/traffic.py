@@ -48,7 +48,7 @@ class Traffic:
         self._topics = topics
         self._losses = RecentLosses()
         self._recent: deque[tuple[float, int, int]] = deque()
-        self._untold: GraphView | None = None
+        self._pending_view: GraphView | None = None
         self._summed_at = -SUM_EVERY_S
         self.messages_per_s: float | None = None
         self.lost_30s = 0
@@ -57,24 +57,24 @@ class Traffic:
 
     def follow(self, view: GraphView, now: float) -> None:
         """Apply a new graph; ``now`` is monotonic seconds. Large graphs are summed less often."""
-        self._untold = view
+        self._pending_view = view
         if len(view.topics) <= AT_ONCE:
-            self._sum_up(view, now)
+            self._sum(view, now)
         else:
-            self._sum_up_if_due(now)
+            self._sum_if_due(now)
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
         """Count the messages of a tick. Called at every tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
         self._count(shown, sum(batch.arrived for batch in batches.values()), now)
-        self._sum_up_if_due(now)
+        self._sum_if_due(now)
 
-    def _sum_up_if_due(self, now: float) -> None:
-        if self._untold is not None and now - self._summed_at >= SUM_EVERY_S:
-            self._sum_up(self._untold, now)
+    def _sum_if_due(self, now: float) -> None:
+        if self._pending_view is not None and now - self._summed_at >= SUM_EVERY_S:
+            self._sum(self._pending_view, now)
 
-    def _sum_up(self, view: GraphView, now: float) -> None:
-        self._untold, self._summed_at = None, now
+    def _sum(self, view: GraphView, now: float) -> None:
+        self._pending_view, self._summed_at = None, now
         self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(view.topics.values())
 

@@ -80,39 +80,39 @@ class Watches:
         # `begin` is called at a topic's first active watch, `end` when the last one is suspended or closed,
         # `forgotten` when the last one is closed.
         self._begin, self._end, self._forgotten = begin, end, forgotten
-        self._looking: Counter[str] = Counter()
-        self._known: Counter[str] = Counter()
+        self._active_counts: Counter[str] = Counter()
+        self._open_counts: Counter[str] = Counter()
 
     def open(self, topics: Iterable[str]) -> Watch:
         """Open a watch of these topics."""
         watch = Watch(topics, self)
-        self._known.update(watch.topics)
+        self._open_counts.update(watch.topics)
         self.enter(watch.topics)
         return watch
 
     def watched(self, topic: str) -> bool:
         """Return whether the topic has an active watch."""
-        return self._looking[topic] > 0
+        return self._active_counts[topic] > 0
 
     def enter(self, topics: Iterable[str]) -> None:
         """Count one more active watch. Called by `Watch`."""
         for topic in topics:
-            self._looking[topic] += 1
-            if self._looking[topic] == 1:
+            self._active_counts[topic] += 1
+            if self._active_counts[topic] == 1:
                 self._begin(topic)
 
     def leave(self, topics: Iterable[str]) -> None:
         """Count one less active watch. Called by `Watch`."""
         for topic in topics:
-            self._looking[topic] -= 1
-            if self._looking[topic] == 0:
-                del self._looking[topic]
+            self._active_counts[topic] -= 1
+            if self._active_counts[topic] == 0:
+                del self._active_counts[topic]
                 self._end(topic)
 
     def forget(self, topics: Iterable[str]) -> None:
         """Count a closed watch, which is suspended. Called by `Watch`."""
         for topic in topics:
-            self._known[topic] -= 1
-            if self._known[topic] == 0:
-                del self._known[topic]
+            self._open_counts[topic] -= 1
+            if self._open_counts[topic] == 0:
+                del self._open_counts[topic]
                 self._forgotten(topic)

@@ -193,7 +193,7 @@ class Networks:
 
     def start(self) -> None:
         """Join the saved networks; invalid saved addresses are skipped."""
-        for name, address in self._kept().items():
+        for name, address in self._saved().items():
             network = self._networks.get(name)
             if network is not None and isinstance(address, str):
                 try:
@@ -211,17 +211,17 @@ class Networks:
         if not network.is_chosen or checked != network.address:
             self._end(network)
             self._begin(network, checked)
-        self._keep({**self._kept(), name: checked})
+        self._save({**self._saved(), name: checked})
 
     def leave(self, name: str) -> None:
         """Stop showing a network. Raises `SettingsError` when that can't be saved."""
         self._end(self._networks[name])
-        self._keep({kind: address for kind, address in self._kept().items() if kind != name})
+        self._save({kind: address for kind, address in self._saved().items() if kind != name})
 
-    def _kept(self) -> dict[str, object]:
+    def _saved(self) -> dict[str, object]:
         return self._settings.get(KEPT, {})
 
-    def _keep(self, chosen: dict[str, object]) -> None:
+    def _save(self, chosen: dict[str, object]) -> None:
         self._settings.set(KEPT, chosen)
 
     def _begin(self, network: OtherNetwork, address: str) -> None:
@@ -257,9 +257,9 @@ class Networks:
             network.take(told.event, now)
             if network.state != before:
                 self._changes += 1
-                self._tell(network)
+                self._update_alert(network)
 
-    def _tell(self, network: OtherNetwork) -> None:
+    def _update_alert(self, network: OtherNetwork) -> None:
         id = f"network:{network.kind.name}"
         if network.state != "lost":
             self._alerts.resolve(id)

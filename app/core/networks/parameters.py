@@ -122,7 +122,7 @@ class NodeParameters:
         self.refusal = ""
         """Sentence why the last set call was rejected, or ""."""
         self.revision = 0
-        self._shown: Message | None = None
+        self._applied_message: Message | None = None
 
     def show(self, node: NodeEntry | None) -> None:
         """Show the parameters of this node, which may have none; None shows no node."""
@@ -138,7 +138,7 @@ class NodeParameters:
         """Show no node."""
         if self.watching is not None:
             self.watching.close()
-        self.watching = self.node = self._shown = None
+        self.watching = self.node = self._applied_message = None
         self.all, self.changed, self.heard = (), {}, False
         self.problem = self.setting = self.refusal = ""
         self.revision += 1
@@ -154,13 +154,13 @@ class NodeParameters:
             return
         topic = self._topic(key_of(node.network, place_of(node.id)))
         newest = topic.newest if topic is not None else None
-        if newest is not None and newest is not self._shown:
-            self._shown = newest
-            self._take(newest, now)
+        if newest is not None and newest is not self._applied_message:
+            self._applied_message = newest
+            self._apply(newest, now)
         if self.setting:
-            self._look_how_it_went(node)
+            self._poll_result(node)
 
-    def _take(self, message: Message, now: float) -> None:
+    def _apply(self, message: Message, now: float) -> None:
         self.revision += 1
         try:
             if message.size_bytes > READ_BYTES:
@@ -180,7 +180,7 @@ class NodeParameters:
             )
         self.all, self.heard, self.problem = told, True, ""
 
-    def _look_how_it_went(self, node: NodeEntry) -> None:
+    def _poll_result(self, node: NodeEntry) -> None:
         try:
             done = self._setter.take(node.id, self.setting)
         except NepError as error:

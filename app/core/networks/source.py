@@ -42,7 +42,7 @@ class OtherSource(LiveSource):
 
     def join(self) -> Node:
         """Join the network. Raises `NepError` while it doesn't answer."""
-        with _in_words():
+        with _converted_errors():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=LOOK_S)
 
     def look(self, node: Node) -> GraphView:
@@ -51,7 +51,7 @@ class OtherSource(LiveSource):
         The revision increases with every change of nodes or topics: back ends that collect a new graph each
         time give different graphs the same number.
         """
-        with _in_words():
+        with _converted_errors():
             view = node.graph(timeout_s=LOOK_S)
         topics = {
             name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
@@ -67,7 +67,7 @@ class OtherSource(LiveSource):
         """Subscribe to a topic with the type by which it is read."""
         info = self._view.topics.get(topic) if self._view is not None else None
         wanted = self._kind.reads(info) if info is not None else msg_type
-        with _in_words():
+        with _converted_errors():
             return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
 
 
@@ -90,7 +90,7 @@ def _members(view: GraphView) -> object:
 
 
 @contextmanager
-def _in_words() -> Iterator[None]:
+def _converted_errors() -> Iterator[None]:
     # Converts exceptions of a back end's library to `NepError`.
     try:
         yield
