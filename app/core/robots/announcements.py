@@ -78,7 +78,7 @@ class Announcements:
         # A robot whose topic `is_proven` (it has answered, or may move) is never evicted.
         self._is_proven = is_proven
         self._watches, self._senders, self._clock = watches, senders, clock
-        self._may_read_s, self._looked_s = READING_S, clock()
+        self._parse_budget_s, self._budget_updated_s = READING_S, clock()
         self._waiting: set[str] = set()
         self._topics: dict[str, _Announced] = {}
         self.left_out: tuple[str, ...] = ()
@@ -142,11 +142,11 @@ class Announcements:
         self._senders.learn(view, there)
         for topic, known in self._topics.items():
             if topic not in there:
-                self._end(known)
+                self._mark_vanished(known)
         left_out: list[str] = []
-        for place, topic in _fairly(there):
+        for place, topic in _in_fair_order(there):
             nodes = there[topic]
-            begun = self._topics.get(topic) or self._begin(topic, place, left_out)
+            begun = self._topics.get(topic) or self._add_topic(topic, place, left_out)
             if begun is None:
                 left_out.append(topic)
                 continue
@@ -167,7 +167,7 @@ class Announcements:
             }
             self._waiting.add(topic)
         self.left_out = tuple(left_out)
-        self._read()
+        self._parse_waiting()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
         """Add received descriptions; return whether any was parsed, including earlier ones."""
@@ -178,13 +178,13 @@ class Announcements:
                     known.told.pop(message.publisher, None)  # so that the newest is last
                     known.told[message.publisher] = message
             while len(known.told) > MOST_CLAIMANTS:
-                self._drop_one(known)
+                self._evict_one(known)
             self._waiting.add(topic)
-        return self._read()
+        return self._parse_waiting()
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _begin(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
+    def _add_topic(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
         # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
         # more robots than this one.
         if len(self._topics) >= MOST_ROBOTS:
@@ -196,10 +196,10 @@ class Announcements:
                 left_out.append(last)
             if gone is None:
                 return None
-            self._end(self._topics.pop(gone))
+            self._mark_vanished(self._topics.pop(gone))
         return self._topics.setdefault(topic, _Announced())
 
-    def _end(self, known: _Announced) -> None:
+    def _mark_vanished(self, known: _Announced) -> None:
         # The owner and its description are kept: after a restart of the master or a suspension it returns
         # over the same connection.
         if known.watch is not None:
@@ -207,7 +207,7 @@ class Announcements:
         known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
         known.told = {id: told for id, told in known.told.items() if self._is_owners(known, told)}
 
-    def _drop_one(self, known: _Announced) -> None:
+    def _evict_one(self, known: _Announced) -> None:
         # Evicts another publisher's description; those of the robot's programs last.
         for owners in (known.owners, known.owners[:1]):
             for id, told in known.told.items():
@@ -219,12 +219,14 @@ class Announcements:
     def _is_owners(self, known: _Announced, message: Message) -> bool:
         return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
 
-    def _read(self) -> bool:
+    def _parse_waiting(self) -> bool:
         # New robots first, then the shortest description. The time is limited, so that a program that keeps
         # changing a long description can't block the window and its Stop.
         now = self._clock()
-        self._may_read_s = min(READING_S, self._may_read_s + (now - self._looked_s) * READING_SHARE)
-        self._looked_s = now
+        self._parse_budget_s = min(
+            READING_S, self._parse_budget_s + (now - self._budget_updated_s) * READING_SHARE
+        )
+        self._budget_updated_s = now
         wait = {topic: newest for topic in self._waiting if (newest := self._unread(topic)) is not None}
         self._waiting = set(wait)
 
@@ -232,11 +234,11 @@ class Announcements:
             return self._topics[each[0]].parsed is not None, len(each[1].data)
 
         for topic, newest in sorted(wait.items(), key=turn):
-            if self._may_read_s <= 0:
+            if self._parse_budget_s <= 0:
                 break
             began = self._clock()
             self._parse(topic, newest)
-            self._may_read_s -= self._clock() - began
+            self._parse_budget_s -= self._clock() - began
             self._waiting.discard(topic)
         return len(self._waiting) < len(wait)
 
@@ -273,7 +275,7 @@ class Announcements:
             known.wrong = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
 
 
-def _fairly(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
+def _in_fair_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
     # Sorted so that the first topic of each node comes before the second topic of any node.
     counts: Counter[str] = Counter()
     placed = []

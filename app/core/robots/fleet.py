@@ -73,11 +73,11 @@ class Fleet:
         self._unlisted: tuple[StopTarget, ...] = ()
         self._settings = settings
         self._names: dict[str, str] = {}
-        self._taken: dict[str, Claim] = {}
+        self._foreign_claims: dict[str, Claim] = {}
         self._notes: list[str] = []
-        self._rize = RizeNames()
+        self._rize_names = RizeNames()
         self._rize_events: Watch | None = None
-        self._alive = Heartbeat(SENDER, "studio-alive")
+        self._heartbeat = Heartbeat(SENDER, "studio-alive")
         self.permission = MotionPermission(settings, self._identity_of)
         self.known = KnownRobots(settings)
         self._movable = MovableRobots(self._links, self._names)
@@ -85,7 +85,7 @@ class Fleet:
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own.other_programs)
         """Robots that a Stop must name."""
-        self._tries = Tries(self._send, self._alive.rest, clock)
+        self._tries = Tries(self._send, self._heartbeat.rest, clock)
         self._messages = RobotMessages(self._own, self._tries, self.moved, clock)
         self._chosen = ""
         self._has_graph = False
@@ -171,7 +171,7 @@ class Fleet:
         if invocation.running:  # a velocity outlasts its final answer: only a Stop ends it
             self.moved.note([name], "form", id="" if described.repeat_s is not None else invocation.id)
         if invocation.running and link.publisher is not None and link.robot.dialect == "native":
-            self._alive.beat(name, link.publisher.publish)
+            self._heartbeat.beat(name, link.publisher.publish)
         return invocation
 
     def _try_again(self, name: str, action: str, input: Payload) -> None:
@@ -264,7 +264,7 @@ class Fleet:
             link.has_proven_stop |= name in report.still
             if not link.not_stopped:
                 self._tries.end_all(link, "canceled")
-            self._alive.rest(name)
+            self._heartbeat.rest(name)
 
     def stands_still(self, names: Iterable[str]) -> None:
         """Apply the user's confirmation that these robots have stopped."""
@@ -303,18 +303,18 @@ class Fleet:
         for link in self._links.values():
             if link.connected and link.publisher is None:
                 self._publishers.open(link)
-        self._forget_away()
+        self._evict_disconnected()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Process received messages: descriptions, replies, sensor values."""
         if self._announcements.add(batches):
             self._follow_announced()
-            self._forget_away()
+            self._evict_disconnected()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
             name = rize.ready(mapping_of(message))
             if name is not None:
-                self._rize.tell(name)
+                self._rize_names.tell(name)
         for link in self._links.values():
             self._messages.read(link, batches)
             began_s = link.stop_began_s
@@ -327,7 +327,7 @@ class Fleet:
     @property
     def claims(self) -> Mapping[str, Claim]:
         """Rejected announcements of programs, by an id."""
-        return {**self._announcements.claims, **self._taken}
+        return {**self._announcements.claims, **self._foreign_claims}
 
     def take_notes(self) -> tuple[str, ...]:
         """Return and clear notices for the user about restarted robots."""
@@ -337,7 +337,7 @@ class Fleet:
     def close(self) -> None:
         """Stop the heartbeat and close the command publishers."""
         self.known.saw([link.robot for link in self.connected])
-        self._alive.close()
+        self._heartbeat.close()
         for link in self._links.values():
             close_publishers(link)
 
@@ -381,14 +381,14 @@ class Fleet:
         if self._rize_events is None and rize.EVENTS in view.topics:
             self._rize_events = self._watches.open([rize.EVENTS])
         native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
-        there = self._rize.present(view, native)
+        there = self._rize_names.present(view, native)
         for name in there:
             known = self._links.get(name)
             if known is None or known.robot.dialect == "rize":
                 self.join(rize.robot(name), f"{rize.COMMANDS} {name}")
         for link in self._links.values():
             if link.robot.dialect == "rize" and link.connected and link.name not in there:
-                self._away(link)
+                self._disconnect(link)
 
     def _follow_announced(self) -> None:
         # Connects announced robots; disconnects those whose program is no longer listed.
@@ -399,19 +399,19 @@ class Fleet:
                 continue
             is_same = now is not None and now[0].name == name and now[1] == link.identity
             if not is_same and not (now is None and self._is_unread(topic, link)):
-                self._away(link)
-        for topic in self._taken.keys() - found.keys():
-            del self._taken[topic]
+                self._disconnect(link)
+        for topic in self._foreign_claims.keys() - found.keys():
+            del self._foreign_claims[topic]
         for topic, (robot, identity) in found.items():
             claim = self._foreign(robot)
             if claim is None:
-                self._taken.pop(topic, None)
+                self._foreign_claims.pop(topic, None)
                 self.join(robot, topic, identity)
                 continue
-            self._taken[topic] = claim
+            self._foreign_claims[topic] = claim
             link = self._links.get(robot.name)
             if link is not None and link.connected:
-                self._away(link)
+                self._disconnect(link)
 
     def _is_unread(self, topic: str, link: RobotLink) -> bool:
         # The program is still listed, but its newest description can't be parsed.
@@ -467,30 +467,30 @@ class Fleet:
                 robot=link.name, now=identity.words, before=before.words
             )
         )
-        self._keep_going(link, before)
+        self._record_unended_actions(link, before)
         self._drop_ended(link)
 
     def _leave_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
-        self._alive.rest(link.name)
+        self._heartbeat.rest(link.name)
         self._tries.end_all(link, "failed", _("{robot} has changed; try again").format(robot=link.name))
         if link.watch is not None:
             link.watch.close()
             link.watch = None
         self._publishers.leave(link)
 
-    def _keep_going(self, link: RobotLink, program: Identity | None) -> None:
+    def _record_unended_actions(self, link: RobotLink, program: Identity | None) -> None:
         # Records actions that the robot could not end: their end can no longer be observed.
         if link.goes_on and not link.virtual:  # a virtual robot is its program
             self.moved.note([link.name], "action", program=program)
             link.not_stopped = link.not_stopped or link.goes_on
         link.goes_on = ""
 
-    def _away(self, link: RobotLink) -> None:
+    def _disconnect(self, link: RobotLink) -> None:
         link.connected, link.gone_s = False, self._clock()
-        self._keep_going(link, link.identity)
+        self._record_unended_actions(link, link.identity)
         self.known.saw([link.robot])
-        self._alive.rest(link.name)
+        self._heartbeat.rest(link.name)
         if link.watch is not None:
             link.watch.close()
             link.watch = None
@@ -502,7 +502,7 @@ class Fleet:
         )
         self.revision += 1
 
-    def _forget_away(self) -> None:
+    def _evict_disconnected(self) -> None:
         # Limits disconnected robots: any program can announce any number of names.
         in_use = {self._chosen, *self.used(), *self.moved.names}
         for link in excess_away(self._links.values(), in_use):

@@ -49,7 +49,7 @@ class Health:
         self._claims: set[str] = set()
         self._unreachable: set[str] = set()
         self._bad: dict[str, _Bad] = {}
-        self._away: dict[str, float] = {}
+        self._gone_since: dict[str, float] = {}
         self._robots: set[str] = set()
 
     def look(self, found: Mapping[str, Checked]) -> None:
@@ -69,7 +69,7 @@ class Health:
             if checked.bad:
                 bad.since = self._clock()
                 bad.count += checked.bad
-                self._tell(topic, bad, checked)
+                self._alert_bad_topic(topic, bad, checked)
 
     def forget(self, topic: str) -> None:
         """Discard the problems of a topic that is no longer watched or is well again."""
@@ -92,7 +92,7 @@ class Health:
             self._check_motion(link)
             self._check_driver(link, now)
             if link.connected:
-                self._away.pop(link.name, None)
+                self._gone_since.pop(link.name, None)
                 self._alerts.resolve(f"robot:{link.name}")
             elif link.name in used:
                 self._alerts.put(
@@ -188,12 +188,12 @@ class Health:
                 self._alerts.put(found.id, "warn", found.sentence, found.hint, count=0)
         if ports:
             ids.add(PORTS)
-            self._tell_ports(ports)
+            self._alert_ports(ports)
         for gone in self._from_graph - ids:
             self._alerts.resolve(gone)
         self._from_graph = ids
 
-    def _tell_ports(self, taken: Sequence[Alert]) -> None:
+    def _alert_ports(self, taken: Sequence[Alert]) -> None:
         # One alert for all occupied ports of the original NEP: only its programs need them.
         title, detail = taken[0].sentence, taken[0].hint
         if len(taken) > 1:
@@ -207,7 +207,7 @@ class Health:
             PORTS, "warn", title, detail, button=step, action="help.doctor", count=0, for_developers=True
         )
 
-    def _tell(self, topic: str, bad: _Bad, checked: Checked) -> None:
+    def _alert_bad_topic(self, topic: str, bad: _Bad, checked: Checked) -> None:
         title = ngettext(
             "{topic} sends messages that can't be decoded ({count} message).",
             "{topic} sends messages that can't be decoded ({count} messages).",
@@ -231,7 +231,7 @@ class Health:
 
     def _check_presence(self, link: RobotLink, now: float, *, runs_here: bool) -> None:
         # A real robot that left, or a virtual one that hangs.
-        since = self._away.setdefault(link.name, now)
+        since = self._gone_since.setdefault(link.name, now)
         if now - since < AWAY_S or (link.virtual and not runs_here):
             self._alerts.resolve(f"robot:{link.name}")
             return
@@ -251,7 +251,7 @@ class Health:
         # Resolves the alerts of robots that Studio has discarded.
         names = {link.name for link in self._fleet.links}
         for name in self._robots - names:
-            self._away.pop(name, None)
+            self._gone_since.pop(name, None)
             for kind in ROBOT_ALERTS:
                 self._alerts.resolve(f"{kind}:{name}")
         self._robots = names

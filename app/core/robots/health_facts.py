@@ -61,7 +61,7 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
     if link.connected:
         facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
         facts += [*_count(REJECTED, link.rejected, now), *_count(ERRORS, link.errors, now)]
-    facts += [_left_alone(link), *_life(link)]
+    facts += [_left_alone(link), *_heartbeat_fact(link)]
     return tuple(sorted(facts, key=lambda fact: not fact.to_look_at))
 
 
@@ -87,12 +87,12 @@ def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
         )
         return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
     if link.mute:
-        return HealthFact(CONNECTION, "error", _mute(link, age))
+        return HealthFact(CONNECTION, "error", _unresponsive_words(link, age))
     words = _("last response {age} ago").format(age=age) if age else _("connected; no question sent yet")
     return HealthFact(CONNECTION, "ok", words)
 
 
-def _mute(link: RobotLink, age: str) -> str:
+def _unresponsive_words(link: RobotLink, age: str) -> str:
     if not age:
         return (
             _("not responding; restart it")
@@ -231,7 +231,7 @@ def _left_alone(link: RobotLink) -> HealthFact:
     return HealthFact(LEFT_ALONE, "ok", _("stops by itself after {seconds} s").format(seconds=number(after)))
 
 
-def _life(link: RobotLink) -> Iterable[HealthFact]:
+def _heartbeat_fact(link: RobotLink) -> Iterable[HealthFact]:
     every = link.robot.beat_s
     if every is not None:
         yield HealthFact(

@@ -47,13 +47,13 @@ class KnownRobots:
         if names:
             now = self._clock()
             others = [robot for robot in self.robots if robot.name not in names]
-            self._keep([*(KnownRobot(name, now) for name in names), *others])
+            self._save([*(KnownRobot(name, now) for name in names), *others])
 
     def forget(self, name: str) -> None:
         """Remove a robot from the list; it is added again when it connects."""
-        self._keep([robot for robot in self.robots if robot.name != name])
+        self._save([robot for robot in self.robots if robot.name != name])
 
-    def _keep(self, robots: Sequence[KnownRobot]) -> None:
+    def _save(self, robots: Sequence[KnownRobot]) -> None:
         if self._settings is None:
             return
         told = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:LIMIT]]

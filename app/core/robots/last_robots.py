@@ -28,7 +28,7 @@ class LastRobots:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._seen: dict[str, str] = {}
+        self._saved: dict[str, str] = {}
 
     @property
     def come_back(self) -> bool:
@@ -53,7 +53,7 @@ class LastRobots:
 
         Called during the session, so that a crash loses none. Errors are reported by the settings.
         """
-        if launcher.wanted != self._seen:
-            self._seen = dict(launcher.wanted)
+        if launcher.wanted != self._saved:
+            self._saved = dict(launcher.wanted)
             with suppress(SettingsError):
-                self._settings.set(KEPT, dict(self._seen))
+                self._settings.set(KEPT, dict(self._saved))

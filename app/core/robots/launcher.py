@@ -41,7 +41,7 @@ _log = logging.getLogger("studio.launcher")
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
+class _StartRequest:
     """Request to start a virtual robot of this model, and its deadlines (monotonic seconds)."""
 
     model: str
@@ -109,8 +109,8 @@ class Launcher:
         self._is_there = is_there
         self._clock = clock
         self._start = start
-        self._wishes: dict[str, _Wish] = {}
-        self._coming: dict[str, float] = {}  # end of the starting state, by the robot's name
+        self._requests: dict[str, _StartRequest] = {}
+        self._starting: dict[str, float] = {}  # end of the starting state, by the robot's name
         self._post_event = post_event
         self._lock = threading.Lock()
         self._robots: dict[str, tuple[Process, IO[bytes]]] = {}
@@ -135,11 +135,11 @@ class Launcher:
     def coming(self) -> tuple[str, ...]:
         """Virtual robots that are starting."""
         now = self._clock()
-        return tuple(name for name, until in self._coming.items() if now < until)
+        return tuple(name for name, until in self._starting.items() if now < until)
 
     def came(self, name: str) -> None:
         """Mark a robot as started."""
-        self._coming.pop(name, None)
+        self._starting.pop(name, None)
 
     @property
     def process_ids(self) -> tuple[int, ...]:
@@ -168,24 +168,24 @@ class Launcher:
         """
         now = self._clock()
         self.wanted[name] = model
-        self._coming[name] = now + COMING_S
-        self._wishes[name] = _Wish(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
+        self._starting[name] = now + COMING_S
+        self._requests[name] = _StartRequest(model, now + KNOWN_WITHIN_S, now + WISH_KEPT_S)
         self.follow()
 
     def follow(self) -> None:
         """Start requested robots that are not listed. Called at each tick of the session."""
-        if not self._wishes:
+        if not self._requests:
             return
         now = self._clock()
-        for name, wish in list(self._wishes.items()):
+        for name, wish in list(self._requests.items()):
             there = self._is_there(name)
             if there is None and (self._master.first or now >= wish.known_until):
                 there = False
             if there is False:
-                del self._wishes[name]
+                del self._requests[name]
                 self._start_robot(name, wish.model)
             elif now >= wish.until:
-                del self._wishes[name]
+                del self._requests[name]
 
     def _start_robot(self, name: str, model: str) -> None:
         with self._lock:
@@ -205,7 +205,7 @@ class Launcher:
                 process = self._start(command, environment, log)
             except OSError as error:
                 log.close()
-                self._coming.pop(name, None)
+                self._starting.pop(name, None)
                 self._post_event(
                     LaunchFailed(
                         name, _("The virtual robot {robot} can't be started.").format(robot=name), str(error)
@@ -218,14 +218,14 @@ class Launcher:
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
         """Restart a virtual robot; a process that hangs is killed."""
         self.wanted[name] = model
-        self._wishes.pop(name, None)
+        self._requests.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
         if held is not None:
             held[0].kill()
             held[0].wait()
             held[1].close()
-        self._coming[name] = self._clock() + COMING_S
+        self._starting[name] = self._clock() + COMING_S
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
@@ -234,12 +234,12 @@ class Launcher:
         self._end_robot(name)
 
     def _end_robot(self, name: str) -> None:
-        self._wishes.pop(name, None)
-        self._coming.pop(name, None)
+        self._requests.pop(name, None)
+        self._starting.pop(name, None)
         with self._lock:
             held = self._robots.pop(name, None)
         if held is not None:
-            _end(held[0])
+            _terminate(held[0])
             held[1].close()
 
     def check(self) -> None:
@@ -251,7 +251,7 @@ class Launcher:
                     continue
                 _process, log = self._robots.pop(name)
                 self.ended |= {name}
-                self._coming.pop(name, None)
+                self._starting.pop(name, None)
                 said, trace = split_trace(_tail(log))
                 if is_crash(code):
                     how = f"the process of a virtual robot {end_words(code)}"
@@ -260,20 +260,20 @@ class Launcher:
                     LaunchFailed(
                         name,
                         _("The virtual robot {robot} ended.").format(robot=name),
-                        said.strip()[-TAIL_LETTERS:] or _silent_end(code),
+                        said.strip()[-TAIL_LETTERS:] or _end_without_output(code),
                     )
                 )
                 log.close()
 
     def close(self) -> None:
         """Stop the virtual robots. The master continues while other programs are registered."""
-        self._wishes.clear()
+        self._requests.clear()
         for name in list(self._robots):
             self._end_robot(name)
         self._master.close()
 
 
-def _end(process: Process) -> None:
+def _terminate(process: Process) -> None:
     process.terminate()
     try:
         process.wait(timeout=END_WAIT_S)
@@ -282,7 +282,7 @@ def _end(process: Process) -> None:
         process.wait()
 
 
-def _silent_end(code: int) -> str:
+def _end_without_output(code: int) -> str:
     # A negative exit code is the number of a signal.
     if code < 0:
         return _("Another program on this computer stopped it.")
@@ -316,7 +316,7 @@ class VirtualProcesses:
         if identity not in self._known:
             if len(self._known) >= MOST_KNOWN:
                 self._known.clear()
-            self._known[identity] = self._look(identity.pid)
+            self._known[identity] = self._is_own_process(identity.pid)
         return self._known[identity]
 
     def has_ended(self, identity: Identity) -> bool:
@@ -329,7 +329,7 @@ class VirtualProcesses:
             return psutil.Process(identity.pid).status() == psutil.STATUS_ZOMBIE
         return not psutil.pid_exists(identity.pid)
 
-    def _look(self, pid: int) -> bool:
+    def _is_own_process(self, pid: int) -> bool:
         import psutil  # noqa: PLC0415 (slow import)
 
         started = set(self._started())

@@ -45,7 +45,7 @@ class SessionRoom:
         self._watch: Watch | None = None
         self._publisher: Publisher | None = None
         self._is_opening = False
-        self._kept = self._published = self._seen = self._map.revision
+        self._saved_revision = self._published_revision = self._last_revision = self._map.revision
         self._changed_s = -math.inf
         self._room: tuple[int, Room] = (-1, Room())
 
@@ -69,22 +69,22 @@ class SessionRoom:
         for there in robots.values():
             if isinstance(moved, (Box, Person)) and _touches(moved, *there):
                 return False
-        return self._tell() if self._map.move(name, x, y) else False
+        return self._publish() if self._map.move(name, x, y) else False
 
     def add(self, kind: str, x: float, y: float) -> str | None:
         """Add a thing; return its name, or None when the limit is reached."""
         name = self._map.add(kind, x, y)
-        self._tell()
+        self._publish()
         return name
 
     def remove(self, name: str) -> bool:
         """Remove a thing; return False when it doesn't exist."""
-        return self._tell() if self._map.remove(name) else False
+        return self._publish() if self._map.remove(name) else False
 
     def put_back(self) -> None:
         """Reset the room to its initial state."""
         self._map.put_back()
-        self._tell()
+        self._publish()
 
     # -- input from the session -----------------------------------------------------------------------
 
@@ -98,7 +98,7 @@ class SessionRoom:
             self._publisher = node.new_pub(TOPIC, "json", latched=True)
 
         self._submit(NO_ROOM, open_it)
-        self._published = -1  # the robots don't know the saved room
+        self._published_revision = -1  # the robots don't know the saved room
 
     def add_messages(self, batches: Mapping[str, Batch]) -> None:
         """Merge changes that others published."""
@@ -114,20 +114,20 @@ class SessionRoom:
     def tick(self) -> None:
         """Publish and save changes. Called at every tick of the session."""
         revision = self._map.revision
-        if self._published == -1 and self._publisher is not None:
-            self._tell()
-        if revision != self._seen:
-            self._seen, self._changed_s = revision, self._clock()
-        elif revision != self._kept and self._clock() - self._changed_s >= QUIET_S:
+        if self._published_revision == -1 and self._publisher is not None:
+            self._publish()
+        if revision != self._last_revision:
+            self._last_revision, self._changed_s = revision, self._clock()
+        elif revision != self._saved_revision and self._clock() - self._changed_s >= QUIET_S:
             self.keep()
-            if revision != self._published:
+            if revision != self._published_revision:
                 # later subscribers receive it from here, even if the program that changed it has ended
-                self._tell()
+                self._publish()
 
     def keep(self) -> None:
         """Save the room for the next start; errors are reported by the settings."""
-        if self._map.revision != self._kept:
-            self._kept = self._map.revision
+        if self._map.revision != self._saved_revision:
+            self._saved_revision = self._map.revision
             with suppress(SettingsError):
                 self._settings.set(KEPT, self._map.message())
 
@@ -137,8 +137,8 @@ class SessionRoom:
         if self._publisher is not None:
             self._publisher.close()
 
-    def _tell(self) -> bool:
-        self._published = self._map.revision
+    def _publish(self) -> bool:
+        self._published_revision = self._map.revision
         if self._publisher is not None:
             with suppress(NepError):
                 self._publisher.publish(self._map.message())

@@ -70,9 +70,9 @@ class Tries:
         for made in link.running:
             if made.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
                 continue
-            self._take(link, made, answer)
+            self._apply(link, made, answer)
 
-    def _take(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
+    def _apply(self, link: RobotLink, made: Invocation, answer: Payload) -> None:
         state = answer.get("state")
         if not isinstance(state, str) or (state not in FINAL_STATES and state not in ("accepted", "running")):
             return
@@ -98,16 +98,14 @@ class Tries:
         now = self._clock()
         for link in links:
             for made in link.running:
-                self._look_at(link, made, now)
+                self._check_invocation(link, made, now)
 
-    def _look_at(self, link: RobotLink, made: Invocation, now: float) -> None:
+    def _check_invocation(self, link: RobotLink, made: Invocation, now: float) -> None:
         robot = link.robot
         if robot.dialect == "native" and made.state == "sent":
             if now - made.started_s > FIRST_ANSWER_S:
-                self._mute(
-                    link,
-                    made,
-                    _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
+                self._mark_unresponsive(
+                    link, made, _("{robot} is not responding. Check that it is switched on.").format(robot=link.name)
                 )
             return
         silence = max(SHORTEST_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
@@ -115,7 +113,7 @@ class Tries:
             said = _(
                 "{robot} stopped responding. Check that it is switched on; press Stop to make it stand still."
             ).format(robot=link.name)
-            self._mute(link, made, said)
+            self._mark_unresponsive(link, made, said)
             return
         left_s = made.left_s
         if left_s is not None and left_s < -GRACE_S:
@@ -130,7 +128,7 @@ class Tries:
                 ),
             )
 
-    def _mute(self, link: RobotLink, made: Invocation, sentence: str) -> None:
+    def _mark_unresponsive(self, link: RobotLink, made: Invocation, sentence: str) -> None:
         link.mute = True
         self._send_cancel(link, made)  # a robot that resumes must not continue
         self._end(link, made, "failed", sentence)

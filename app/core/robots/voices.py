@@ -116,11 +116,11 @@ class RobotVoices:
         self._clock = clock
         self.speaker: Speaker | None = None
         self._watches: dict[str, Watch] = {}
-        self._seen: dict[str, tuple[object, Heard]] = {}
+        self._last_drawings: dict[str, tuple[object, Heard]] = {}
         self._waiting: deque[Utterance] = deque()
-        self._now: Utterance | None = None
+        self._current: Utterance | None = None
         self._until_s = 0.0
-        self._plays = ""
+        self._playing_robot = ""
         self._stops = fleet.stops
 
     @property
@@ -144,7 +144,7 @@ class RobotVoices:
     @property
     def saying(self) -> Utterance | None:
         """Text that is being spoken."""
-        return self._now
+        return self._current
 
     def follow(self) -> None:
         """Apply what robots say now. Called at every tick."""
@@ -153,7 +153,7 @@ class RobotVoices:
         there = {link.name: link for link in self._fleet.connected if _is_heard(link)} if self.on else {}
         for name in self._watches.keys() - there.keys():
             self._watches.pop(name).close()
-            self._break_off(name, self._seen.pop(name, (None, Heard()))[1], Heard())
+            self._stop_interrupted(name, self._last_drawings.pop(name, (None, Heard()))[1], Heard())
         stopped = self._fleet.stops != self._stops
         if stopped:
             self._stops = self._fleet.stops
@@ -162,32 +162,32 @@ class RobotVoices:
             if name not in self._watches and link.robot.topics.state is not None:
                 self._watches[name] = self._watch(link.robot.topics.state)
             self._take(name, link.drawing, is_heard=not stopped)
-        self._go_on(self.speaker)
+        self._speak_next(self.speaker)
 
     def _take(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
-        told, before = self._seen.get(name, (None, Heard()))
+        told, before = self._last_drawings.get(name, (None, Heard()))
         if drawing is None or drawing is told:
             return
         now = Heard.parse(drawing)
-        first = name not in self._seen
-        self._seen[name] = (drawing, now)
-        self._break_off(name, before, now)
+        first = name not in self._last_drawings
+        self._last_drawings[name] = (drawing, now)
+        self._stop_interrupted(name, before, now)
         if now.speech and is_heard and (now.speech != before.speech or now.spoken < before.spoken):
             self._queue(Utterance(name, now.speech, now.language, now.volume))
         if now.notes and is_heard and not first and now.sound != before.sound and self.speaker is not None:
-            self._plays = name
+            self._playing_robot = name
             self.speaker.play(now.notes, now.volume)
 
-    def _break_off(self, name: str, before: Heard, now: Heard) -> None:
+    def _stop_interrupted(self, name: str, before: Heard, now: Heard) -> None:
         if self.speaker is None:
             return
         if before.speech and before.spoken < ENDED and now.speech != before.speech:
             self._waiting = deque(each for each in self._waiting if each.robot != name)
-            if self._now is not None and self._now.robot == name:
-                self._now = None
+            if self._current is not None and self._current.robot == name:
+                self._current = None
                 self.speaker.stop_voice()
-        if before.notes and before.played < ENDED and not now.notes and self._plays == name:
-            self._plays = ""
+        if before.notes and before.played < ENDED and not now.notes and self._playing_robot == name:
+            self._playing_robot = ""
             self.speaker.play((), 0.0)
 
     def _queue(self, said: Utterance) -> None:
@@ -197,21 +197,21 @@ class RobotVoices:
             self._tell("info", lost.robot, words)
         self._waiting.append(said)
 
-    def _go_on(self, speaker: Speaker) -> None:
-        if self._now is not None and speaker.busy:
+    def _speak_next(self, speaker: Speaker) -> None:
+        if self._current is not None and speaker.busy:
             if self._clock() < self._until_s:
                 return
             speaker.stop_voice()
-        self._now = None
+        self._current = None
         if self._waiting:
-            said = self._now = self._waiting.popleft()
+            said = self._current = self._waiting.popleft()
             self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(said.words)
             speaker.say(said.words, said.language, said.volume)
 
     def silence(self) -> None:
         """Stop and discard all speech and sounds."""
         self._waiting.clear()
-        self._now, self._plays = None, ""
+        self._current, self._playing_robot = None, ""
         if self.speaker is not None:
             self.speaker.stop()
 

@@ -301,7 +301,7 @@ def test_a_virtual_robot_that_goes_away_moves_nothing_any_more(session: Session,
     lives(pepper, "turn")
     tick_until(session, lambda: link.state == "not stopped")
     link.robot = replace(link.robot, virtual=True)
-    session.fleet._away(link)
+    session.fleet._disconnect(link)
     assert link.state == "away"
 
 

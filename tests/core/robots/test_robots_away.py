@@ -187,7 +187,7 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     strangers.pass_by(300)
     health.check()
     assert not alerts.has("robot:Rover")
-    assert len(health._away) == MAX_AWAY
+    assert len(health._gone_since) == MAX_AWAY
 
 
 def test_running_program_tells_the_fleet_which_robots_it_uses(tmp_path: Path) -> None:

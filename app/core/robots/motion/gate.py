@@ -93,7 +93,7 @@ class MotionGate:
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
         self._permission, self._robots = permission, robots
-        self._seen: tuple[MovingTopics, int] | None = None
+        self._followed_state: tuple[MovingTopics, int] | None = None
         self._snapshot = _Snapshot()
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
@@ -124,7 +124,7 @@ class MotionGate:
     def follow(self) -> None:
         """Update the state that `refusal` uses: robots and permissions."""
         now = self._robots.moving, self._permission.revision
-        if now == self._seen:
+        if now == self._followed_state:
             return
         known = {robot.name: robot for robot in self._robots.movable}
         allowed = {
@@ -135,12 +135,12 @@ class MotionGate:
         # a permission counts until the robot is identified
         strangers = self._permission.strangers - known.keys()
         self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described)
-        self._seen = now
+        self._followed_state = now
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
         """Return why a message may not be published now, or "". Thread-safe."""
         known = self._snapshot
-        return _words(
+        return _refusal_words(
             topic, [name for name in known.moving.moved_by(topic, msg_type) if name not in known.allowed]
         )
 
@@ -158,10 +158,12 @@ class MotionGate:
             return ""  # no node can have joined without the master
         known = self._snapshot
         newcomers = moving_topics(view, (), description_topics(view) - known.described)
-        return _words(topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers])
+        return _refusal_words(
+            topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers]
+        )
 
 
-def _words(topic: str, names: Sequence[str]) -> str:
+def _refusal_words(topic: str, names: Sequence[str]) -> str:
     if not names:
         return ""
     if names == [topic]:

@@ -95,7 +95,11 @@ class MotionPermission:
 
     def allowed(self, robot: Robot) -> bool:
         """Return whether this robot may move without asking."""
-        return robot.virtual or self._now(robot) in self._allowed or self._key(robot) in self._always()
+        return (
+            robot.virtual
+            or self._program_key(robot) in self._allowed
+            or self._key(robot) in self._always_allowed()
+        )
 
     def permits(
         self,
@@ -113,7 +117,7 @@ class MotionPermission:
         unknown = tuple(name for name in strangers if name not in self.strangers)
         if not open_ and not unknown:
             return True
-        self._asked = tuple((self._now(robot), self._key(robot)) for robot, _key in open_)
+        self._asked = tuple((self._program_key(robot), self._key(robot)) for robot, _key in open_)
         self.question = Question({robot.name: moves for robot, moves in open_}, go_on, unknown, reason)
         self.revision += 1
         return False
@@ -128,7 +132,9 @@ class MotionPermission:
         self.strangers |= set(question.strangers)
         try:
             if always and self._settings is not None:
-                self._settings.set(ALWAYS, sorted({*self._always(), *(key for _now, key in self._asked)}))
+                self._settings.set(
+                    ALWAYS, sorted({*self._always_allowed(), *(key for _program_key, key in self._asked)})
+                )
         finally:
             question.go_on()
 
@@ -151,12 +157,12 @@ class MotionPermission:
         identity = self._identity_of(robot.name)
         return f"{robot.name} ({robot.model})" + (f", {identity.words}" if identity is not None else "")
 
-    def _now(self, robot: Robot) -> str:
+    def _program_key(self, robot: Robot) -> str:
         # Key of a permission for this very program until it is restarted.
         identity = self._identity_of(robot.name)
         return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
 
-    def _always(self) -> list[str]:
+    def _always_allowed(self) -> list[str]:
         return self._settings.get(ALWAYS, []) if self._settings is not None else []
 
 

@@ -194,7 +194,7 @@ class MovedRobots:
             return program.node_id != motion.program.node_id
 
         if id:
-            self._keep(name, stays)
+            self._retain(name, stays)
 
     def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
         """End the motions of programs, by node id, that confirmed a Stop which began at ``mark``.
@@ -202,7 +202,7 @@ class MovedRobots:
         Motions of other programs that may still run remain.
         """
         self._proven |= dict.fromkeys(programs, mark)
-        self._keep(
+        self._retain(
             name,
             lambda motion: (
                 motion.number > mark
@@ -224,7 +224,7 @@ class MovedRobots:
 
     def told(self, name: str, mark: int) -> None:
         """End the motions of a robot that can't confirm (RIZE) and received a stop at ``mark``."""
-        self._keep(name, lambda motion: motion.number > mark)
+        self._retain(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:
             del self._sent[name]
 
@@ -236,9 +236,9 @@ class MovedRobots:
 
     def drop_ended(self, name: str) -> None:
         """Remove motions of ended programs: a virtual robot has stopped once its program has ended."""
-        self._keep(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
+        self._retain(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 
-    def _keep(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:
+    def _retain(self, name: str, stays: Callable[[UnprovenMotion], bool]) -> None:
         left = [motion for motion in self._motions.get(name, ()) if stays(motion)]
         if left:
             self._motions[name] = left

@@ -46,10 +46,10 @@ MOST_LISTENING = 4
 """Maximum number of named programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
 """Interval of checks for a connection."""
-LOOK_S = 0.1
+GRAPH_POLL_S = 0.1
 """Minimum interval of graph queries while the publisher of a reply is unknown."""
-GRAPH_S = 0.3
-_NOBODY = "nobody"
+GRAPH_TIMEOUT_S = 0.3
+_UNKNOWN_PROGRAM = "nobody"
 """Placeholder for the program of a robot until a graph lists it."""
 
 STOP_TIMEOUT_S = 1.0
@@ -79,13 +79,13 @@ class RobotStopper:
         self._clock = clock
         self._sender = f"stopper-{uuid.uuid4().hex[:8]}"
         self._changed = threading.Condition()
-        self._making = threading.Lock()  # held while opening connections
-        self._makers: list[threading.Thread] = []
+        self._opening_lock = threading.Lock()  # held while opening connections
+        self._openers: list[threading.Thread] = []
         self._lines: dict[str, StopLine] = {}
         self._asked: dict[str, StopRequest] = {}
         self._view: GraphView | None = None
         self._hearers: dict[str, frozenset[str]] = {}  # subscribed nodes by command topic, of this view
-        self._looked_s = 0.0
+        self._graph_queried_s = 0.0
         self._senders = Senders()
 
     def see(self, view: GraphView) -> None:
@@ -94,7 +94,7 @@ class RobotStopper:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
             self._senders.learn(view, {way.answer for target in targets for way in target.ways})
-            late = [said for asked in self._asked.values() for said in self._judge_again(asked)]
+            late = [said for asked in self._asked.values() for said in self._apply_held_replies_locked(asked)]
             self._changed.notify_all()
         for tell, said in late:
             tell(said)
@@ -126,9 +126,9 @@ class RobotStopper:
             lines = list(self._lines.values())
         for way in left:
             way.close()
-        with self._making:
+        with self._opening_lock:
             for line in lines:
-                self._make(line)
+                self._open_missing_ways(line)
         with self._changed:
             view = self._view
         if view is not None:
@@ -146,7 +146,7 @@ class RobotStopper:
         with self._changed:
             line = self._lines.get(name)
             way = None if line is None else line.ways.get(line.target.robot.topics)
-            return line is not None and way is not None and self._is_connected(line, way)
+            return line is not None and way is not None and self._is_connected_locked(line, way)
 
     def deliver(self) -> None:
         """Send pending Stops to robots that have connected since. Call it at each tick.
@@ -180,7 +180,7 @@ class RobotStopper:
         that don't support it (RIZE) need another Stop after the end of the program.
         """
         for line in self._chosen(names):
-            self._tell(line, _id(), ends)
+            self._send(line, _id(), ends)
 
     def stop_all(
         self,
@@ -211,8 +211,8 @@ class RobotStopper:
         asked = [self._ask(line, ends, on_late) for line in lines]
         if is_for_all:
             for line in self._unexpected():
-                self._tell(line, _id(), ends)
-        self._make_missing(asked)
+                self._send(line, _id(), ends)
+        self._retry_missing_ways(asked)
         if timeout_s is None:
             timeout_s = patience_s((line.target.robot for line in lines), self._longest_s)
         if asked:
@@ -230,11 +230,13 @@ class RobotStopper:
         # Waits until all requests are settled, or the deadline; returns the reported (request, node) pairs.
         reported: set[tuple[str, str]] = set()
         while True:
-            self._look_for(asked)
+            self._query_graph_if_needed(asked)
             undelivered = [each for each in asked if not self._deliver(each)]
             with self._changed:
                 remaining_s = deadline_s - self._clock()
-                pause_s = min(remaining_s, LOOK_S) if any(each.unknown for each in asked) else remaining_s
+                pause_s = (
+                    min(remaining_s, GRAPH_POLL_S) if any(each.unknown for each in asked) else remaining_s
+                )
                 pause_s = min(pause_s, POLL_S) if undelivered else pause_s
                 self._changed.wait_for(lambda: self._is_news(asked, reported), max(0.0, pause_s))
                 news = [(each, node, result) for each in asked for node, result in each.news(reported)]
@@ -248,15 +250,15 @@ class RobotStopper:
     def close(self) -> None:
         """Disconnect from all robots without a stop."""
         self.set_robots(())
-        for maker in self._makers:
+        for maker in self._openers:
             maker.join(timeout=5)
         with self._changed:
             self._asked.clear()
 
     # ---- connections
 
-    def _make(self, line: StopLine) -> None:
-        # Opens missing connections; a failure becomes the line's error. Call with `_making` held.
+    def _open_missing_ways(self, line: StopLine) -> None:
+        # Opens missing connections; a failure becomes the line's error. Call with `_opening_lock` held.
         error = ""
         for topics in line.target.ways:
             with self._changed:
@@ -288,7 +290,7 @@ class RobotStopper:
             publisher.close()
             raise
 
-    def _make_missing(self, asked: Sequence[StopRequest]) -> None:
+    def _retry_missing_ways(self, asked: Sequence[StopRequest]) -> None:
         # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
         missing = [each for each in asked if not each.line.is_whole]
         if not missing:
@@ -297,19 +299,19 @@ class RobotStopper:
         def make() -> None:
             for each in missing:
                 before = set(each.line.ways)
-                with self._making:
-                    self._make(each.line)
+                with self._opening_lock:
+                    self._open_missing_ways(each.line)
                 new = each.line.ways.keys() - before
-                error = self._tell(each.line, each.id, each.ends, new) if new else each.line.untold
+                error = self._send(each.line, each.id, each.ends, new) if new else each.line.untold
                 with self._changed:
                     each.error = error if not before else each.error
                     self._changed.notify_all()
 
         for each in missing:
             each.error = "" if not each.line.ways else each.error
-        self._makers = [thread for thread in self._makers if thread.is_alive()]
-        self._makers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
-        self._makers[-1].start()
+        self._openers = [thread for thread in self._openers if thread.is_alive()]
+        self._openers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
+        self._openers[-1].start()
 
     def _chosen(self, names: Iterable[str] | None) -> list[StopLine]:
         with self._changed:
@@ -322,21 +324,21 @@ class RobotStopper:
     ) -> StopRequest:
         asked = StopRequest(line, _id(), self._clock(), late, ends)
         with self._changed:
-            self._forget_old()
+            self._evict_expired()
             self._asked[asked.id] = asked
             if self._view is not None and line.target.robot.dialect != RIZE:
                 asked.serving |= self._serving(asked)
             for topics, way in line.ways.items():
-                if self._is_connected(line, way):
+                if self._is_connected_locked(line, way):
                     asked.sent(topics, asked.sent_s)
-        asked.error = self._tell(line, asked.id, ends)
+        asked.error = self._send(line, asked.id, ends)
         return asked
 
     def _unexpected(self) -> list[StopLine]:
         with self._changed:
             return [line for line in self._lines.values() if not line.target.is_expected]
 
-    def _is_connected(self, line: StopLine, way: StopWay) -> bool:
+    def _is_connected_locked(self, line: StopLine, way: StopWay) -> bool:
         # Call with `_changed` held.
         hearers = self._hearers.get(way.topic)
         if hearers is None:
@@ -353,15 +355,15 @@ class RobotStopper:
             new = [
                 topics
                 for topics, way in ways.items()
-                if topics not in asked.delivered and self._is_connected(asked.line, way)
+                if topics not in asked.delivered and self._is_connected_locked(asked.line, way)
             ]
             for topics in new:
                 asked.sent(topics, self._clock())
         if new:
-            self._tell(asked.line, asked.id, asked.ends, new)
+            self._send(asked.line, asked.id, asked.ends, new)
         return bool(asked.delivered or asked.error)
 
-    def _tell(
+    def _send(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
     ) -> str:
         # Returns the reason if the Stop could be sent on no topic, else an empty string.
@@ -389,36 +391,36 @@ class RobotStopper:
     def _is_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
         if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
             return True
-        return any(each.unknown for each in asked) and self._clock() - self._looked_s >= LOOK_S
+        return any(each.unknown for each in asked) and self._clock() - self._graph_queried_s >= GRAPH_POLL_S
 
-    def _look_for(self, asked: Sequence[StopRequest]) -> None:
+    def _query_graph_if_needed(self, asked: Sequence[StopRequest]) -> None:
         # Queries the graph while the programs of a robot or the publisher of a reply are unknown.
         with self._changed:
             waits = self._view is None or any(each.unknown for each in asked)
             now = self._clock()
-            looks = waits and (self._view is None or now - self._looked_s >= LOOK_S)
+            looks = waits and (self._view is None or now - self._graph_queried_s >= GRAPH_POLL_S)
             if looks:
-                self._looked_s = now
+                self._graph_queried_s = now
         if looks:
             self._refresh_view()
         with self._changed:
             for each in asked:
                 if not each.serving:
                     each.serving |= self._serving(each)
-                    self._judge_again(each)  # not late: the Stop was sent just now
+                    self._apply_held_replies_locked(each)  # not late: the Stop was sent just now
 
     def _add_newcomers(self, asked: Sequence[StopRequest]) -> None:
         # Programs newer than the last graph received the Stop too.
         self._refresh_view()
         with self._changed:
             for each in asked:
-                known = {node: said for node, said in each.serving.items() if node != _NOBODY}
+                known = {node: said for node, said in each.serving.items() if node != _UNKNOWN_PROGRAM}
                 each.serving = self._serving(each) | known
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
-            self.see(self._node.graph(GRAPH_S))
+            self.see(self._node.graph(GRAPH_TIMEOUT_S))
 
     def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
         # The programs that must reply, by node: the robot's own, then others that serve it. Programs that
@@ -428,7 +430,7 @@ class RobotStopper:
             # RIZE never replies; a robot that could not be reached is not among them.
             return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
         identity = target.identity or first_to_announce(view, target.robot.topics.description)
-        own = identity.node_id if identity is not None else _NOBODY
+        own = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
         found: dict[str, RobotStop | None] = {own: None}
         answering = {node for way in target.ways for node in publishing(view, way.answer)}
         heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
@@ -458,20 +460,22 @@ class RobotStopper:
                 node = self._senders.node_of(message)
                 for asked in self._asked.values():
                     if message.topic in asked.line.answers:
-                        late += self._judge(asked, node, message)
+                        late += self._apply_reply_locked(asked, node, message)
             self._changed.notify_all()
         for tell, said in late:
             tell(said)
 
-    def _judge_again(self, asked: StopRequest) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
+    def _apply_held_replies_locked(
+        self, asked: StopRequest
+    ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
         # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
         # publisher has not registered, or the master is missing, and then nothing can be proven.
         held = asked.unknown.take()
         known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
-        return [said for node, message in known for said in self._judge(asked, node, message)]
+        return [said for node, message in known for said in self._apply_reply_locked(asked, node, message)]
 
-    def _judge(
+    def _apply_reply_locked(
         self, asked: StopRequest, node: str | None, message: Message
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Applies a reply of a program that must reply; returns the callback if it is late.
@@ -517,7 +521,7 @@ class RobotStopper:
                 on_answer(result)
         return StopReport(tuple(results), elapsed_ms, tuple(dict.fromkeys(strangers)))
 
-    def _forget_old(self) -> None:
+    def _evict_expired(self) -> None:
         # Discards Stops whose late replies are no longer accepted.
         now = self._clock()
         over = [id for id, each in self._asked.items() if each.is_over]

@@ -150,8 +150,8 @@ class SimulatedStudio:
         assert isinstance(source, SimulatedSource)
         source.node, self._source = self.node, source
         fleet, runs = self.session.fleet, self.session.runs
-        fleet._alive = cast("Any", SimulatedHeartbeat(clock, "studio"))
-        fleet._tries._rest = fleet._alive.rest
+        fleet._heartbeat = cast("Any", SimulatedHeartbeat(clock, "studio"))
+        fleet._tries._rest = fleet._heartbeat.rest
         runs._make_runner = cast("Any", lambda post: SimulatedRunner(clock, network, post))
         self.session.stopper = stopper = RobotStopper(cast("Any", self.node), clock.now)
         stopper._changed = clock.condition()
@@ -188,7 +188,7 @@ class SimulatedStudio:
     def run(self, robots: Sequence[str]) -> None:
         wanted = _Driving(self.session.documents.current)
         object.__setattr__(wanted, "robots", tuple(robots))
-        self.session.runs._want(wanted)
+        self.session.runs._request(wanted)
         self.allow()
 
     def send_from_shelf(self, name: str) -> None:
