@@ -24,7 +24,7 @@ class BlockErrors:
         self._wanted: Wanted | None = None
         self._not_started = False
         self._ran: Mapping[str, object] = {}
-        self._looked: Program | int | None = None  # the newest program, or count of edits, that was checked
+        self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
     def begin(self, wanted: Wanted) -> None:
         """Clear the errors of the last run."""
@@ -32,7 +32,7 @@ class BlockErrors:
 
     def put(self, errors: Mapping[str, str], *, not_started: bool) -> None:
         """Set errors that prevented the start or stopped the program."""
-        self.by_block, self._not_started, self._looked = errors, not_started, None
+        self.by_block, self._not_started, self._checked = errors, not_started, None
 
     def forget_repaired(self) -> bool:
         """Remove the errors whose blocks are repaired; return whether any were removed."""
@@ -41,16 +41,16 @@ class BlockErrors:
         count = len(self.by_block)
         if self._not_started:
             self.by_block = self._unsolved(self._wanted)
-        elif self._looked != (edits := self._wanted.document.edits):
-            self._looked = edits
+        elif self._checked != (edits := self._wanted.document.edits):
+            self._checked = edits
             self.by_block = self._unchanged(self._wanted.document.workspace)
         return len(self.by_block) < count
 
     def _unsolved(self, wanted: Wanted) -> Mapping[str, str]:
         newest = wanted.document.newest()
-        if newest is None or newest is self._looked:
+        if newest is None or newest is self._checked:
             return self.by_block
-        self._looked = newest
+        self._checked = newest
         program = newest if wanted.stack is None else wanted.program()
         wrong = {} if program is None else wanted.problems(program)
         return {block: said for block, said in self.by_block.items() if wrong.get(block) == said}

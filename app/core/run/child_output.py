@@ -38,7 +38,7 @@ class Output:
             if len(held) > LONGEST_LINE:  # a line that is too long isn't a protocol line
                 self.strange_bytes += len(held) - 1
                 held = b"-"  # placeholder, so that the rest of the line isn't parsed either
-            self._rest(read=len(chunk))
+            self._throttle(read=len(chunk))
         self.strange_bytes += len(held)
 
     def _protocol(self, whole: bytes) -> Iterator[bytes]:
@@ -49,7 +49,7 @@ class Output:
             if whole.startswith(MARK, at):
                 end = whole.index(b"\n", at)
                 if end - at <= LONGEST_LINE:
-                    self._rest(lines=1)
+                    self._throttle(lines=1)
                     yield whole[at:end]
                 else:
                     self.strange_bytes += end + 1 - at
@@ -69,7 +69,7 @@ class Output:
         except (OSError, ValueError):
             return b""
 
-    def _rest(self, *, lines: int = 0, read: int = 0) -> None:
+    def _throttle(self, *, lines: int = 0, read: int = 0) -> None:
         # Pauses when this second's limit is exceeded.
         now = self._clock()
         if now - self._second >= 1.0:

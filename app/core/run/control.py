@@ -82,10 +82,10 @@ class Runs:
         self.also_stops: Callable[[], object] = tuple  # called by Stop before it stops robots
         self.document: Document | None = None  # the run's behaviour
         self._runner: Runner | None = None
-        self._now: Wanted | None = None  # the current run, else the last
+        self._current_request: Wanted | None = None  # the current run, else the last
         self._trial = Trial()
         self.asking = Asking()
-        self._next: Wanted | None = None  # begins once the current run is proven to be stopped
+        self._pending_request: Wanted | None = None  # begins once the current run is proven to be stopped
         self._edits = EditsSinceRun()
         self._used: tuple[str, ...] = ()
         self._breakpoints: tuple[str, ...] = ()  # of the running program
@@ -97,7 +97,7 @@ class Runs:
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
         self._stop_number = self._stop_mark = 0
-        self._asked_again: set[str] = set()
+        self._stopped_again: set[str] = set()
         self._stop_thread: threading.Thread | None = None
         self.running_blocks: tuple[str, ...] = ()
         self.stopped_blocks: tuple[str, ...] = ()
@@ -184,12 +184,12 @@ class Runs:
         if run.state == "paused":
             self.go_on()
         elif run.state != "running" or self._clock() - run.started_s >= PRESSED_TWICE_S:
-            self._want(Wanted(self._documents.current))
+            self._request(Wanted(self._documents.current))
 
     def restart(self) -> None:
         """Restart the running or paused behaviour with its current blocks."""
-        if self.active and self._now is not None:
-            self._want(replace(self._now, paused=False))
+        if self.active and self._current_request is not None:
+            self._request(replace(self._current_request, paused=False))
 
     def try_stack(self, stack: Stack) -> None:
         """Run one stack of the current behaviour; a running program is stopped first."""
@@ -198,9 +198,9 @@ class Runs:
             self._show_variable(stack, variable)
             return
         wanted, run = Wanted(self._documents.current, stack=stack), self._run
-        again = self.active and self._now == wanted
+        again = self.active and self._current_request == wanted
         if not again or self._clock() - run.started_s >= PRESSED_TWICE_S:
-            self._want(wanted)
+            self._request(wanted)
 
     def _show_variable(self, stack: Stack, id: str) -> None:
         # A new program would lack the value of the current or last run.
@@ -211,10 +211,10 @@ class Runs:
     def concerns(self, document: Document) -> bool:
         """Return whether this behaviour runs, or will once the running program has stopped."""
         return (self.active and self.document is document) or (
-            self._next is not None and self._next.document is document
+            self._pending_request is not None and self._pending_request.document is document
         )
 
-    def _want(self, wanted: Wanted) -> None:
+    def _request(self, wanted: Wanted) -> None:
         # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
             self._begin(wanted)
@@ -222,7 +222,7 @@ class Runs:
         if self.active:
             self._stop(self._used)
         if self._run.state == "stopping":
-            self._next = wanted
+            self._pending_request = wanted
             self._run = replace(self._run, restarts=True)
 
     def step(self) -> None:
@@ -265,8 +265,8 @@ class Runs:
     def stop(self) -> None:
         """Stop the program and every robot; the run bar shows their replies."""
         self.also_stops()
-        self._asked_again.clear()
-        self._next = None
+        self._stopped_again.clear()
+        self._pending_request = None
         self._stop(None)
         self._fleet.permission.withdraw()
 
@@ -276,7 +276,7 @@ class Runs:
             self.stop()
             return
         self.also_stops()
-        self._asked_again.discard(name)
+        self._stopped_again.discard(name)
         self._stop_one(name)
 
     def _stop_one(self, name: str) -> None:
@@ -291,13 +291,13 @@ class Runs:
         At most once per Stop of the user, so that a robot whose stops always time out is not stopped forever.
         """
         report, state = self._run.report, self._run.state
-        if name in self._asked_again:
+        if name in self._stopped_again:
             return
         if state == "unanswered" and report is not None and name in report.silent:
-            self._asked_again.add(name)
+            self._stopped_again.add(name)
             self._stop(self._run.asked)
         elif state in {"ready", "proven"}:
-            self._asked_again.add(name)
+            self._stopped_again.add(name)
             self._stop_one(name)
 
     def follow_robots(self) -> None:
@@ -396,7 +396,7 @@ class Runs:
             self._run, last_words=result_words(report), restarts=False, doubts=self._news.doubts(report)
         )
         self._news.tell_person(report, self._run.name or "stop")
-        wanted, self._next = self._next, None
+        wanted, self._pending_request = self._pending_request, None
         if wanted is not None and not report.unproven:
             self._begin(wanted)
 
@@ -411,7 +411,7 @@ class Runs:
     # -- private -----------------------------------------------------------------------------------------
 
     def _begin(self, wanted: Wanted) -> None:
-        document, self._now = wanted.document, wanted
+        document, self._current_request = wanted.document, wanted
         is_same, self.document = self.document is document, document
         self._trial.begin(wanted)
         self._alerts.resolve("program")
@@ -420,7 +420,7 @@ class Runs:
         self._set_errors({})
         self._mark()
         try:
-            program = self._what_runs(wanted)
+            program = self._runnable_program(wanted)
             if program is None:
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
@@ -466,7 +466,7 @@ class Runs:
         said = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, said)
 
-    def _what_runs(self, wanted: Wanted) -> Program | None:
+    def _runnable_program(self, wanted: Wanted) -> Program | None:
         # None if it has no blocks to run or has problems; the run bar shows the reason.
         program = wanted.program()
         wrong = {} if program is None else wanted.problems(program)

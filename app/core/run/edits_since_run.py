@@ -27,23 +27,23 @@ class EditsSinceRun:
         self._document: RunDocument | None = None
         self._edits = 0
         self._ran = ""
-        self._looked: Program | None = None
+        self._compared: Program | None = None
         self._differs = False
 
     def ran(self, document: RunDocument | None, program: Program) -> None:
         """Set the running program of a behaviour; None ignores edits."""
         self._document, self._ran = document, program.runnable
         self._edits = 0 if document is None else document.edits
-        self._looked, self._differs = program, False
+        self._compared, self._differs = program, False
 
     def seen(self) -> bool:
         """Return whether the blocks differ now; each program is compared once."""
         if self._document is None:
             return False
         newest = self._document.newest()
-        if newest is None or newest is self._looked:
+        if newest is None or newest is self._compared:
             return self._differs
-        self._looked = newest
+        self._compared = newest
         if self._document.edits == self._edits:
             self._ran = newest.runnable  # robots connected or disconnected: Restart would not apply an edit
         self._differs = newest.runnable != self._ran

@@ -21,8 +21,8 @@ class ProgramRobots:
     def __init__(self, fleet: Fleet) -> None:
         self._fleet = fleet
         self._runner: Runner | None = None
-        self._asked: Mapping[str, Sequence[str]] = {}
-        self._told: Mapping[str, str] = {}
+        self._requested_actions: Mapping[str, Sequence[str]] = {}
+        self._known_owners: Mapping[str, str] = {}
         self._revision = -1
         self._moving = MovingTopics()
         self._topics: Mapping[str, Sequence[str]] = {}
@@ -31,12 +31,12 @@ class ProgramRobots:
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
         """Begin with a running program that knows these ``owners``; ``asked`` are its actions by robot."""
-        self._runner, self._told, self._revision = runner, owners, self._fleet.revision
+        self._runner, self._known_owners, self._revision = runner, owners, self._fleet.revision
         moving, connected = self._fleet.moving, {link.name for link in self._fleet.connected}
         # the program was started with the connected robots; unreadable ones are reported at the next tick
         self._moving = moving if connected.issuperset(moving.robots) else MovingTopics()
         self._topics = self._moving.topics
-        self._asked = {robot.name: actions for robot, actions in asked}
+        self._requested_actions = {robot.name: actions for robot, actions in asked}
 
     def end(self) -> None:
         """Stop reporting: the program has ended."""
@@ -47,17 +47,19 @@ class ProgramRobots:
         if self._runner is None or not self._has_changed():
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)
-        links = [self._fleet.link(name) for name in self._asked]
+        links = [self._fleet.link(name) for name in self._requested_actions]
         anew = [
             link
             for link in links
-            if link is not None and link.name in owners and owners[link.name] != self._told.get(link.name)
+            if link is not None
+            and link.name in owners
+            and owners[link.name] != self._known_owners.get(link.name)
         ]
-        moving = [(link.robot, self._asked[link.name]) for link in anew]
-        if self._fleet.permission.permits(moving, self._tell):
-            self._tell()
+        moving = [(link.robot, self._requested_actions[link.name]) for link in anew]
+        if self._fleet.permission.permits(moving, self._send):
+            self._send()
         else:
-            self._tell(without=[link.name for link in anew])
+            self._send(without=[link.name for link in anew])
 
     def _has_changed(self) -> bool:
         is_same = self._fleet.revision == self._revision
@@ -66,12 +68,16 @@ class ProgramRobots:
         self._moving = self._fleet.moving
         return not is_same or self._moving.topics != self._topics
 
-    def _tell(self, without: Collection[str] = ()) -> None:
+    def _send(self, without: Collection[str] = ()) -> None:
         if self._runner is None:
             return
         owners = {name: id for name, id in owners_of(self._fleet).items() if name not in without}
-        anew = [name for name, id in owners.items() if name in self._asked and self._told.get(name) != id]
+        anew = [
+            name
+            for name, id in owners.items()
+            if name in self._requested_actions and self._known_owners.get(name) != id
+        ]
         self._fleet.moved.note(anew, "behaviour")  # of the robot's current program
-        self._told = {**self._told, **owners}
+        self._known_owners = {**self._known_owners, **owners}
         self._topics = self._fleet.moving.topics
         self._runner.set_robots(owners, self._topics)

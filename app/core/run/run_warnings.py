@@ -14,13 +14,13 @@ class RunWarnings:
         self._log = log
         self.by_block: Mapping[str, str] = {}
         self._counts: dict[tuple[str, str], int] = {}
-        self._logged: dict[tuple[str, str], int] = {}
+        self._logged_counts: dict[tuple[str, str], int] = {}
         self._edits = 0
 
     def begin(self) -> None:
         """Clear everything for a new run."""
         self.by_block = {}
-        self._counts, self._logged = {}, {}
+        self._counts, self._logged_counts = {}, {}
 
     def clear_if_edited(self, edits: int) -> bool:
         """Remove the warnings if there were edits since the newest one; return whether any were removed."""
@@ -35,17 +35,17 @@ class RunWarnings:
         key = (block, sentence)
         self._counts[key] = count
         self.by_block = {**self.by_block, block: counted(sentence, count)}
-        if count >= 10 * self._logged.get(key, 0) or key not in self._logged:
-            self._tell(key)
+        if count >= 10 * self._logged_counts.get(key, 0) or key not in self._logged_counts:
+            self._log_count(key)
 
     def end(self) -> None:
         """Log the final counts."""
         for key, count in self._counts.items():
-            if count != self._logged[key]:
-                self._tell(key)
+            if count != self._logged_counts[key]:
+                self._log_count(key)
 
-    def _tell(self, key: tuple[str, str]) -> None:
-        self._logged[key] = self._counts[key]
+    def _log_count(self, key: tuple[str, str]) -> None:
+        self._logged_counts[key] = self._counts[key]
         self._log(counted(key[1], self._counts[key]))
 
 

@@ -31,11 +31,11 @@ Kind = Literal[
 
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
-ASK_S = 0.04
+STOP_GRACE_S = 0.04
 """Time that a stopped program gets to end before it is killed; stopping takes well below 100 ms in all."""
 END_S = 2.0
 """Time that a process gets to end after its program has ended."""
-LOOK_S = 0.1
+MEMORY_CHECK_INTERVAL_S = 0.1
 """Interval of the memory checks."""
 PIPE_S = 0.5
 """Time that its pipes may stay open after its end: its child processes may hold them."""
@@ -105,7 +105,7 @@ class Runner:
         self._child: ChildProcess | None = None
         self._threads: list[threading.Thread] = []
         self._errors: deque[str] = deque(maxlen=ERRORS_KEPT)
-        self._orders: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
+        self._commands: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
         self._began_s = 0.0
         self._ended, self._output_over = threading.Event(), threading.Event()
         self._last: RunnerEvent | None = None
@@ -137,7 +137,7 @@ class Runner:
         self._began_s = self._clock()
         self.state = "paused" if paused else "running"
         kept = program.to_json() | ({} if name is None else {"name": name})
-        self._orders.put(
+        self._commands.put(
             {
                 "do": "start",
                 "id": self.program_id,
@@ -163,38 +163,38 @@ class Runner:
 
     def set_pace(self, seconds: float) -> None:
         """Set slow motion: seconds that each script waits at a block; 0 for none."""
-        self._orders.put({"do": "pace", "pace_s": seconds})
+        self._commands.put({"do": "pace", "pace_s": seconds})
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
         """Report new or restarted robots: their node ids, and the topics that move them."""
         topics = {topic: list(names) for topic, names in guarded.items()}
-        self._orders.put({"do": "robots", "owners": dict(owners), "guarded": topics})
+        self._commands.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
     def put_variable(self, python: str, value: str | float | bool) -> None:
         """Set a variable of the running program; ``python`` is its name there."""
-        self._orders.put({"do": "variable", "python": python, "value": value})
+        self._commands.put({"do": "variable", "python": python, "value": value})
 
     def set_breakpoints(self, blocks: Sequence[str]) -> None:
         """Set the blocks before which the program pauses."""
-        self._orders.put({"do": "breakpoints", "blocks": list(blocks)})
+        self._commands.put({"do": "breakpoints", "blocks": list(blocks)})
 
     def pause(self) -> None:
         """Pause the program and its robots; the event "paused" reports when all are still."""
-        self._orders.put({"do": "pause"})
+        self._commands.put({"do": "pause"})
 
     def go_on(self) -> None:
         """Resume a paused program."""
         if self.state == "paused":
             self.state = "running"
-        self._orders.put({"do": "go"})
+        self._commands.put({"do": "go"})
 
     def step(self) -> None:
         """Run one block of a paused program."""
-        self._orders.put({"do": "step"})
+        self._commands.put({"do": "step"})
 
     def answer(self, question: int, words: str) -> None:
         """Answer a question of the program."""
-        self._orders.put({"do": "answer", "question": question, "text": words})
+        self._commands.put({"do": "answer", "question": question, "text": words})
 
     def stop(self) -> None:
         """Stop the program: ask it to end, and kill it if it doesn't at once. It has ended within 100 ms.
@@ -206,9 +206,9 @@ class Runner:
             return
         if self.state != "ended":
             self.state = "stopping"
-        self._orders.put({"do": "stop"})
-        self._orders.put(None)
-        if not child.wait(ASK_S):
+        self._commands.put({"do": "stop"})
+        self._commands.put(None)
+        if not child.wait(STOP_GRACE_S):
             child.kill()
             child.wait(END_S)
 
@@ -232,7 +232,7 @@ class Runner:
             return
         try:
             with child.popen.stdin as stream:
-                while (order := self._orders.get()) is not None:
+                while (order := self._commands.get()) is not None:
                     stream.write(json.dumps(order).encode() + b"\n")
                     stream.flush()
         except (OSError, ValueError):
@@ -250,20 +250,20 @@ class Runner:
                 self._last = event
                 break
             elif event.kind in ("ready", "variables", "ask") or gate.passes():
-                self._tell(event, gate)
-        self._left_out(gate.kept_back, output.strange_bytes)
+                self._deliver(event, gate)
+        self._report_dropped(gate.kept_back, output.strange_bytes)
         child.popen.stdout.close()
         self._output_over.set()
 
-    def _tell(self, event: RunnerEvent, gate: Gate) -> None:
+    def _deliver(self, event: RunnerEvent, gate: Gate) -> None:
         if event.kind in ("running", "paused") and self.state in ("running", "paused"):
             self.state = "paused" if event.kind == "paused" else "running"
         missed = gate.take_kept_back()
         if missed:
-            self._left_out(missed, 0)
+            self._report_dropped(missed, 0)
         self._on_event(event)
 
-    def _left_out(self, events: int, strange_bytes: int) -> None:
+    def _report_dropped(self, events: int, strange_bytes: int) -> None:
         if events:
             text = ngettext(
                 "{count} line was dropped: too many at once",
@@ -278,9 +278,9 @@ class Runner:
             self._on_event(RunnerEvent("print", self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
-        while not child.ended and not self._output_over.wait(LOOK_S):
+        while not child.ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
             child.look()
-        self._orders.put(None)  # closes its input, which ends a child that still waits for commands
+        self._commands.put(None)  # closes its input, which ends a child that still waits for commands
         hung = not child.wait(END_S)
         if hung:
             child.kill()
@@ -292,7 +292,7 @@ class Runner:
         self.state = "ended"
         last = self._last
         if last is None:
-            text = "" if was_stopped else self._why(child, hung=hung)
+            text = "" if was_stopped else self._failure_reason(child, hung=hung)
             last = RunnerEvent("ended", self.run, text=text, ok=was_stopped, elapsed_s=self._elapsed())
         self._on_event(last)
         self._ended.set()
@@ -300,7 +300,7 @@ class Runner:
     def _elapsed(self) -> float:
         return round(self._clock() - self._began_s, 3)
 
-    def _why(self, child: ChildProcess, *, hung: bool) -> str:
+    def _failure_reason(self, child: ChildProcess, *, hung: bool) -> str:
         if child.too_large:
             return _("The program used more than {size} GB of memory and was stopped.").format(
                 size=number(self._most_bytes / 1e9)

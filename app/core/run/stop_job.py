@@ -36,9 +36,11 @@ def stop_program(
 
     if runner is not None:
         if stopper is not None:
-            with log_errors("tell the robots at once"):  # sent again below, also to robots without `ends`
+            with log_errors(
+                "send Stop to the robots at once"
+            ):  # sent again below, also to robots without `ends`
                 stopper.send_stop(ends=ends)
-        with log_errors("end the program"):
+        with log_errors("stop the program"):
             runner.stop()
     report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
     post_event(StopDone(number, report))

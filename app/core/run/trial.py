@@ -30,23 +30,23 @@ class Trial:
     def __init__(self) -> None:
         self.value: TriedValue | None = None
         self._tries = itertools.count(1)
-        self._wanted: Wanted | None = None
+        self._request: Wanted | None = None
         self._unit = ""
 
     def begin(self, wanted: Wanted) -> None:
         """Begin with a request; discards the value of the previous trial."""
-        self._wanted, self._unit, self.value = wanted, "", None
+        self._request, self._unit, self.value = wanted, "", None
 
     def start(self, program: Program, robots: Iterable[Robot]) -> str:
         """Start with these robots; return the label of the tried block, "" for a behaviour."""
-        if self._wanted is None:
+        if self._request is None:
             return ""
-        self._unit = self._wanted.unit(program, robots)
-        return self._wanted.words(program)
+        self._unit = self._request.unit(program, robots)
+        return self._request.words(program)
 
     def take(self, line: str) -> str | None:
         """Return a printed line formatted as the tried value; None if the trial has no value."""
-        wanted = self._wanted
+        wanted = self._request
         if wanted is None or wanted.stack is None or not wanted.gives_value:
             return None
         words = f"{line} {self._unit}".strip() if line else _("not known yet")

@@ -162,9 +162,9 @@ def test_who_is_late_leaves_out_what_has_gone_by_and_never_hurries(bench, monkey
     now = [100.0]
     monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
     each = Repeated(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
-    assert (Outbox._next(each), round(each.due_s, 6)) == (0, 100.1)
+    assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.1)
     now[0] = 100.55  # 100.1 is due; those of 100.2 to 100.5 have gone by
-    assert Outbox._next(each) == 4
+    assert Outbox._schedule_next(each) == 4
     assert round(each.due_s, 6) == 100.6
     now[0] = 100.6
-    assert (Outbox._next(each), round(each.due_s, 6)) == (0, 100.7)
+    assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.7)

@@ -115,7 +115,7 @@ def stopping_s(begin: Callable[[], Runner]) -> float:
 
 
 def test_a_program_is_asked_for_less_than_a_tenth_of_a_second_before_it_is_killed():
-    assert runner_module.ASK_S < 0.1
+    assert runner_module.STOP_GRACE_S < 0.1
 
 
 def program(*blocks):
@@ -305,7 +305,7 @@ def test_the_robot_is_told_when_the_window_dies(runner, heard, master, pepper):
     wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])
     made.start(wanted, [pepper.described.source], master.address)
     heard.until("running", says="Pepper says “Hi”")
-    made._orders.put(None)  # what the operating system does with a dead parent's pipe
+    made._commands.put(None)  # what the operating system does with a dead parent's pipe
     assert heard.until("ended").ok
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)

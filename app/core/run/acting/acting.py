@@ -130,8 +130,8 @@ class SessionActing:
         self.revision += 1
         if not was_on:
             words = _("armed for {count} min").format(count=round(self.armed_s / 60))
-            self._say("warn", words)
-            self._log("switch", "", words)
+            self._log_to_console("warn", words)
+            self._add_record("switch", "", words)
         return ""
 
     def disarm(self) -> None:
@@ -141,8 +141,8 @@ class SessionActing:
         self.outbox.end_all()
         if was_on:
             self.revision += 1
-            self._say("info", words := _("no longer armed"))
-            self._log("switch", "", words)
+            self._log_to_console("info", words := _("no longer armed"))
+            self._add_record("switch", "", words)
 
     def allow(
         self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
@@ -248,7 +248,7 @@ class SessionActing:
 
     def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
         """Send an order as `send` does; return a sentence why it can't be sent, or ""."""
-        not_now = self._not_now()
+        not_now = self._replay_obstacle()
         if not_now:
             return not_now
         not_armed = self.ready(order.target, partial(self.send_order, order, rate_hz=rate_hz))
@@ -262,7 +262,7 @@ class SessionActing:
         self.revision += 1
         return ""
 
-    def _not_now(self) -> str:
+    def _replay_obstacle(self) -> str:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
@@ -308,7 +308,7 @@ class SessionActing:
             request = read_json(text).filled({})
         except NepError as error:
             return str(error)
-        not_now = self._not_now()
+        not_now = self._replay_obstacle()
         if not_now:
             return not_now
         not_armed = self.ready(Target("service", service), partial(self.call, service, text, timeout_s))
@@ -335,16 +335,16 @@ class SessionActing:
             target = each.order.target
             if not self.may_go_on(target):
                 self.outbox.end(each.order.id)
-                self.ready(target, _nothing)
+                self.ready(target, _ignore)
         for result in self.outbox.take():
-            self._take(result)
+            self._apply_result(result)
         for record in self.calls.tick():
             self.revision += 1
             level = "info" if record.state == "answered" else "warn"
-            self._say(level, f"{record.service}: {call_words(record)}")
+            self._log_to_console(level, f"{record.service}: {call_words(record)}")
             self._log_call(record)
 
-    def _take(self, result: SendResult) -> None:
+    def _apply_result(self, result: SendResult) -> None:
         order = result.order
         if self.shelf.get(order.id) is not None:
             self.last[order.id] = result
@@ -355,10 +355,10 @@ class SessionActing:
         self.revision += 1
         is_bad = result.kind == "failed"
         words = f"{order.name}, {result_words(result)}"
-        self._say("warn" if is_bad else "info", f"{order.topic}: {words}")
+        self._log_to_console("warn" if is_bad else "info", f"{order.topic}: {words}")
         was_once = result.kind == "sent"
         again = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
-        self._log(
+        self._add_record(
             order.asker, order.topic, words,
             sent=1 if was_once else result.count, is_bad=is_bad, text=result.text, source=order.source,
             again=again,
@@ -367,7 +367,7 @@ class SessionActing:
             order.told(result)
 
     def _log_call(self, record: CallRecord) -> None:
-        self._log(
+        self._add_record(
             "service", record.service, call_words(record),
             sent=1 if record.was_begun else 0, is_bad=record.state != "answered",
             text=record.request, source=record.request,
@@ -377,16 +377,16 @@ class SessionActing:
     def tell(self, level: str, target: Target, words: str, sent: int = 0) -> None:
         """Log what a recording sends; ``sent`` messages have been sent."""
         self.revision += 1
-        self._say(level, f"{target.name}: {words}")
-        self._log("replay", target.name, words, sent=sent, is_bad=level == "warn")
+        self._log_to_console(level, f"{target.name}: {words}")
+        self._add_record("replay", target.name, words, sent=sent, is_bad=level == "warn")
 
-    def _log(
+    def _add_record(
         self, asker: Asker, name: str, words: str, *, sent: int = 0, is_bad: bool = False, text: str = "",
         source: str = "", again: Callable[[], str] | None = None,
     ) -> None:  # fmt: skip
         self.sent.put(SentRecord(self._clock_s(), asker, name, words, is_bad, text, source, again), sent)
 
-    def _say(self, level: str, words: str) -> None:
+    def _log_to_console(self, level: str, words: str) -> None:
         self._session.console.add(level, "studio", words)
 
     def check(self) -> None:
@@ -439,7 +439,7 @@ class SessionActing:
         return kept.value if kept.value is not None else Shelf()
 
 
-def _nothing() -> None: ...
+def _ignore() -> None: ...
 
 
 def result_words(result: SendResult) -> str:

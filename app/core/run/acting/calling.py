@@ -56,7 +56,7 @@ class CallRecord:
 
 
 @dataclass(slots=True, eq=False)
-class _UnderWay:
+class _CallInFlight:
     """Call in flight; its end may be set by any thread and counts once."""
 
     number: int
@@ -93,7 +93,7 @@ class ServiceCalls:
         self._records: deque[CallRecord] = deque(maxlen=HISTORY_KEPT)
         self._lock = threading.Lock()
         self._ended: deque[_Ended] = deque(maxlen=HISTORY_KEPT)
-        self._now: _UnderWay | None = None
+        self._in_flight: _CallInFlight | None = None
         self._done: list[CallRecord] = []
         self._clients: dict[str, Client] = {}
         self.revision = 0
@@ -112,7 +112,7 @@ class ServiceCalls:
     @property
     def waited_s(self) -> float:
         """Time since the call in flight began, in seconds."""
-        return self._clock() - self._now.asked_s if self._now is not None else 0.0
+        return self._clock() - self._in_flight.asked_s if self._in_flight is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
         """Call a service; ``words`` is the request for display.
@@ -123,15 +123,15 @@ class ServiceCalls:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
         timeout_s = min(MOST_S, max(LEAST_S, timeout_s))
         record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
-        now = _UnderWay(record.number, self._arming.turn, self._clock())
-        self._now = now
-        self._put(record)
+        now = _CallInFlight(record.number, self._arming.turn, self._clock())
+        self._in_flight = now
+        self._add_record(record)
         self._submit("", lambda node: self._begin(node, now, record, request))
         return record
 
     def give_up(self) -> None:
         """Cancel waiting for the reply; the server may still execute the call."""
-        self._end_now("canceled", _("canceled; the server may still carry it out"))
+        self._cancel("canceled", _("canceled; the server may still carry it out"))
 
     def tick(self) -> list[CallRecord]:
         """Apply finished calls; return those that ended since the last call, including cancelled ones."""
@@ -140,12 +140,12 @@ class ServiceCalls:
             place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
             if place is None or self._records[place].state != "waiting":
                 continue
-            self._take(place, ended)
-        waiting, now = self.waiting, self._now
+            self._apply(place, ended)
+        waiting, now = self.waiting, self._in_flight
         has_begun = now is None or now.future is not None  # from then on its client measures the timeout
         if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
             said = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
-            self._end_now("failed", said)
+            self._cancel("failed", said)
         done, self._done = self._done, []
         return done
 
@@ -159,19 +159,19 @@ class ServiceCalls:
 
     def close(self) -> None:
         """Cancel the call in flight; the node closes the clients."""
-        self._end_now("canceled", _("canceled; the server may still carry it out"))
+        self._cancel("canceled", _("canceled; the server may still carry it out"))
         self._clients.clear()
 
     # ---- private
 
-    def _put(self, record: CallRecord) -> None:
+    def _add_record(self, record: CallRecord) -> None:
         self._records.append(record)
         for place in range(len(self._records) - ANSWERS_KEPT):
             if self._records[place].is_kept:
                 self._records[place] = replace(self._records[place], answer=None, text="", is_kept=False)
         self.revision += 1
 
-    def _take(self, place: int, ended: _Ended) -> None:
+    def _apply(self, place: int, ended: _Ended) -> None:
         made = replace(
             self._records[place],
             state=ended.state,
@@ -180,15 +180,15 @@ class ServiceCalls:
             answer=ended.answer,
             text=ended.text,
             is_cut=ended.is_cut,
-            was_begun=self._now is not None and self._now.future is not None,
+            was_begun=self._in_flight is not None and self._in_flight.future is not None,
         )
         self._records[place] = made
         self._done.append(made)
-        self._now = None
+        self._in_flight = None
         self.revision += 1
 
-    def _end_now(self, state: State, sentence: str) -> None:
-        now, waiting = self._now, self.waiting
+    def _cancel(self, state: State, sentence: str) -> None:
+        now, waiting = self._in_flight, self.waiting
         if now is None or waiting is None:
             return
         with self._lock:
@@ -196,9 +196,9 @@ class ServiceCalls:
             future = now.future
         if future is not None:
             future.cancel()
-        self._take(len(self._records) - 1, _Ended(now.number, state, self.waited_s, sentence))
+        self._apply(len(self._records) - 1, _Ended(now.number, state, self.waited_s, sentence))
 
-    def _begin(self, node: Node, now: _UnderWay, record: CallRecord, request: object) -> None:
+    def _begin(self, node: Node, now: _CallInFlight, record: CallRecord, request: object) -> None:
         # Runs in the network thread.
         began_s = time.monotonic()
         try:

@@ -101,10 +101,10 @@ def value_typed(text: str) -> object:
 
 def pretty(value: object) -> str:
     """Format a value as editable JSON; values that JSON lacks become strings."""
-    return json.dumps(value, indent=2, ensure_ascii=False, default=_otherwise)
+    return json.dumps(value, indent=2, ensure_ascii=False, default=_to_json_value)
 
 
-def _otherwise(value: object) -> object:
+def _to_json_value(value: object) -> object:
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, (bytes, bytearray, memoryview)):

@@ -110,12 +110,12 @@ class Outbox:
     ) -> None:
         # `gate` knows which messages would move a robot without permission; without it all are sent.
         self._gate = gate
-        self._heard: dict[Publisher, int] = {}
+        self._last_subscriber_counts: dict[Publisher, int] = {}
         self._arming, self._submit, self._clock = arming, submit, clock
         self._changed = threading.Condition()
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._repeated: dict[str, Repeated] = {}
-        self._begun: dict[str, object] = {}
+        self._starting: dict[str, object] = {}
         self._results: deque[SendResult] = deque(maxlen=RESULTS_KEPT)
         self._thread: threading.Thread | None = None
         self._is_closed = False
@@ -141,7 +141,7 @@ class Outbox:
     def is_going(self, order_id: str) -> bool:
         """Return whether a message is sent repeatedly, or is about to be."""
         with self._changed:
-            return order_id in self._repeated or order_id in self._begun
+            return order_id in self._repeated or order_id in self._starting
 
     # ---- requests
 
@@ -156,9 +156,9 @@ class Outbox:
             self._check(node, order, publisher)
             if self._arming.if_armed(turn, order.target, lambda: publisher.publish(made)):
                 text = _text_of(value) if len(made.data) <= KEPT_BYTES else ""
-                self._tell(SendResult(order, "sent", heard=publisher.subscribers, text=text))
+                self._add_result(SendResult(order, "sent", heard=publisher.subscribers, text=text))
             else:
-                self._tell(SendResult(order, "failed", _("not sent: no longer armed")))
+                self._add_result(SendResult(order, "failed", _("not sent: no longer armed")))
 
         self._submit("", self._guarded(order, asked_s, send_it))
 
@@ -167,9 +167,9 @@ class Outbox:
         rate_hz = min(MOST_HZ, max(LEAST_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:
-            if len(self._repeated.keys() | self._begun.keys() | {order.id}) > MOST_AT_ONCE:
+            if len(self._repeated.keys() | self._starting.keys() | {order.id}) > MOST_AT_ONCE:
                 return False
-            self._begun[order.id] = token
+            self._starting[order.id] = token
 
         def begin_it(node: Node) -> None:
             codec_for(order.msg_type).encode(order.make())  # errors are reported before anything is sent
@@ -177,22 +177,22 @@ class Outbox:
             now = time.monotonic()
             made = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
-                if self._begun.get(order.id) is not token:
+                if self._starting.get(order.id) is not token:
                     return  # ended meanwhile
                 self._repeated[order.id] = made
                 if self._thread is None and not self._is_closed:
                     self._thread = threading.Thread(target=self._run, name="studio-sending", daemon=True)
                     self._thread.start()
                 self._changed.notify_all()
-            self._tell(SendResult(order, "began"))
+            self._add_result(SendResult(order, "began"))
 
         def begin_then(node: Node) -> None:
             try:
                 begin_it(node)
             finally:
                 with self._changed:
-                    if self._begun.get(order.id) is token:
-                        del self._begun[order.id]
+                    if self._starting.get(order.id) is token:
+                        del self._starting[order.id]
 
         self._submit("", self._guarded(order, asked_s, begin_then))
         return True
@@ -200,21 +200,21 @@ class Outbox:
     def end(self, order_id: str) -> None:
         """End a repeated message."""
         with self._changed:
-            self._begun.pop(order_id, None)
+            self._starting.pop(order_id, None)
             ended = self._repeated.pop(order_id, None)
             self._changed.notify_all()
         if ended is not None:
-            self._tell_end(ended)
+            self._report_end(ended)
 
     def end_all(self) -> None:
         """End all sending and close the publishers."""
         with self._changed:
-            self._begun.clear()
+            self._starting.clear()
             ids = list(self._repeated)
         for each in ids:
             self.end(each)
         if self._publishers and not self._is_closed:
-            self._submit("", lambda _node: self._leave())
+            self._submit("", lambda _node: self._close_unused())
 
     def close(self) -> None:
         """End everything and wait for the thread, which waits for no other."""
@@ -234,9 +234,9 @@ class Outbox:
                     raise NepError(_("not sent: there was no master"))
                 job(node)
             except NepError as error:
-                self._tell(SendResult(order, "failed", str(error)))
+                self._add_result(SendResult(order, "failed", str(error)))
             except Exception as error:  # noqa: BLE001 - reported as the result of this message
-                self._tell(SendResult(order, "failed", error_words(error)))
+                self._add_result(SendResult(order, "failed", error_words(error)))
 
         return run
 
@@ -245,13 +245,13 @@ class Outbox:
         if self._gate is None:
             return
         heard = publisher.subscribers
-        if heard == self._heard.get(publisher):
+        if heard == self._last_subscriber_counts.get(publisher):
             refusal = self._gate.refusal(order.topic)
         else:
             refusal = self._gate.refusal_now(node, order.topic)
         if refusal:
             raise NepError(_("not sent: {reason}").format(reason=refusal))
-        self._heard[publisher] = heard
+        self._last_subscriber_counts[publisher] = heard
 
     def _publisher(self, node: Node, order: SendOrder) -> Publisher:
         key = (order.topic, order.msg_type)
@@ -265,7 +265,7 @@ class Outbox:
             known = self._publishers[key] = node.new_pub(order.topic, order.msg_type)
         return known
 
-    def _leave(self) -> None:
+    def _close_unused(self) -> None:
         with self._changed:
             used = {(each.order.topic, each.order.msg_type) for each in self._repeated.values()}
         if self._arming.is_on:
@@ -275,17 +275,17 @@ class Outbox:
 
     def _close(self, key: tuple[str, str]) -> None:
         publisher = self._publishers.pop(key)
-        self._heard.pop(publisher, None)
+        self._last_subscriber_counts.pop(publisher, None)
         publisher.close()
 
-    def _tell(self, result: SendResult) -> None:
+    def _add_result(self, result: SendResult) -> None:
         self._results.append(result)
 
-    def _tell_end(self, ended: Repeated, sentence: str = "") -> None:
+    def _report_end(self, ended: Repeated, sentence: str = "") -> None:
         if not ended.is_over.is_set():
             ended.is_over.set()
             kind = "failed" if sentence else "ended"
-            self._tell(SendResult(ended.order, kind, sentence, ended.heard, ended.count, ended.skipped))
+            self._add_result(SendResult(ended.order, kind, sentence, ended.heard, ended.count, ended.skipped))
 
     # ---- thread of repeated messages
 
@@ -301,9 +301,9 @@ class Outbox:
                     self._changed.wait(None if next_s is None else max(0.0, next_s - now))
                     continue
             for each in due:
-                self._repeat(each)
+                self._send_repeated(each)
 
-    def _repeat(self, each: Repeated) -> None:
+    def _send_repeated(self, each: Repeated) -> None:
         problem = ""
         try:
             made = codec_for(each.order.msg_type).encode(each.order.make())
@@ -313,12 +313,12 @@ class Outbox:
             is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)
         if is_done:
             each.heard = each.publisher.subscribers
-            each.skipped += self._next(each)
+            each.skipped += self._schedule_next(each)
             return
         with self._changed:
             if self._repeated.get(each.order.id) is each:
                 del self._repeated[each.order.id]
-        self._tell_end(each, problem)
+        self._report_end(each, problem)
 
     def _publish(self, each: Repeated, made: object) -> None:
         with self._changed:  # an ended message is not sent once more
@@ -327,7 +327,7 @@ class Outbox:
                 each.count += 1
 
     @staticmethod
-    def _next(each: Repeated) -> int:
+    def _schedule_next(each: Repeated) -> int:
         # Sets the next due time; returns the number of messages omitted because they are late.
         period_s = 1 / each.rate_hz
         late = max(0, int((time.monotonic() - each.due_s) / period_s))

@@ -90,7 +90,7 @@ class Shelf:
 
     def put(self, message: KeptMessage) -> bool:
         """Add a message or replace the one with this id; return False when the shelf is full."""
-        place = self._place(message.id)
+        place = self._index(message.id)
         if place is None:
             if len(self._messages) >= MOST_MESSAGES:
                 return False
@@ -104,7 +104,7 @@ class Shelf:
 
     def copy(self, id: str) -> KeptMessage | None:
         """Insert a copy below a message; return None if it doesn't exist or the shelf is full."""
-        place = self._place(id)
+        place = self._index(id)
         if place is None or len(self._messages) >= MOST_MESSAGES:
             return None
         old = self._messages[place]
@@ -124,7 +124,7 @@ class Shelf:
 
     def remove(self, id: str) -> KeptMessage | None:
         """Remove and return a message; `put_back` undoes it."""
-        place = self._place(id)
+        place = self._index(id)
         if place is None:
             return None
         removed = self._messages.pop(place)
@@ -150,7 +150,7 @@ class Shelf:
                 self._requests.pop(next(iter(self._requests)))
             self.revision += 1
 
-    def _place(self, id: str) -> int | None:
+    def _index(self, id: str) -> int | None:
         return next((place for place, each in enumerate(self._messages) if each.id == id), None)
 
 

@@ -16,7 +16,7 @@ from nep.recordings.formats.schemas import schema_of
 WRITTEN = frozenset({"json", "msgpack", "string"})
 """Codecs of messages that can be written as text."""
 _SCALARS: Mapping[str, object] = {"string": "", "boolean": False, "integer": 0, "number": 0.0, "array": []}
-_DEEPEST = 10
+_MAX_DEPTH = 10
 
 
 def is_written(msg_type: str) -> bool:
@@ -47,7 +47,7 @@ def text_of_type(msg_type: str) -> str:
 
 
 def _example(schema: object, depth: int) -> object:
-    if not isinstance(schema, Mapping) or depth > _DEEPEST:
+    if not isinstance(schema, Mapping) or depth > _MAX_DEPTH:
         return None
     kind = schema.get("type")
     if kind == "object":
