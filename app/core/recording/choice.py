@@ -26,8 +26,8 @@ MOST_NAMES = 1_000
 MOST_LETTERS = 80
 """Maximum length of a file name, which with its suffix all file systems accept."""
 NOT = lazy("not")
-_NEVER_IN_NAMES = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
-_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
+_INVALID_CHARACTERS = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
+_RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,9 +184,9 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def file_stem(name: str) -> str:
     """Return a name that is valid as a file name on every system; "" when nothing of it is left."""
-    plain = _NEVER_IN_NAMES.sub(" ", name)
+    plain = _INVALID_CHARACTERS.sub(" ", name)
     plain = " ".join(plain.split())[:MOST_LETTERS].strip(" .")
-    return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
+    return f"_{plain}" if _RESERVED_NAMES.fullmatch(plain) else plain
 
 
 def free_path(wanted: Path, *, is_folder: bool = False) -> Path:

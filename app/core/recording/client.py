@@ -201,11 +201,11 @@ class RecorderClient:
         # `post_event` passes events of the process's threads to `on_event`.
         self._address, self._alerts, self._post_event = address, alerts, post_event
         self._start, self._clock = start, clock
-        self._line: OrderLine | None = None
+        self._process: OrderLine | None = None
         self._number = 0
         self._ring: RingChoice | None = None
-        self._again_at, self._again_s = 0.0, AGAIN_S
-        self._on: Mapping[str, Callable[[Mapping[str, object]], None]] = {
+        self._retry_at, self._backoff_s = 0.0, AGAIN_S
+        self._handlers: Mapping[str, Callable[[Mapping[str, object]], None]] = {
             "recording": self._on_recording,
             "figures": self._on_figures,
             "ended": self._on_ended,
@@ -250,7 +250,7 @@ class RecorderClient:
         )
         limits = {"seconds": seconds, "size_bytes": most_bytes}
         ends = {name: limit for name, limit in limits.items() if limit is not None}
-        self._order(
+        self._send(
             op="record", path=str(path), topics=list(topics), left_out=list(left_out), note=note, **ends
         )
         return True
@@ -259,12 +259,12 @@ class RecorderClient:
         """Stop recording; the file is complete when ``phase`` is "" again."""
         if self.state.phase in {"starting", "recording"}:
             self._set(replace(self.state, phase="ending"))
-            self._order(op="stop")
+            self._send(op="stop")
 
     def note(self, text: str) -> None:
         """Add a bookmark with this text to the recording."""
         if self.state.phase == "recording":
-            self._order(op="note", text=text)
+            self._send(op="note", text=text)
 
     def say(self, role: str, value: Mapping[str, object], to: str = "") -> None:
         """Add an event to the recording and the flight recorder, if they are on.
@@ -272,37 +272,37 @@ class RecorderClient:
         ``to`` restricts it to "recording" or "ring".
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
-        if self._line is not None and is_heard:
-            self._line.order({"op": "say", "role": role, "value": dict(value), "to": to})
+        if self._process is not None and is_heard:
+            self._process.order({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def follow_ring(self, choice: RingChoice | None) -> None:
         """Switch the flight recorder on with this selection, or off. It restarts after a failure."""
         if choice == self._ring:
             return
         was_on, self._ring = self._ring is not None, choice
-        self._again_at, self._again_s = 0.0, AGAIN_S
+        self._retry_at, self._backoff_s = 0.0, AGAIN_S
         self._alerts.resolve("recorder:ring")
-        if was_on and self._line is not None:
-            self._order(op="end_ring")
+        if was_on and self._process is not None:
+            self._send(op="end_ring")
         if choice is not None:
             self._begin_ring(choice)
 
     def keep(self, path: Path, seconds: float, note: str = "") -> bool:
         """Save the last seconds to a file; return False without a flight recorder, or with too many saves."""
-        if self._ring is None or self._line is None or len(self.state.keeping) >= MOST_KEEPING:
+        if self._ring is None or self._process is None or len(self.state.keeping) >= MOST_KEEPING:
             return False
         self._set(replace(self.state, keeping=(*self.state.keeping, path)))
-        self._order(op="keep", path=str(path), seconds=seconds, note=note)
+        self._send(op="keep", path=str(path), seconds=seconds, note=note)
         return True
 
     def check(self) -> None:
         """Restart a flight recorder that ended unexpectedly. Called once a second."""
-        if self._ring is not None and self._line is None and self._clock() >= self._again_at:
+        if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
             self._begin_ring(self._ring)
 
     def close(self, wait_s: float = END_WAIT_S) -> None:
         """Close the process, which finishes its work even beyond the time waited here."""
-        line, self._line = self._line, None
+        line, self._process = self._process, None
         if line is not None:
             line.close(wait_s)
 
@@ -310,12 +310,12 @@ class RecorderClient:
 
     def on_event(self, event: RecorderSaid | RecorderGone) -> None:
         """Apply a posted event; those of earlier processes are ignored."""
-        if event.process != self._number or self._line is None:
+        if event.process != self._number or self._process is None:
             return
         if isinstance(event, RecorderGone):
             self._on_gone(event.detail)
             return
-        told = self._on.get(str(event.content.get("event")))
+        told = self._handlers.get(str(event.content.get("event")))
         if told is not None:
             told(event.content)
 
@@ -327,13 +327,15 @@ class RecorderClient:
         state = self.state
         recording, ring = content.get("recording"), content.get("ring")
         if isinstance(recording, Mapping) and state.phase:
-            state = replace(_with_status(state, recording), free_bytes=_whole(content.get("free_bytes")))
+            state = replace(
+                _with_status(state, recording), free_bytes=_non_negative_int(content.get("free_bytes"))
+            )
         if isinstance(ring, Mapping) and self._ring is not None:
             seconds = ring.get("seconds")
             state = replace(
                 state,
                 ring_s=float(seconds) if isinstance(seconds, int | float) else 0.0,
-                ring_bytes=_whole(ring.get("size_bytes")) or 0,
+                ring_bytes=_non_negative_int(ring.get("size_bytes")) or 0,
             )
         self._set(state)
         self._warn()
@@ -351,11 +353,11 @@ class RecorderClient:
                 "recorder:ended",
                 "error",
                 _("The recording stopped: {reason}.").format(reason=problem),
-                _said(path),
+                _path_words(path),
             )
 
     def _on_ring(self, _content: Mapping[str, object]) -> None:
-        self._again_s = AGAIN_S
+        self._backoff_s = AGAIN_S
         self._alerts.resolve("recorder:ring")
         if self._ring is not None:
             self._set(replace(self.state, ring_s=self.state.ring_s or 0.0))
@@ -365,13 +367,13 @@ class RecorderClient:
         problem = status.get("problem") if isinstance(status, Mapping) else ""
         if isinstance(problem, str) and problem:
             self._ring = None  # the user switches it on again when there is space
-            self._tell_of_ring(problem)
+            self._alert_ring_off(problem)
         if self._ring is None:
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
 
     def _on_kept(self, content: Mapping[str, object]) -> None:
         path = _path(content)
-        self._set(replace(self._no_longer_keeping(path), last=path or self.state.last))
+        self._set(replace(self._without_keeping(path), last=path or self.state.last))
 
     def _on_problem(self, content: Mapping[str, object]) -> None:
         op, sentence = content.get("op"), str(content.get("sentence", ""))
@@ -379,33 +381,33 @@ class RecorderClient:
             self._set(replace(self.state, phase="", path=None))
             self._alerts.put("recorder:ended", "error", _("Nothing is being recorded."), sentence)
         elif op == "keep":
-            self._set(self._no_longer_keeping(_path(content)))
+            self._set(self._without_keeping(_path(content)))
             self._alerts.put("recorder:keep", "error", _("The last seconds could not be saved."), sentence)
         elif op == "ring":
             self._ring = None
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
-            self._tell_of_ring(sentence)
+            self._alert_ring_off(sentence)
         elif op == "stop":
             self._set(replace(self.state, phase=""))
             self._alerts.put("recorder:ended", "error", _("The recording could not be closed."), sentence)
 
     def _on_gone(self, detail: str) -> None:
-        before, self._line = self.state, None
-        self._again_at = self._clock() + self._again_s
-        self._again_s = min(2 * self._again_s, AGAIN_AT_MOST_S)
+        before, self._process = self.state, None
+        self._retry_at = self._clock() + self._backoff_s
+        self._backoff_s = min(2 * self._backoff_s, AGAIN_AT_MOST_S)
         self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, keeping=()))
         if before.phase:
             title = _("The recorder stopped. Everything up to a second before that is saved.")
-            self._alerts.put("recorder:ended", "error", title, detail or _said(before.path))
+            self._alerts.put("recorder:ended", "error", title, detail or _path_words(before.path))
         if before.keeping:
             title = _("The last seconds could not be saved.")
             self._alerts.put("recorder:keep", "error", title, detail)
         if self._ring is not None:
-            self._tell_of_ring(detail)
+            self._alert_ring_off(detail)
 
     # ---- private
 
-    def _tell_of_ring(self, reason: str) -> None:
+    def _alert_ring_off(self, reason: str) -> None:
         title = _("The flight recorder is off: the last seconds can't be saved.")
         self._alerts.put("recorder:ring", "warn", title, reason)
 
@@ -430,7 +432,7 @@ class RecorderClient:
             self._alerts.put("recorder:unkept", "warn", title.format(count=state.unkept), count=0)
 
     def _begin_ring(self, choice: RingChoice) -> None:
-        self._order(
+        self._send(
             op="ring",
             folder=str(choice.folder),
             seconds=choice.seconds,
@@ -439,14 +441,14 @@ class RecorderClient:
             left_out=list(choice.left_out),
         )
 
-    def _order(self, **content: object) -> None:
-        if self._line is None:
+    def _send(self, **content: object) -> None:
+        if self._process is None:
             self._number += 1
-            self._line = self._start(self._number, self._address, self._post_event)
-        if not self._line.order(content):
+            self._process = self._start(self._number, self._address, self._post_event)
+        if not self._process.order(content):
             self._on_problem({**content, "sentence": _("the recorder does not respond")})
 
-    def _no_longer_keeping(self, path: Path | None) -> RecorderState:
+    def _without_keeping(self, path: Path | None) -> RecorderState:
         return replace(self.state, keeping=tuple(each for each in self.state.keeping if each != path))
 
     def _set(self, state: RecorderState) -> None:
@@ -462,16 +464,16 @@ def _with_status(state: RecorderState, status: Mapping[str, object]) -> Recorder
     duration = status.get("duration_s")
     return replace(
         state,
-        message_count=_whole(status.get("message_count")) or 0,
-        size_bytes=_whole(status.get("size_bytes")) or 0,
+        message_count=_non_negative_int(status.get("message_count")) or 0,
+        size_bytes=_non_negative_int(status.get("size_bytes")) or 0,
         duration_s=float(duration) if isinstance(duration, int | float) else 0.0,
         lost=sum(each.lost or 0 for each in topics.values()),
-        unkept=_whole(status.get("unkept")) or 0,
+        unkept=_non_negative_int(status.get("unkept")) or 0,
         topics=topics,
     )
 
 
-def _whole(value: object) -> int | None:
+def _non_negative_int(value: object) -> int | None:
     return value if type(value) is int and value >= 0 else None
 
 
@@ -480,5 +482,5 @@ def _path(content: Mapping[str, object]) -> Path | None:
     return Path(path) if isinstance(path, str) and path else None
 
 
-def _said(path: Path | None) -> str:
+def _path_words(path: Path | None) -> str:
     return "" if path is None else str(path)

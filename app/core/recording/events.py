@@ -16,7 +16,7 @@ from nep.programs.alarms.sentences import what_words
 MOST_PRESENT = 200
 """Maximum number of present alarms that are repeated; further ones are sent once."""
 MOST_LETTERS = 200
-_GOES_ON = frozenset({"running", "paused"})
+_ACTIVE_STATES = frozenset({"running", "paused"})
 
 
 class Say(Protocol):
@@ -53,7 +53,7 @@ class RecordedEvents:
         before, self._run = self._run, run
         if run is before:
             return
-        was_on, is_on = before is not None and before.state in _GOES_ON, run.state in _GOES_ON
+        was_on, is_on = before is not None and before.state in _ACTIVE_STATES, run.state in _ACTIVE_STATES
         is_same = was_on and before is not None and _is_same(before, run)
         if was_on and not (is_on and is_same):
             self._end_run(run if is_same else None)
@@ -61,7 +61,7 @@ class RecordedEvents:
             self._tell_result(run)
         if is_on and not is_same:
             self._run_told = self._new(f"run-{next(self._numbers)}", run.trying or run.name)
-            self._put("runs", self._run_told)
+            self._add("runs", self._run_told)
 
     def _end_run(self, run: RunState | None) -> None:
         # `run` is None if the end was not observed.
@@ -99,7 +99,7 @@ class RecordedEvents:
         told = self._new(f"{key}-{next(self._numbers)}", what_words(condition, event.seen))
         told["severity"] = severity_of(condition)
         told["topic"] = "" if condition.is_about_node else condition.name
-        self._put("alarms", told, key)
+        self._add("alarms", told, key)
 
     # ---- private
 
@@ -107,7 +107,7 @@ class RecordedEvents:
         since_ns = self._clock_ns()
         return {"id": f"{id}-{since_ns}", "name": name[:MOST_LETTERS], "since_ns": since_ns, "until_ns": None}
 
-    def _put(self, role: str, told: Mapping[str, object], key: str = "") -> None:
+    def _add(self, role: str, told: Mapping[str, object], key: str = "") -> None:
         self._say(role, dict(told))
         if len(self._present) < MOST_PRESENT:
             self._present[key or str(told["id"])] = (role, told)

@@ -85,7 +85,7 @@ class RecordingExport:
     def _run(self) -> None:
         try:
             with self._opener.open(self._recording) as recording:
-                made = export(recording, self._kind, self.folder, self._part, progress=self._tell)
+                made = export(recording, self._kind, self.folder, self._part, progress=self._report_progress)
                 self.damage = damage_words(recording.damage, recording.start_ns)
             self.files = tuple(made)
         except _CancelledError:
@@ -96,7 +96,7 @@ class RecordingExport:
             self._opener.close()
             self._is_over.set()
 
-    def _tell(self, done: int, total: int) -> None:
+    def _report_progress(self, done: int, total: int) -> None:
         self._progress = (done, total)
         if self._is_cancelled.is_set():
             raise _CancelledError

@@ -53,7 +53,7 @@ _GB = 1_000_000_000
 _KEPT_FILE = re.compile(r"[\w.-]+\.mcap\b")
 
 
-def _nobody(_path: Path, _kind: str) -> None: ...
+def _ignore_made(_path: Path, _kind: str) -> None: ...
 
 
 class SessionRecordings:
@@ -81,10 +81,10 @@ class SessionRecordings:
         self.events = RecordedEvents(self.client.say)
         self.choice = read_choice(settings.get(CHOICE_KEY, {}))
         self.wish = read_wish(settings.get(RING_KEY, {}))
-        self.on_made: Callable[[Path, str], object] = _nobody
+        self.on_made: Callable[[Path, str], object] = _ignore_made
         self.recorded = self.choice
         """Selection of the recording in progress."""
-        self._began: float | None = None
+        self._started_s: float | None = None
         self._keeping: dict[Path, Done | None] = {}
 
     # ---- folder
@@ -97,7 +97,7 @@ class SessionRecordings:
 
     def set_folder(self, folder: Path) -> None:
         """Set and save the folder of recordings."""
-        self._put(FOLDER_KEY, str(folder))
+        self._save_setting(FOLDER_KEY, str(folder))
         self._alerts.resolve(NO_FOLDER)
 
     def _ready_folder(self) -> Path | None:
@@ -140,12 +140,12 @@ class SessionRecordings:
     @property
     def elapsed_s(self) -> float:
         """Duration of the recording in seconds; 0 when idle or while its process starts."""
-        return 0.0 if self._began is None else max(0.0, self._clock() - self._began)
+        return 0.0 if self._started_s is None else max(0.0, self._clock() - self._started_s)
 
     def choose(self, choice: RecordingChoice) -> None:
         """Set and save the selection for the next recordings."""
         self.choice = choice
-        self._put(CHOICE_KEY, plain_choice(choice))
+        self._save_setting(CHOICE_KEY, plain_choice(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
         """Start a recording; return a sentence why it can't start, or "".
@@ -173,7 +173,7 @@ class SessionRecordings:
             seconds=None if choice.ends_min is None else 60.0 * choice.ends_min,
             most_bytes=None if choice.ends_gb is None else round(choice.ends_gb * _GB),
         )
-        self.recorded, self._began = choice, None
+        self.recorded, self._started_s = choice, None
         return ""
 
     def stop(self) -> None:
@@ -193,7 +193,7 @@ class SessionRecordings:
         Another selection of topics restarts it: its content is discarded.
         """
         self.wish = wish
-        self._put(RING_KEY, plain_wish(wish))
+        self._save_setting(RING_KEY, plain_wish(wish))
         self._follow_wish()
 
     def _follow_wish(self) -> None:
@@ -252,10 +252,10 @@ class SessionRecordings:
         self.client.on_event(event)
         state = self.client.state
         if was.phase == "starting" and state.phase == "recording":
-            self._began = self._clock()
+            self._started_s = self._clock()
             self.events.repeat("recording")
         if was.phase and not state.phase:
-            self._began = None
+            self._started_s = None
             if state.last is not None and state.last == was.path:
                 self.on_made(state.last, "recorded")
         for path in [each for each in self._keeping if each not in state.keeping]:
@@ -271,7 +271,7 @@ class SessionRecordings:
         """Close; the process finishes a recording in progress, even after Studio has ended."""
         self.client.close()
 
-    def _put(self, key: str, value: object) -> None:
+    def _save_setting(self, key: str, value: object) -> None:
         with suppress(SettingsError):  # an alert reports that settings can't be saved
             self._settings.set(key, value)
 

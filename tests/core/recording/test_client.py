@@ -178,7 +178,7 @@ def test_the_flight_recorder_keeps_the_last_seconds_and_comes_back(made):
         assert client.state.ring_s is None
         assert "recorder:ring" in made.told()
         started = made.now
-        while client._line is None:
+        while client._process is None:
             made.now += 1.0
             client.check()
         waits.append(made.now - started)

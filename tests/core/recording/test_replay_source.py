@@ -160,7 +160,7 @@ def test_only_the_last_of_many_seeks_is_done(replay, whole):
     played = replay("/a")
     for log_ns, _message in whole:
         played.source.order("seek", lambda playback, at_ns=log_ns: playback.seek(at_ns))
-    assert len(played.source._orders) == 1
+    assert len(played.source._changes) == 1
     played.source.turn()
     assert played.source.status.player.position_ns == whole[-1][0]
 

@@ -285,7 +285,7 @@ class Replay:
         """Apply the messages of the thread since the last tick; ``now`` is monotonic seconds."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._opened(self.source.opened, now)
-        self._tell_problems()
+        self._alert_problems()
         handed = self.source.take()
         if handed.jump is not None:
             self._take_jump(handed.jump, now)
@@ -323,9 +323,9 @@ class Replay:
                 self.source.set_deep(topic, CAPACITY)
                 self._logs.append(self.watch(topic))
 
-        self._tell_not_closed(opened)
+        self._alert_not_closed(opened)
 
-    def _tell_problems(self) -> None:
+    def _alert_problems(self) -> None:
         status = self.status
         reason = status.sentence if status.stage == "failed" else ""
         if not reason and self.densities is not None:
@@ -342,7 +342,7 @@ class Replay:
             detail = damage_words(status.damage, self.start_ns)
             self._alerts.put(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
 
-    def _tell_not_closed(self, opened: OpenedRecording) -> None:
+    def _alert_not_closed(self, opened: OpenedRecording) -> None:
         # Of a file that was cut off, or whose program was killed.
         recording = opened.recording
         if recording.is_complete:

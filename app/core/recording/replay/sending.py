@@ -80,36 +80,36 @@ class ReplayOutbox:
         # checked.
         self._arming, self._submit, self._gate = arming, submit, gate
         self._lock = threading.Lock()
-        self._going: dict[str, SentTopic] = {}
+        self._active: dict[str, SentTopic] = {}
 
     @property
     def going(self) -> tuple[SentTopic, ...]:
         """Topics that are published now."""
         with self._lock:
-            return tuple(self._going.values())
+            return tuple(self._active.values())
 
     def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
         """Publish this topic as soon as its publisher is ready, during the switch's ``turn``."""
         made = SentTopic(route, turn, is_latched)
         with self._lock:
-            old = self._going.get(route.recorded)
-            self._going[route.recorded] = made
+            old = self._active.get(route.recorded)
+            self._active[route.recorded] = made
         if old is not None:
-            self._leave(old)
-        self._ask(made, msg_type)
+            self._close_later(old)
+        self._create_publisher(made, msg_type)
 
     def end(self, recorded: str) -> SentTopic | None:
         """Stop publishing a topic; return its state."""
         with self._lock:
-            ended = self._going.pop(recorded, None)
+            ended = self._active.pop(recorded, None)
         if ended is not None:
-            self._leave(ended)
+            self._close_later(ended)
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
         """Publish messages that were played just now, each with its delay in seconds."""
         with self._lock:
-            going = dict(self._going)
+            going = dict(self._active)
         for message, late in zip(messages, late_s, strict=True):
             sent = going.get(message.topic)
             if sent is not None and sent.is_ready and not sent.problem:
@@ -119,7 +119,7 @@ class ReplayOutbox:
         kind = published_type(message)
         publisher = sent.publishers.get(kind)
         if publisher is None:
-            self._ask(sent, kind)
+            self._create_publisher(sent, kind)
         if publisher is None or late_s > LATE_S or self._is_refused(sent, publisher):
             sent.skipped += 1
             return
@@ -146,7 +146,7 @@ class ReplayOutbox:
 
     # ---- in the network thread
 
-    def _ask(self, sent: SentTopic, msg_type: str) -> None:
+    def _create_publisher(self, sent: SentTopic, msg_type: str) -> None:
         if msg_type in sent.asked or len(sent.asked) >= MOST_TYPES:
             return
         sent.asked.add(msg_type)
@@ -170,9 +170,9 @@ class ReplayOutbox:
 
     def _is_going(self, sent: SentTopic) -> bool:
         with self._lock:
-            return self._going.get(sent.route.recorded) is sent
+            return self._active.get(sent.route.recorded) is sent
 
-    def _leave(self, sent: SentTopic) -> None:
+    def _close_later(self, sent: SentTopic) -> None:
         self._submit("", lambda _node: self._close(sent))
 
     @staticmethod
@@ -193,11 +193,11 @@ class ReplaySending:
         self._opened: OpenedRecording | None = None
         self._moving: MovingTopics | None = None
         self._latched: frozenset[str] = frozenset()
-        self._asks: list[ReplayRoute] = []
-        self._waits = False
+        self._pending_routes: list[ReplayRoute] = []
+        self._is_asking = False
         """True if the question about the first of them is open."""
         self._worker: BackgroundWorker[tuple[MovingTopics, frozenset[str]]] | None = None
-        self.on_change: Callable[[], object] = _nothing
+        self.on_change: Callable[[], object] = _ignore
         """Called when the published topics change."""
 
     def open(self, opened: OpenedRecording) -> None:
@@ -215,7 +215,7 @@ class ReplaySending:
             return
         recording = self._opened.recording
         self._worker = BackgroundWorker("studio-moving")
-        self._worker.ask("topics", lambda: _facts_of(recording))
+        self._worker.ask("topics", lambda: _moving_and_latched_topics(recording))
 
     def moves(self, recorded: str, name: str) -> bool:
         """Return whether messages of a topic move a robot, under its own or another name."""
@@ -267,21 +267,21 @@ class ReplaySending:
         }
         going = {sent.route for sent in self.outbox.going}
         missing = [route for route in wanted if route not in going]
-        self._asks = sorted(missing, key=lambda route: self._acting.asks(route.target))
-        return self._go_on()
+        self._pending_routes = sorted(missing, key=lambda route: self._acting.asks(route.target))
+        return self._begin_next()
 
-    def _go_on(self) -> str:
-        self._waits = False
-        while self._asks:
-            route, turn = self._asks[0], self._acting.arming.turn
-            not_armed = self._acting.ready(route.target, self._go_on)
+    def _begin_next(self) -> str:
+        self._is_asking = False
+        while self._pending_routes:
+            route, turn = self._pending_routes[0], self._acting.arming.turn
+            not_armed = self._acting.ready(route.target, self._begin_next)
             if not_armed:
-                self._asks = []
+                self._pending_routes = []
                 return not_armed
             if not_armed is not None:
-                self._waits = bool(self._asks)
+                self._is_asking = bool(self._pending_routes)
                 break
-            self._asks.remove(route)
+            self._pending_routes.remove(route)
             self._begin(route, turn)
         return ""
 
@@ -292,56 +292,56 @@ class ReplaySending:
         topic = opened.recording.topics[route.recorded]
         self._acting.tell_moved(route.target, "replay")
         self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
-        self._say(route, _("sent as it is played"))
+        self._log(route, _("sent as it is played"))
         self._changed()
 
     def end(self) -> None:
         """Stop publishing: the recording closes."""
-        if self.outbox.going or self._asks:
+        if self.outbox.going or self._pending_routes:
             self._acting.disarm()
         self._end_all()
         if self._worker is not None:
             self._worker.close()
 
     def _end_all(self) -> None:
-        self._asks = []
+        self._pending_routes = []
         for sent in self.outbox.going:
             self._end(sent)
 
     def _end(self, sent: SentTopic) -> None:
         if self.outbox.end(sent.route.recorded) is not None:
             words = ", ".join(filter(None, (sent.problem, sent_words(sent))))
-            self._say(sent.route, words, sent.count, is_bad=bool(sent.problem))
+            self._log(sent.route, words, sent.count, is_bad=bool(sent.problem))
             self._changed()
 
     def _changed(self) -> None:
         self.revision += 1
         self.on_change()
 
-    def _say(self, route: ReplayRoute, words: str, sent: int = 0, *, is_bad: bool = False) -> None:
+    def _log(self, route: ReplayRoute, words: str, sent: int = 0, *, is_bad: bool = False) -> None:
         if route.name != route.recorded:
             words = _("{topic} of the recording, {what}").format(topic=route.recorded, what=words)
         self._acting.tell("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
         """Apply changes: end topics that are no longer allowed, or that move a new robot."""
-        self._take_facts()
+        self._apply_facts()
         arming = self._acting.arming
         if not arming.is_on:
-            self._asks = []
+            self._pending_routes = []
         for sent in self.outbox.going:
             target = sent.route.target
             if sent.problem or sent.turn != arming.turn or not arming.allows(target):
                 self._end(sent)
             elif not self._acting.may_go_on(target):
                 self._end(sent)
-                self._asks.append(sent.route)
-        if self._asks and not self._acting.is_asking:
-            if self._waits:  # the answer was no
-                del self._asks[0]
-            self._go_on()
+                self._pending_routes.append(sent.route)
+        if self._pending_routes and not self._acting.is_asking:
+            if self._is_asking:  # the answer was no
+                del self._pending_routes[0]
+            self._begin_next()
 
-    def _take_facts(self) -> None:
+    def _apply_facts(self) -> None:
         if self._worker is None or self._moving is not None or self._opened is None:
             return
         try:
@@ -353,7 +353,7 @@ class ReplaySending:
             self.revision += 1
 
 
-def _facts_of(recording: Recording) -> tuple[MovingTopics, frozenset[str]]:
+def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, frozenset[str]]:
     return moving_topics(recording), latched_topics(recording, recording.topics)
 
 
@@ -369,4 +369,4 @@ def late_words(count: int) -> str:
     return said.format(count=count)
 
 
-def _nothing() -> None: ...
+def _ignore() -> None: ...

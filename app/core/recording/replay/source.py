@@ -110,7 +110,7 @@ class ReplaySource:
         self.opened: OpenedRecording | None = None
         self._pictures, self._clock = pictures, clock
         self._changed = threading.Condition()
-        self._orders: list[tuple[str, Order]] = []
+        self._changes: list[tuple[str, Order]] = []
         self._watched: set[str] = set()
         self._deep: dict[str, int] = {}
         self._chosen: frozenset[str] = frozenset()
@@ -118,7 +118,7 @@ class ReplaySource:
         self._played: frozenset[str] = frozenset()
         self._forward: Forward | None = None
         self._mailbox = Mailbox()
-        self._handed = Handed()
+        self._results = Handed()
         self._status = ReplayStatus("reading")
         self._closing = False
         self._playback: Playback | None = None
@@ -145,10 +145,10 @@ class ReplaySource:
         seeks only to its newest position.
         """
         with self._changed:
-            if self._orders and self._orders[-1][0] == kind:
-                self._orders[-1] = (kind, change)
+            if self._changes and self._changes[-1][0] == kind:
+                self._changes[-1] = (kind, change)
             else:
-                self._orders.append((kind, change))
+                self._changes.append((kind, change))
             self._changed.notify_all()
 
     def watch(self, topic: str) -> None:
@@ -173,7 +173,7 @@ class ReplaySource:
             self._mailbox.set_room(topic, room)
             is_watched = topic in self._watched
         if room is not None and is_watched:  # otherwise its history is read when it is watched
-            self.order(f"history {topic}", lambda playback: self._look_back(playback, [topic]))
+            self.order(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
         """Also pass messages of these topics to ``to`` as they are played, except those of a seek."""
@@ -184,7 +184,7 @@ class ReplaySource:
     def take(self) -> Handed:
         """Return and clear the results since the last call."""
         with self._changed:
-            handed, self._handed = self._handed, Handed()
+            handed, self._results = self._results, Handed()
             handed.drained = self._mailbox.drain()
         return handed
 
@@ -217,7 +217,7 @@ class ReplaySource:
             while True:
                 wait_s = self.turn()
                 with self._changed:
-                    if not self._closing and not self._orders:
+                    if not self._closing and not self._changes:
                         self._changed.wait(wait_s)
                     if self._closing:
                         return
@@ -236,12 +236,12 @@ class ReplaySource:
 
     def open(self) -> None:
         """Read the index and seek to the first message. Raises `RecordingError`."""
-        self.opened = opened = open_recording(self.path, self._tell_progress, self._opener)
+        self.opened = opened = open_recording(self.path, self._report_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
-        self._tell(playback)
+        self._update_status(playback)
 
-    def _tell_progress(self, progress: float) -> None:
+    def _report_progress(self, progress: float) -> None:
         if self._closing:
             raise _ClosingError
         self._status = ReplayStatus("reading", progress)
@@ -255,7 +255,7 @@ class ReplaySource:
         if playback is None:
             return None
         with self._changed:
-            orders, self._orders = self._orders, []
+            orders, self._changes = self._changes, []
         was_playing = playback.status().is_playing
         for _kind, change in orders:
             change(playback)
@@ -265,22 +265,22 @@ class ReplaySource:
         due = playback.advance()
         if due.is_jump:
             self._jump(due.messages)
-            self._tell(playback)
+            self._update_status(playback)
             with self._changed:
                 deep = frozenset(self._deep)
-            self._look_back(playback, deep & self._chosen)
+            self._read_history(playback, deep & self._chosen)
         else:
             if self._sent:
                 self._forward_on(due.messages, late_of(due, playback.status()))
-            self._hand([each for each in due.messages if each.topic in self._chosen])
-            self._tell(playback)
+            self._pass_on([each for each in due.messages if each.topic in self._chosen])
+            self._update_status(playback)
         is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
         if due.is_jump or is_due:
-            self._begin_figures(playback)
-        self._tell_figures()
+            self._schedule_figures(playback)
+        self._read_next_figures()
         return 0.0 if self._figures else due.wait_s
 
-    def _tell(self, playback: Playback) -> None:
+    def _update_status(self, playback: Playback) -> None:
         damage = self.opened.recording.damage if self.opened is not None else ()
         self._status = ReplayStatus("there", 1.0, player=playback.status(), damage=damage)
 
@@ -295,14 +295,14 @@ class ReplaySource:
         if played and self.opened is not None:
             before = self.opened.recording.newest(playback.status().position_ns, played)
             newest += [each.message for each in before.values()]
-        self._hand([each for each in newest if each.topic in seen - new])
+        self._pass_on([each for each in newest if each.topic in seen - new])
         self._chosen, self._played = wanted, wanted | sent
-        self._look_back(playback, new)
+        self._read_history(playback, new)
 
-    def _hand(self, messages: Sequence[Message]) -> None:
+    def _pass_on(self, messages: Sequence[Message]) -> None:
         if not messages:
             return
-        own = [_own(message) for message in messages]
+        own = [_own_copy(message) for message in messages]
         self._pictures.offer([each for each in own if each.codec == "image"])
         with self._changed:
             for topic, some in groupby(sorted(own, key=_topic), key=_topic):
@@ -316,7 +316,7 @@ class ReplaySource:
             to([message for message, _late in some], [late for _message, late in some])
 
     def _jump(self, messages: Sequence[Message]) -> None:
-        own = [_own(message) for message in messages if message.topic in self._chosen]
+        own = [_own_copy(message) for message in messages if message.topic in self._chosen]
         pictures = [each for each in own if each.codec == "image"]
         self._pictures.rewind([each.topic for each in pictures])
         self._pictures.offer(pictures)
@@ -324,12 +324,12 @@ class ReplaySource:
             self._mailbox = Mailbox()
             for topic, room in self._deep.items():
                 self._mailbox.set_room(topic, room)
-            self._handed = Handed(jump=own)
+            self._results = Handed(jump=own)
 
     # -- history
     # ------------------------------------------------------------------------------------------------
 
-    def _look_back(self, playback: Playback, topics: Collection[str]) -> None:
+    def _read_history(self, playback: Playback, topics: Collection[str]) -> None:
         # Reads messages before the playhead, of topics with history.
         if not topics or self.opened is None:
             return
@@ -339,19 +339,19 @@ class ReplaySource:
         for back_s in HISTORY_S:
             from_ns = max(recording.start_ns, at_ns - round(back_s * 1e9))
             if (
-                not self._read_back(recording, (from_ns, until_ns), found, began)
+                not self._prepend_range(recording, (from_ns, until_ns), found, began)
                 or from_ns <= recording.start_ns
             ):
                 break
             until_ns = from_ns
         for topic, each in recording.newest(at_ns, [topic for topic in topics if not found[topic]]).items():
-            found[topic].append(_own(each.message))
+            found[topic].append(_own_copy(each.message))
         with self._changed:
-            self._handed.history.update({topic: list(messages) for topic, messages in found.items()})
+            self._results.history.update({topic: list(messages) for topic, messages in found.items()})
             for topic in topics:  # the history includes all pending messages
                 self._mailbox.forget(topic)
 
-    def _read_back(
+    def _prepend_range(
         self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
     ) -> bool:
         # Prepends the messages of a range; returns False when the limits are reached.
@@ -360,8 +360,8 @@ class ReplaySource:
             topic: deque(maxlen=MOST_HISTORY - len(found[topic])) for topic in topics
         }
         for number, each in enumerate(recording.read(span[0], span[1], topics)):
-            came[each.message.topic].append(_own(each.message))
-            if number % 64 == 0 and (self._orders or self._clock() - began > HISTORY_MOST_S):
+            came[each.message.topic].append(_own_copy(each.message))
+            if number % 64 == 0 and (self._changes or self._clock() - began > HISTORY_MOST_S):
                 return False  # an incomplete range would be a gap, so it is discarded
         for topic, messages in came.items():
             found[topic].extendleft(reversed(messages))
@@ -370,7 +370,7 @@ class ReplaySource:
     # -- statistics
     # ---------------------------------------------------------------------------------------------
 
-    def _begin_figures(self, playback: Playback) -> None:
+    def _schedule_figures(self, playback: Playback) -> None:
         # Some topics in each cycle, so that no command waits for all.
         if self.opened is None:
             return
@@ -379,7 +379,7 @@ class ReplaySource:
         self._next_figures = self._clock() + max(FIGURES_EVERY_S, FIGURES_SHARE * self._figures_s)
         self._figures_s = 0.0
 
-    def _tell_figures(self) -> None:
+    def _read_next_figures(self) -> None:
         if not self._figures or self.opened is None:
             return
         began, recording = self._clock(), self.opened.recording
@@ -395,7 +395,7 @@ class ReplaySource:
             for topic in topics
         }
         with self._changed:
-            self._handed.figures.update(figures)
+            self._results.figures.update(figures)
         self._figures_s += self._clock() - began
 
 
@@ -412,7 +412,7 @@ def _topic(message: Message) -> str:
     return message.topic
 
 
-def _own(message: Message) -> Message:
+def _own_copy(message: Message) -> Message:
     # Copies small messages, so that they don't keep the chunk of the file.
     if isinstance(message.raw, bytes) or message.size_bytes > OWN_BYTES:
         return message
